@@ -18,26 +18,17 @@ ALULA_ROOT = Path(__file__).resolve().parents[1]
 STATE = Path(os.environ["ALULA_STATE"])
 VENV2 = STATE / "venv2"
 INTERFACES, LIBRARY = ALULA_ROOT / "bridge/interfaces/skillset_interfaces", ALULA_ROOT / "lib"
-GENERAL = {
-    "lib": "alula",
-    "ros1_ws/src/skillset_ros1": "src/skillset_ros1",
-    "ros1_ws/src/resource_reporter": "src/resource_reporter",
-    "ros2_ws/src/skillset_ros2": "skillset_ros2",
-    "ros2_ws/src/skill_panel": "skill_panel",
-    "bridge/ros_bridge": "ros_bridge",
-}
-"""Manifest's folder: the folder of modules in it."""
-DISTRIBUTIONS = {
-    "yaml": "python3-yaml",
-    "py_trees": "python3-py-trees-pip",
-    "pydot": "python3-pydot",
-    "mcap": "python3-mcap-pip",
-    "rosbags": "python3-rosbags-pip",
-    "textual": "python3-textual-pip",
-}
-"""Packages by module, as rosdep calls them; others are called as the module, with `python3-` before it unless they are of ROS."""
+DEBIAN = {"yaml": "yaml", "cv2": "opencv", "PIL": "pil", "tf2_ros": "tf2-ros"}
+"""Debian's packages by module, where they are called otherwise; `python3-` comes before."""
+PIP = {"aiortc", "av", "gtsam", "mcap", "plyfile", "py_trees", "pymavlink", "rosbags", "textual"}
+"""What set-up has from PyPI; rosdep's names of such end in `-pip`."""
 OF_PYPI = {"yaml": "PyYAML", "z3": "z3-solver", "py_trees": "py-trees", "lsprotocol": "pygls", "zmq": "pyzmq"}
-ROS = re.compile(r"rclpy|rospy|roslib|rosgraph|genpy|actionlib|alula|skillset_ros2|skillset_interfaces|\w+_msgs|\w+_srvs|\w+_interfaces")
+ROS = re.compile(r"rclpy|rospy|roslib|rosgraph|rosbag|genpy|actionlib|alula|dynamic_reconfigure|\w+_(msgs|srvs|interfaces|managers)")
+STUBS = {"_typeshed"}
+"""What only a type checker imports."""
+LAUNCHED = re.compile(r"\$\(find (\w+)\)|pkg=\"(\w+)\"")
+ROBOTS = "examples"
+"""Robots of their own have their own folder, and manifests."""
 
 
 def copy(workspace: Path, *packages: Path) -> Path:
@@ -92,7 +83,7 @@ def imports(folder: Path) -> set[str]:
                 found |= {alias.name.partition(".")[0] for alias in node.names}
             elif isinstance(node, ast.ImportFrom) and node.level == 0:
                 found.add((node.module or "").partition(".")[0])
-    return found - sys.stdlib_module_names - {folder.name}
+    return found - sys.stdlib_module_names - STUBS - {folder.name}
 
 
 def depends(manifest: Path) -> set[str]:
@@ -101,8 +92,33 @@ def depends(manifest: Path) -> set[str]:
     return {str(element.text) for element in root if element.tag in {"depend", "exec_depend"}}
 
 
+def manifests() -> dict[str, Path]:
+    """Return the manifests of the checkout by the package's name; robots of their own are not of it."""
+    listed = subprocess.run(["git", "ls-files", "*package.xml"], cwd=ALULA_ROOT, capture_output=True, text=True, check=True).stdout
+    found = [ALULA_ROOT / line for line in listed.split() if not line.startswith(ROBOTS)]
+    return {str(ET.parse(path).getroot().findtext("name")): path for path in found}  # noqa: S314 - our own
+
+
+PACKAGES = manifests()
+
+
+def modules_of(package: str) -> Path | None:
+    """Return the folder of a package's modules; None where it has none."""
+    folder = PACKAGES[package].parent
+    return next((place for place in (folder / "src" / package, folder / package) if (place / "__init__.py").is_file()), None)
+
+
+def launched_by(package: str) -> set[str]:
+    """Return the packages that its launch files name."""
+    texts = [path.read_text(encoding="utf-8") for path in (PACKAGES[package].parent / "launch").glob("*.launch")]
+    return {name for text in texts for names in LAUNCHED.findall(text) for name in names if name} - {package}
+
+
 def called(module: str) -> str:
-    return module if ROS.fullmatch(module) else DISTRIBUTIONS.get(module, f"python3-{module}")
+    """Return a module's package as manifests name it: of ROS and of ours as it is, else as rosdep calls it."""
+    if ROS.fullmatch(module) or module in PACKAGES:
+        return module
+    return f"python3-{DEBIAN.get(module, module).replace('_', '-')}" + ("-pip" if module in PIP else "")
 
 
 def dependencies(*, extra: bool) -> set[str]:
@@ -111,13 +127,17 @@ def dependencies(*, extra: bool) -> set[str]:
     return {re.split("[<>=]", name)[0] for name in (optional if extra else project["dependencies"])}
 
 
-@pytest.mark.parametrize("package", GENERAL)
-def test_a_manifest_names_what_the_package_imports_and_no_more(package: str) -> None:
-    folder = ALULA_ROOT / package
+PYTHON = [name for name in PACKAGES if name == "alula" or modules_of(name) is not None or launched_by(name)]
+
+
+@pytest.mark.parametrize("package", PYTHON)
+def test_a_manifest_names_what_the_package_needs_and_no_more(package: str) -> None:
+    modules = modules_of(package)
     # What only some of the library's commands import is an extra of pip, which no manifest of ROS knows.
-    extras = dependencies(extra=True) if package == "lib" else set()
-    needed = {called(module) for module in imports(folder / GENERAL[package]) if OF_PYPI.get(module, module) not in extras}
-    assert depends(folder / "package.xml") == needed
+    extras = dependencies(extra=True) if package == "alula" else set()
+    imported = set() if modules is None else imports(modules)
+    needed = {called(module) for module in imported if OF_PYPI.get(module, module) not in extras} | launched_by(package)
+    assert depends(PACKAGES[package]) == needed
 
 
 def test_the_librarys_distribution_names_what_it_imports_and_no_more() -> None:

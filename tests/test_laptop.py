@@ -84,9 +84,9 @@ def test_models_are_checked_and_proved(alula: Alula) -> None:
 def test_a_campaign_runs_over_mocks(alula: Alula, tmp_path: Path) -> None:
     plan = tmp_path / "few.yaml"
     draw = "{faults: {mapping: [zed]}, most: 1, at_s: [5, 60], lasts_s: [5, 30]}"
-    plan.write_text(f"over: mocks\nscenarios: [mapping]\nflights: 5\ndraw: {draw}\n", encoding="utf-8")
+    plan.write_text(f"over: mocks\nscenarios: [mapping]\nruns: 5\ndraw: {draw}\n", encoding="utf-8")
     said = alula("campaign", str(plan), "--out", str(tmp_path / "campaign"), code=0)
-    assert "5 flights" in said.stdout + said.stderr
+    assert "5 runs" in said.stdout + said.stderr
 
 
 def test_what_needs_ros_says_so(alula: Alula) -> None:

@@ -193,7 +193,7 @@ def test_bags_of_others_are_refused_in_a_line(tmp_path, capsys):
     assert bags
     for bag in bags:
         assert main([str(bag), "--from", "functional"]) == CANNOT_REPLAY
-        assert "does not tell which mission was flown" in capsys.readouterr().err
+        assert "does not tell which mission was run" in capsys.readouterr().err
         shutil.copy(RECORDINGS / "mapping" / FILE, tmp_path / FILE)
         shutil.copy(bag, tmp_path / bag.name)
         assert main([str(tmp_path / bag.name), "--from", "functional"]) == CANNOT_REPLAY

@@ -17,20 +17,26 @@ ROS = r"rclpy|rospy|roslib|roslaunch|rosbag|genpy|actionlib|rcl_interfaces|\w+_m
 ADAPTERS = "skillset_ros1|skillset_ros2|resource_reporter|skill_panel|ros_bridge"
 DRONE_PACKAGES = "ground_station|lidar_mapping|lidar_obstacles|perception_core|radio_link|video_stream|zed_depth"
 DRONE = rf"uav_\w+|{DRONE_PACKAGES}|navigation_\w+|perception_managers|mapping_managers|video_managers"
-DRONE_WORDS = "ardupilot|autopilot|guidance|imu|lidar|mavlink|radio|vehicle|zed"
+DRONE_WORDS = r"ardupilot|autopilots?|drones?|guidance|imu|lidar|lift[-_ ]?off|mavlink|radio\w*|take[-_ ]?off|telepilot|vehicles?|video|zed"
+CONTRACT = {"lift_off", "landed"}
+"""What files of a run have been called since there is but the drone (`summary.json`)."""
+PAGE = ("lib/alula/console/page", "lib/alula/editor")
+"""Programs of pages: every word counts, as no reader can tell which of them are shown."""
 GENERATED = {"language/generate", "scaffold/robot"}
 """Texts of the library that become code of a robot, which imports ROS."""
+EXAMPLES = {"missions/check/page.py", "prove/mission/page.py", "prove/bench.py"}
+"""Whole models that documents and benches show."""
 TYPES = "lib/alula/model/ros_types.py"
 """What types of models are called in ROS: names as data."""
 RULES = {
     # The library: neither ROS nor a robot.
-    "lib/alula": rf"{ROS}|{ADAPTERS}|{DRONE}",
+    "lib/alula": rf"{ROS}|{ADAPTERS}|{DRONE}|{DRONE_WORDS}",
     # The adapters and the bridge: no robot.
-    "ros1_ws/src/skillset_ros1": DRONE,
-    "ros1_ws/src/resource_reporter": DRONE,
-    "ros2_ws/src/skillset_ros2": DRONE,
-    "ros2_ws/src/skill_panel": DRONE,
-    "bridge/ros_bridge": DRONE,
+    "ros1_ws/src/skillset_ros1": rf"{DRONE}|{DRONE_WORDS}",
+    "ros1_ws/src/resource_reporter": rf"{DRONE}|{DRONE_WORDS}",
+    "ros2_ws/src/skillset_ros2": rf"{DRONE}|{DRONE_WORDS}",
+    "ros2_ws/src/skill_panel": rf"{DRONE}|{DRONE_WORDS}",
+    "bridge/ros_bridge": rf"{DRONE}|{DRONE_WORDS}",
     # A run of any robot: no robot either, not even by what it consists of.
     "flight": rf"{DRONE}|{DRONE_WORDS}",
 }
@@ -82,13 +88,28 @@ def modules(*rooms: str) -> Iterator[Path]:
 @pytest.mark.parametrize("room", RULES)
 def test_no_room_knows_what_stands_on_it(room: str) -> None:
     # With a slash behind, it is the name of a type, as the language and logs have it.
-    forbidden = re.compile(rf"(?<![\w.])({RULES[room]})\b(?!/)")
+    forbidden = re.compile(rf"(?i)(?<![\w.])({RULES[room]})\b(?!/)")
     found = [
         f"{path}:{line}: {match[0]}"
         for path in modules(room)
-        if not any(part in str(path) for part in {*GENERATED, TYPES})
+        if not any(part in str(path) for part in {*GENERATED, *EXAMPLES, TYPES})
         for line, name in names_in(path.read_text(encoding="utf-8"))
         for match in forbidden.finditer(name)
+        if match[1] not in CONTRACT
+    ]
+    assert not found, "\n".join(found)
+
+
+def test_no_page_knows_the_drone() -> None:
+    forbidden = re.compile(rf"(?i)(?<![a-z])({DRONE_WORDS}|land(?:ed|ing)?|fl(?:y|ies|ew|own|ight)s?)(?![a-z])")
+    found = [
+        f"{path}:{number}: {match[0]}"
+        for room in PAGE
+        for path in sorted((ALULA_ROOT / room).rglob("*"))
+        if path.suffix in {".js", ".html", ".css"}
+        for number, line in enumerate(path.read_text(encoding="utf-8").splitlines(), 1)
+        for match in forbidden.finditer(line)
+        if match[1] not in CONTRACT
     ]
     assert not found, "\n".join(found)
 

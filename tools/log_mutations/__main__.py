@@ -7,7 +7,7 @@ import random
 import sys
 from collections.abc import Iterator
 
-from alula.campaign.mock_flights import load_flights
+from alula.campaign.mocked_scenarios import load_mocked_scenario
 from alula.common.faults import FaultRequest
 from alula.model.conditions import data_of
 from alula.model.deadlines import waits
@@ -21,11 +21,11 @@ LONGEST_S = 90.0
 
 def good_logs(flights: int, chance: random.Random) -> Iterator[tuple[Skillset, list[EngineEvent]]]:
     """Yield the log of each skillset of flights with a random fault each, one that has anything in it."""
-    scenarios = [load_flights(name) for name in SCENARIOS]
+    scenarios = [load_mocked_scenario(name) for name in SCENARIOS]
     for number in range(flights):
         scenario = scenarios[number % len(scenarios)]
         fault = FaultRequest(chance.choice(sorted(scenario.behaviour.faults)), begin_s=chance.uniform(0.0, LONGEST_S))
-        flown = scenario.fly([fault], seed=number)
+        flown = scenario.run([fault], seed=number)
         for skillset in scenario.skillsets:
             events = [event for event in flown.events if event.skillset == skillset.name]
             if len(events) > 1 and not asks_data(skillset):

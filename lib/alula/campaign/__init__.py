@@ -1,1 +1,1 @@
-"""Flies a campaign: many flights with faults, over mocks or in the simulator, and what became of each failure."""
+"""Does a campaign: many runs with faults, over mocks or in the simulator, and what became of each failure."""

@@ -1,6 +1,6 @@
-"""``./alula campaign``: flies a campaign, goes on where it stopped, and ends with the failure coverage.
+"""``./alula campaign``: does a campaign, goes on where it stopped, and ends with the failure coverage.
 
-Ends with 0: all flown, 1: flown, and flights had trouble, 2: could not start, or could not write its folder any more.
+Ends with 0: all done, 1: done, and runs had trouble, 2: could not start, or could not write its folder any more.
 """
 
 from __future__ import annotations
@@ -13,9 +13,9 @@ from pathlib import Path
 
 from alula.campaign.coverage import Coverage, cover, processes
 from alula.campaign.failures import ways_to_fail
-from alula.campaign.mock_flights import load_flights
+from alula.campaign.mocked_scenarios import load_mocked_scenario
 from alula.campaign.plan import MOCKS, Campaign, load_campaign
-from alula.campaign.running import run
+from alula.campaign.running import options_of, run
 from alula.campaign.table import ROWS, Table
 from alula.campaign.telling import as_page, as_text
 from alula.common.files import write_json, write_text
@@ -26,14 +26,14 @@ from alula.records.causes.fault_file import effects_of_robot
 from alula.records.errors import AnalysisError
 from alula.records.models import robot_skillsets
 
-FLOWN, TROUBLE, CANNOT_START = 0, 1, 2
+DONE, TROUBLE, CANNOT_START = 0, 1, 2
 SHOW_EVERY_S = 1.0
 
 
 def parse(arguments: Sequence[str]) -> argparse.Namespace:
     """Return the command line's values; wrong ones print the usage on stderr and exit with code 2."""
     parser = argparse.ArgumentParser(
-        prog="alula campaign", description="Fly many flights with faults, and report the mission's response to each failure."
+        prog="alula campaign", description="Run scenarios many times with faults, and report the mission's response to each failure."
     )
     parser.add_argument("file", type=Path, help="campaign file (docs/records.md)")
     parser.add_argument("--out", type=Path, help="folder for the results (default: runs/campaign-NAME); an interrupted one continues there")
@@ -47,27 +47,27 @@ def check_faults(campaign: Campaign) -> None:
     """Refuse faults that the mocks of a scenario don't have, and a robot's file of faults that is wrong; raises AnalysisError."""
     effects_of_robot()
     if campaign.over == MOCKS:
-        scenarios = {name: load_flights(name, campaign.behaviour) for name in campaign.scenarios}
-        for flight in campaign.flights:
-            scenarios[flight.scenario].check(flight.requests)
+        scenarios = {name: load_mocked_scenario(name, campaign.behaviour) for name in campaign.scenarios}
+        for planned in campaign.runs:
+            scenarios[planned.scenario].check(planned.requests)
 
 
 class Teller:
     """Says on standard error how far a campaign is, once a second."""
 
-    def __init__(self, flights: int, begun: int) -> None:
-        self._flights = flights
+    def __init__(self, runs: int, begun: int) -> None:
+        self._runs = runs
         self._begun = begun
         self._since = self._said = time.monotonic()
 
     def __call__(self, done: int) -> None:
-        """Write how many flights are done, their rate and the time left to stderr, at most every ``SHOW_EVERY_S``."""
+        """Write how many runs are done, their rate and the time left to stderr, at most every ``SHOW_EVERY_S``."""
         now = time.monotonic()
-        if now - self._said >= SHOW_EVERY_S or done == self._flights:
+        if now - self._said >= SHOW_EVERY_S or done == self._runs:
             self._said = now
             rate = (done - self._begun) / max(now - self._since, 1e-9)
-            left_s = (self._flights - done) / max(rate, 1e-9)
-            sys.stderr.write(f"{done} of {self._flights} flights, {rate:.1f} a second, {left_s:.0f} s left\n")
+            left_s = (self._runs - done) / max(rate, 1e-9)
+            sys.stderr.write(f"{done} of {self._runs} runs, {rate:.1f} a second, {left_s:.0f} s left\n")
             sys.stderr.flush()
 
 
@@ -85,16 +85,17 @@ def finish(table: Table, out: Path, title: str) -> Coverage:
 
 
 def main(arguments: Sequence[str] | None = None) -> int:
-    """Fly; return the exit code."""
+    """Do it; return the exit code."""
     given = parse(sys.argv[1:] if arguments is None else arguments)
     out = given.out or runs_folder() / f"campaign-{given.file.stem}"
     try:
         campaign = load_campaign(given.file)
         check_faults(campaign)
+        options = options_of(campaign)
         table = Table(out, campaign)
         if table.rows:
-            sys.stderr.write(f"{len(table.rows)} of {len(campaign.flights)} flights are in {out / ROWS}\n")
-        run(campaign, table, out, Teller(len(campaign.flights), len(table.rows)), given.dask)
+            sys.stderr.write(f"{len(table.rows)} of {len(campaign.runs)} runs are in {out / ROWS}\n")
+        run(campaign, table, out, Teller(len(campaign.runs), len(table.rows)), options, given.dask)
         coverage = finish(table, out, f"Campaign {given.file.stem}")
     except (AnalysisError, RobotError, ScenarioError) as error:
         sys.stderr.write(f"alula campaign: {error}\n")
@@ -107,7 +108,7 @@ def main(arguments: Sequence[str] | None = None) -> int:
         return TROUBLE
     sys.stdout.write(as_text(coverage))
     sys.stderr.write(f"{out / 'coverage.html'}\n")
-    return TROUBLE if coverage.troubled else FLOWN
+    return TROUBLE if coverage.troubled else DONE
 
 
 if __name__ == "__main__":

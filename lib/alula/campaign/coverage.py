@@ -25,7 +25,7 @@ _INCLUDED = re.compile(r"\$\(find (\w+)\)/launch/([\w.]+\.launch)")
 
 @dataclass
 class Cover:
-    """The flights with one way to fail. ``responses`` counts the branches of the tree that took over; clearance is of whole flights."""
+    """The runs with one way to fail. ``responses`` counts the branches of the tree that took over; clearance is of whole runs."""
 
     way: Way
     responses: Counter[str] = field(default_factory=Counter)
@@ -47,25 +47,25 @@ class Cover:
 
 @dataclass(frozen=True)
 class Coverage:
-    """The matrix and the flights that it is of."""
+    """The matrix and the runs that it is of."""
 
     covers: Sequence[Cover]
-    flights: int
+    runs: int
     outcomes: Mapping[str, int]
     troubled: Sequence[int]
-    """Flights that did not come to an end or conform, left something open, collided, did not land, had problems, or an exit code that
+    """Runs that did not come to an end or conform, left something open, collided, did not land, had problems, or an exit code that
     does not say their outcome."""
 
     @property
     def never(self) -> list[Way]:
-        """What no flight has tried."""
+        """What no run has tried."""
         return [cover.way for cover in self.covers if not cover.times]
 
     def as_dict(self) -> dict[str, object]:
         """Return the whole matrix as ``coverage.json`` has it."""
         tried = [cover.as_dict() for cover in self.covers if cover.times]
         never = [vars(way) for way in self.never]
-        return {"flights": self.flights, "outcomes": dict(self.outcomes), "troubled": list(self.troubled), "tried": tried, "never": never}
+        return {"runs": self.runs, "outcomes": dict(self.outcomes), "troubled": list(self.troubled), "tried": tried, "never": never}
 
 
 def cover(rows: Iterable[Row], ways: Iterable[Way]) -> Coverage:
@@ -73,24 +73,24 @@ def cover(rows: Iterable[Row], ways: Iterable[Way]) -> Coverage:
     covers = {way: Cover(way) for way in ways}
     outcomes: Counter[str] = Counter()
     troubled: list[int] = []
-    flights = 0
+    runs = 0
     for row in rows:
-        flights += 1
+        runs += 1
         outcomes[str(row["outcome"])] += 1
         if is_troubled(row):
-            troubled.append(int(row["flight"]))
-        for asked in row["faults"]:  # one that never came, because the flight was over before, has not been tried
+            troubled.append(int(row["run"]))
+        for asked in row["faults"]:  # one that never came, because the run was over before, has not been tried
             way = Way(FAULT, name_of(parse_fault(asked)))
             covers.setdefault(way, Cover(way))
         for failure in row["failures"]:
             way = Way(failure["kind"], failure["name"])
             _count(covers.setdefault(way, Cover(way)), row, str(failure["answered_by"]), failure["after_s"])
     ordered = sorted(covers.values(), key=lambda one: (KINDS.index(one.way.kind), one.way.name))
-    return Coverage(ordered, flights, dict(outcomes.most_common()), troubled)
+    return Coverage(ordered, runs, dict(outcomes.most_common()), troubled)
 
 
 def is_troubled(row: Row) -> bool:
-    """Tell whether something is wrong with a flight, whatever failed in it."""
+    """Tell whether something is wrong with a run, whatever failed in it."""
     unfinished = row["outcome"] in {"not_started", "running", None}
     wrong = row["open"] or row["collisions"] or row["landed"] is False or row["problems"]
     return bool(unfinished or wrong or not row["conforms"] or row["exit_code"] not in {None, CODE_OF.get(str(row["outcome"]))})

@@ -1,4 +1,4 @@
-"""The ways in which something can fail, from the models, and where a flight's events show one."""
+"""The ways in which something can fail, from the models, and where a run's events show one."""
 
 from __future__ import annotations
 
@@ -73,11 +73,11 @@ def _arrow(skillset: str, resource: str, source: str, target: str) -> str:
     return f"{skillset}.{resource} {source} -> {target}"
 
 
-# --- in a flight --------------------------------------------------------------------------------------------------------
+# --- in a run --------------------------------------------------------------------------------------------------------
 
 
 def failures_in(events: Sequence[EngineEvent], known: Iterable[Way], places: Places) -> list[Failure]:
-    """Return the failures of a flight in the order of time, each with the branch of the tree and the skill that followed."""
+    """Return the failures of a run in the order of time, each with the branch of the tree and the skill that followed."""
     ways = set(known)
     violated = [failure for failure in skill_failures(events) if failure.end.state is S.RESOURCE_INVARIANT_VIOLATED]
     broken = {at: failure for failure in reversed(violated) for at in failure.behind}

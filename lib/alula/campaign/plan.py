@@ -1,4 +1,4 @@
-"""Reads a campaign: which scenarios, seeds, faults and times, listed or drawn. The same file gives the same flights."""
+"""Reads a campaign: which scenarios, seeds, faults and times, listed or drawn. The same file gives the same runs."""
 
 from __future__ import annotations
 
@@ -14,15 +14,15 @@ from alula.common.located_yaml import Located, choices, read_yaml
 from alula.common.scenarios import scenario_names
 from alula.records.errors import AnalysisError
 
-KEYS = ("about", "over", "scenarios", "seeds", "faults", "flights", "seed", "draw", "worlds", "options", "behaviour", "at_once")
+KEYS = ("about", "over", "scenarios", "seeds", "faults", "runs", "seed", "draw", "worlds", "options", "behaviour", "at_once")
 DRAW = ("faults", "most", "in_turn", "at_s", "lasts_s")
 MOCKS, SIMULATOR = "mocks", "simulator"
-MOST_FLIGHTS = 1_000_000
+MOST_RUNS = 1_000_000
 
 
 @dataclass(frozen=True)
-class Flight:
-    """One flight of a campaign; ``faults`` as on the command line of ``run``; ``world`` is a file, None: the scenario's own."""
+class PlannedRun:
+    """One run of a campaign; ``faults`` as on the command line of ``run``; ``world`` is a file, None: the scenario's own."""
 
     number: int
     scenario: str
@@ -32,19 +32,19 @@ class Flight:
 
     @property
     def requests(self) -> list[FaultRequest]:
-        """The faults of the flight, parsed; raises FaultError where a text is none."""
+        """The faults of the run, parsed; raises FaultError where a text is none."""
         return [parse_fault(text) for text in self.faults]
 
 
 @dataclass(frozen=True)
 class Campaign:
-    """Flights, numbered from 0, and over what they are flown.
+    """Runs, numbered from 0, and over what they are.
 
     ``options`` are the robot's own of a live run, by name; ``at_once`` is how many at a time, None: one a core.
     """
 
     over: str
-    flights: tuple[Flight, ...]
+    runs: tuple[PlannedRun, ...]
     options: Mapping[str, str] = field(default_factory=dict)
     behaviour: tuple[Path, ...] = ()
     at_once: int | None = None
@@ -52,11 +52,11 @@ class Campaign:
 
     def as_dict(self) -> dict[str, object]:
         """Return what decides the table: a campaign goes on only where this is the same."""
-        flights = [{**asdict(flight), "world": flight.world and flight.world.read_text(encoding="utf-8")} for flight in self.flights]
+        runs = [{**asdict(planned), "world": planned.world and planned.world.read_text(encoding="utf-8")} for planned in self.runs]
         return {
             "over": self.over,
             "behaviour": [path.read_text(encoding="utf-8") for path in self.behaviour],
-            "flights": flights,
+            "runs": runs,
             **({"options": dict(self.options)} if self.options else {}),
         }
 
@@ -71,26 +71,26 @@ def load_campaign(path: Path) -> Campaign:
     if document is None:
         raise AnalysisError(f"{path}: is empty; a campaign may have {', '.join(KEYS)}")
     said = document.record("a campaign", KEYS)
-    for wanted, other in (("flights", "faults"), ("draw", "faults"), ("draw", "seeds"), ("flights", "seeds")):
+    for wanted, other in (("runs", "faults"), ("draw", "faults"), ("draw", "seeds"), ("runs", "seeds")):
         if wanted in said and other in said:
-            raise said[other].wrong(f"`{other}` lists flights, `{wanted}` draws them; use only one of both")
+            raise said[other].wrong(f"`{other}` lists runs, `{wanted}` draws them; use only one of both")
     over = _choice(said["over"], (MOCKS, SIMULATOR)) if "over" in said else MOCKS
     scenarios = tuple(_choice(part, scenario_names()) for part in said["scenarios"].elements()) if "scenarios" in said else ("mapping",)
-    drawn = "draw" in said or "flights" in said
+    drawn = "draw" in said or "runs" in said
     for key in ("scenarios", "seeds", "faults"):
         if key in said and not said[key].elements():
-            raise said[key].wrong(f"`{key}` is empty, so there would be no flight; leave it out, or name one")
-    flights = _drawn(document, said, scenarios) if drawn else _listed(said, scenarios)
+            raise said[key].wrong(f"`{key}` is empty, so there would be no run; leave it out, or name one")
+    runs = _drawn(document, said, scenarios) if drawn else _listed(said, scenarios)
     if over == SIMULATOR and "behaviour" in said:
-        raise said["behaviour"].wrong("`behaviour` is for mocks only; leave it out, or fly `over: mocks`")
+        raise said["behaviour"].wrong("`behaviour` is for mocks only; leave it out, or do it `over: mocks`")
     for key in ("worlds", "options"):
         if over == MOCKS and key in said:
-            raise said[key].wrong(f"`{key}` is for the simulator only; leave it out, or fly `over: simulator`")
+            raise said[key].wrong(f"`{key}` is for the simulator only; leave it out, or do it `over: simulator`")
     worlds = said["worlds"].record("`worlds`", scenarios) if "worlds" in said else {}
     files = {scenario: _file(path, part, "a world file") for scenario, part in worlds.items()}
     return Campaign(
         over=over,
-        flights=tuple(replace(flight, world=files.get(flight.scenario)) for flight in flights),
+        runs=tuple(replace(planned, world=files.get(planned.scenario)) for planned in runs),
         options={name: one.text(f"the option `{name}`") for name, one in said["options"].entries("`options`").items()}
         if "options" in said
         else {},
@@ -124,12 +124,12 @@ def _file(path: Path, part: Located, what: str) -> Path:
 # --- listed -------------------------------------------------------------------------------------------------------------
 
 
-def _listed(said: dict[str, Located], scenarios: Sequence[str]) -> list[Flight]:
+def _listed(said: dict[str, Located], scenarios: Sequence[str]) -> list[PlannedRun]:
     seeds = [_whole(part, "a seed", 0, 2**31 - 1) for part in said["seeds"].elements()] if "seeds" in said else [0]
     lists = [part.elements() for part in said["faults"].elements()] if "faults" in said else [[]]
     faults = [tuple(_fault(one, one.text("a fault")) for one in several) for several in lists]
     every = itertools.product(scenarios, seeds, faults)
-    return [Flight(number, *one) for number, one in enumerate(every)]
+    return [PlannedRun(number, *one) for number, one in enumerate(every)]
 
 
 def _fault(part: Located, text: str) -> str:
@@ -153,9 +153,9 @@ class _Kind:
 
 @dataclass(frozen=True)
 class _Draw:
-    """What is drawn for a flight: when each fault comes and how long it lasts.
+    """What is drawn for a run: when each fault comes and how long it lasts.
 
-    Which faults come is drawn, too: up to ``most`` of ``faults``. With ``in_turn``, the flights of a scenario take its lists one after
+    Which faults come is drawn, too: up to ``most`` of ``faults``. With ``in_turn``, the runs of a scenario take its lists one after
     another instead, and begin again after the last one.
     """
 
@@ -165,8 +165,8 @@ class _Draw:
     at_s: tuple[float, float]
     lasts_s: tuple[float, float] | None
 
-    def flight(self, scenario: str, turn: int, chance: random.Random) -> tuple[str, ...]:
-        """Draw the faults of the scenario's flight ``turn``, from 0: none, one or several, in the order of time."""
+    def faults_of(self, scenario: str, turn: int, chance: random.Random) -> tuple[str, ...]:
+        """Draw the faults of the scenario's run ``turn``, from 0: none, one or several, in the order of time."""
         several = [self._fault(kind, chance) for kind in self._kinds(scenario, turn, chance)]
         return tuple(str(fault) for fault in sorted(several, key=lambda fault: (fault.begin_s or 0.0, fault.what)))
 
@@ -185,36 +185,36 @@ class _Draw:
         return FaultRequest(kind.what, kind.how, begin_s, None if lasts_s is None else round(begin_s + lasts_s, 1))
 
 
-def _drawn(document: Located, said: dict[str, Located], scenarios: Sequence[str]) -> Iterator[Flight]:
-    for key in ("flights", "draw"):
+def _drawn(document: Located, said: dict[str, Located], scenarios: Sequence[str]) -> Iterator[PlannedRun]:
+    for key in ("runs", "draw"):
         if key not in said:
             raise document.wrong(f"a campaign that draws needs `{key}`")
-    count = _whole(said["flights"], "`flights`", 1, MOST_FLIGHTS)
+    count = _whole(said["runs"], "`runs`", 1, MOST_RUNS)
     seed = _whole(said["seed"], "`seed`", 0, 2**31 - 1) if "seed" in said else 0
     draw = _draw(said["draw"], scenarios)
     turns = Counter[str]()
     for number in range(count):
-        # One generator a flight: another number of flights leaves the first ones as they were.
+        # One generator a run: another number of runs leaves the first ones as they were.
         chance = random.Random(f"{seed} {number}")  # noqa: S311 - nothing here is secret
         scenario = scenarios[number % len(scenarios)]
-        yield Flight(number, scenario, chance.randrange(2**31), draw.flight(scenario, turns[scenario], chance))
+        yield PlannedRun(number, scenario, chance.randrange(2**31), draw.faults_of(scenario, turns[scenario], chance))
         turns[scenario] += 1
 
 
 def _draw(part: Located, scenarios: Sequence[str]) -> _Draw:
     said = part.record("`draw`", DRAW)
     if ("faults" in said) == ("in_turn" in said):
-        raise part.wrong("`draw` needs `faults` to draw from, or `in_turn`: lists of faults, which the flights use one after another")
+        raise part.wrong("`draw` needs `faults` to draw from, or `in_turn`: lists of faults, which the runs use one after another")
     if "in_turn" in said and "most" in said:
         raise said["most"].wrong("`most` says how many of `faults` are drawn; `in_turn` draws none")
     faults, in_turn = (_by_scenario(said[key], key, scenarios) if key in said else {} for key in ("faults", "in_turn"))
     lists = {scenario: tuple(tuple(map(_kind, one.elements())) for one in part.elements()) for scenario, part in in_turn.items()}
     for scenario, one in lists.items():
         if not one:
-            raise in_turn[scenario].wrong(f"`in_turn` has no list for {scenario}; `[[]]` means flights without faults")
+            raise in_turn[scenario].wrong(f"`in_turn` has no list for {scenario}; `[[]]` means runs without faults")
     for scenario, several in faults.items():
         if not several.elements():
-            raise several.wrong(f"`faults` has no fault to draw for {scenario}; for flights without faults write `in_turn: [[]]`")
+            raise several.wrong(f"`faults` has no fault to draw for {scenario}; for runs without faults write `in_turn: [[]]`")
     return _Draw(
         faults={scenario: tuple(map(_kind, part.elements())) for scenario, part in faults.items()},
         in_turn=lists,

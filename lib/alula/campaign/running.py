@@ -1,4 +1,4 @@
-"""Has the flights of a campaign flown by Dask, here or on other machines, and puts the rows into the table as they come."""
+"""Has the runs of a campaign done by Dask, here or on other machines, and puts the rows into the table as they come."""
 
 from __future__ import annotations
 
@@ -8,31 +8,30 @@ from collections.abc import Callable, Iterator, Sequence
 from contextlib import ExitStack
 from pathlib import Path
 
-from alula.campaign.flying import fly
-from alula.campaign.plan import SIMULATOR, Campaign, Flight
+from alula.campaign.plan import SIMULATOR, Campaign, PlannedRun
+from alula.campaign.rows import rows_of
 from alula.campaign.table import Table
 from alula.live.options import ask_options, words_of
 from alula.live.spec import RequestError
 from alula.records.errors import AnalysisError
 
 TOGETHER = 10
-"""Mock flights that are handed over at a time: a flight takes tens of milliseconds."""
+"""Mock runs that are handed over at a time: a run takes tens of milliseconds."""
 CONNECT_S = 30.0
 
 Progress = Callable[[int], None]
-"""Gets how many flights are in the table."""
+"""Gets how many runs are in the table."""
 
 
-def run(campaign: Campaign, table: Table, out: Path, progress: Progress, dask: str | None = None) -> None:
-    """Fly what is missing in the table.
+def run(campaign: Campaign, table: Table, out: Path, progress: Progress, options: tuple[str, ...] = (), dask: str | None = None) -> None:
+    """Do what is missing in the table; ``options`` are words of the command lines of live runs.
 
     Raises:
-        AnalysisError: there is no Dask scheduler at the address, or the robot has no such options.
+        AnalysisError: there is no Dask scheduler at the address.
     """
-    left = [flight for flight in campaign.flights if flight.number not in table.rows]
+    left = [planned for planned in campaign.runs if planned.number not in table.rows]
     if not left:
         return
-    options = _words(campaign)
     from dask import config  # late: it takes a second, and a finished campaign does not need it
     from distributed import Client, LocalCluster, as_completed
 
@@ -52,19 +51,20 @@ def run(campaign: Campaign, table: Table, out: Path, progress: Progress, dask: s
             raise AnalysisError(f"--dask {dask}: can't be used: {error}") from None
         behaviour = tuple(str(path.absolute()) for path in campaign.behaviour)
         parts = list(_parts(left, 1 if campaign.over == SIMULATOR else TOGETHER))
-        futures = client.map(fly, parts, over=campaign.over, behaviour=behaviour, out=str(out.absolute()), options=options, pure=False)
+        futures = client.map(rows_of, parts, over=campaign.over, behaviour=behaviour, out=str(out.absolute()), options=options, pure=False)
         for _, rows in as_completed(futures, with_results=True):
             table.add(rows)
             progress(len(table.rows))
 
 
-def _words(campaign: Campaign) -> tuple[str, ...]:
+def options_of(campaign: Campaign) -> tuple[str, ...]:
+    """Return the options of its live runs as words of their command lines; raises AnalysisError where the robot has no such options."""
     try:
         return tuple(words_of(campaign.options, asyncio.run(ask_options()))) if campaign.options else ()
     except RequestError as error:
         raise AnalysisError(f"`options`: {error}") from None
 
 
-def _parts(flights: Sequence[Flight], size: int) -> Iterator[Sequence[Flight]]:
-    for begin in range(0, len(flights), size):
-        yield flights[begin : begin + size]
+def _parts(runs: Sequence[PlannedRun], size: int) -> Iterator[Sequence[PlannedRun]]:
+    for begin in range(0, len(runs), size):
+        yield runs[begin : begin + size]

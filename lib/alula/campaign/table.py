@@ -1,4 +1,4 @@
-"""The table of a campaign: a line of JSON a flight, written when it is over, so that no crash loses more than the flights under way."""
+"""The table of a campaign: a line of JSON a run, written when it is over, so that no crash loses more than the runs under way."""
 
 from __future__ import annotations
 
@@ -11,9 +11,9 @@ from alula.campaign.plan import Campaign
 from alula.common.files import strict, write_json, write_text
 from alula.records.errors import AnalysisError
 
-ROWS, PLAN = "flights.jsonl", "campaign.json"
+ROWS, PLAN = "runs.jsonl", "campaign.json"
 COLUMNS = frozenset(
-    ("flight", "faults", "outcome", "landed", "open", "problems", "collisions", "min_clearance_m", "conforms", "exit_code", "failures")
+    ("run", "faults", "outcome", "landed", "open", "problems", "collisions", "min_clearance_m", "conforms", "exit_code", "failures")
 )
 """What the coverage reads of a row."""
 
@@ -21,7 +21,7 @@ Row = Mapping[str, Any]
 
 
 class Table:
-    """The rows in a folder. What a crash has cut off is flown again.
+    """The rows in a folder. What a crash has cut off is done again.
 
     Raises:
         AnalysisError: the folder has another campaign in it, or can't be used.
@@ -33,7 +33,7 @@ class Table:
         try:
             folder.mkdir(parents=True, exist_ok=True)
             self._claim(folder, campaign)
-            self._read({flight.number for flight in campaign.flights})
+            self._read({planned.number for planned in campaign.runs})
             self._file: BinaryIO = self._path.open("ab")
         except OSError as error:
             raise AnalysisError(f"{folder}: can't hold a campaign: {error.strerror or error}") from None
@@ -52,19 +52,19 @@ class Table:
         """Read the rows that are whole, and leave no others in the file."""
         lines = self._path.read_bytes().splitlines(keepends=True) if self._path.is_file() else []
         whole = [row for line in lines if line.endswith(b"\n") and _is_row(row := _json(line), numbers)]
-        self.rows = {row["flight"]: row for row in whole}
+        self.rows = {row["run"]: row for row in whole}
         if len(whole) < len(lines):
             write_text(self._path, b"".join(map(_line, whole)).decode())
 
     def add(self, rows: Iterable[Row]) -> None:
         """Write rows, through to the disk."""
         for row in rows:
-            self.rows[int(row["flight"])] = row
+            self.rows[int(row["run"])] = row
             self._file.write(_line(row))
         self._file.flush()
 
     def finish(self) -> None:
-        """Put the rows in the order of the flights: however often it was interrupted, the table is the same."""
+        """Put the rows in the order of the runs: however often it was interrupted, the table is the same."""
         self._file.close()
         write_text(self._path, b"".join(_line(self.rows[number]) for number in sorted(self.rows)).decode())
 
@@ -78,8 +78,8 @@ def _json(text: bytes) -> Any:
 
 
 def _is_row(row: Any, numbers: Collection[int]) -> bool:
-    """Tell whether this is what the coverage needs of one of these flights."""
-    return isinstance(row, dict) and row.keys() >= COLUMNS and isinstance(row["flight"], int) and row["flight"] in numbers
+    """Tell whether this is what the coverage needs of one of these runs."""
+    return isinstance(row, dict) and row.keys() >= COLUMNS and isinstance(row["run"], int) and row["run"] in numbers
 
 
 def _line(row: Row) -> bytes:

@@ -39,8 +39,8 @@ def as_text(coverage: Coverage) -> str:
     lines = ["  ".join(cell.ljust(width) for cell, width in zip(row, widths, strict=True)).rstrip() for row in tried]
     lines += ["", f"never tried ({len(coverage.never)}):", *(f"  {way.kind}: {way.name}" for way in coverage.never)]
     troubled = ", ".join(map(str, coverage.troubled[:20])) + (", ..." if len(coverage.troubled) > 20 else "")
-    lines += ["", f"{coverage.flights} flights: {counted(dict(coverage.outcomes))}"]
-    lines += [f"flights with trouble: {len(coverage.troubled)}{f' ({troubled})' if troubled else ''}"]
+    lines += ["", f"{coverage.runs} runs: {counted(dict(coverage.outcomes))}"]
+    lines += [f"runs with trouble: {len(coverage.troubled)}{f' ({troubled})' if troubled else ''}"]
     return "\n".join(lines) + "\n"
 
 
@@ -53,8 +53,8 @@ def as_page(coverage: Coverage, title: str) -> str:
     troubled = ", ".join(map(str, coverage.troubled)) or "none"
     return (
         f'<!doctype html>\n<html lang="en"><meta charset="utf-8"><title>{escape(title)}</title><style>{_STYLE}</style>\n'
-        f"<h1>{escape(title)}</h1>\n<p>{coverage.flights} flights: {escape(counted(dict(coverage.outcomes)))}. "
-        f"Flights with trouble: {escape(troubled)}.</p>\n"
+        f"<h1>{escape(title)}</h1>\n<p>{coverage.runs} runs: {escape(counted(dict(coverage.outcomes)))}. "
+        f"Runs with trouble: {escape(troubled)}.</p>\n"
         f"<h2>What failed, and the mission's responses</h2>\n<table><tr>{head}</tr>\n{chr(10).join(rows)}</table>\n"
         f"<h2>Never tried ({len(never)})</h2>\n<table>{chr(10).join(never)}</table>\n</html>\n"
     )

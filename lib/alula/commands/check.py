@@ -100,7 +100,7 @@ def _parser() -> argparse.ArgumentParser:
         "--play",
         type=int,
         metavar="N",
-        help="play counterexample N: in running managers, or as a flight of the mission (see `--play 1 --help`)",
+        help="play counterexample N: in running managers, or as a run of the mission (see `--play 1 --help`)",
     )
     parser.add_argument("--out", metavar="DIR", help="with --play of a mission: folder for the run's files")
     parser.add_argument("--strict", action="store_true", help="treat warnings as errors")

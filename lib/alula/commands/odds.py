@@ -65,7 +65,7 @@ def _parser() -> argparse.ArgumentParser:
     parser = argparse.ArgumentParser(prog=COMMAND, description="Tell how likely a mission is accomplished, degraded, given up, or neither.")
     parser.add_argument("file", type=Path, metavar="FILE", help="a mission: BehaviorTree.CPP 4's XML")
     parser.add_argument(
-        "--with", dest="changes", action="append", default=[], metavar="FAULT=UNITS", help="what it would bring: zed=2, or zed=never"
+        "--with", dest="changes", action="append", default=[], metavar="FAULT=UNITS", help="what it would bring: camera=2, or camera=never"
     )
     parser.add_argument("--world", default="", metavar="FILE|NAME", help="inputs of the mission (default: those of its scenario)")
     parser.add_argument(

@@ -17,7 +17,7 @@ import uuid
 from collections.abc import Sequence
 from pathlib import Path
 
-from alula.campaign.mock_flights import load_flights
+from alula.campaign.mocked_scenarios import load_mocked_scenario
 from alula.commands.run_options import check_seed, groot_address, run_folder, run_parser, shown_at, world_file
 from alula.common.faults import MOCKED, FaultError, FaultRequest, changes_of, parse_fault, spans_of
 from alula.common.files import write_json
@@ -60,7 +60,7 @@ def prepare(given: argparse.Namespace) -> tuple[MockedMission, RunSpec]:
         AnalysisError, FaultError, RequestError, RobotError, ScenarioError, InputError: it can't be run; nothing was written.
     """
     out, seed = run_folder(given.out, given.scenario), check_seed(given.seed)
-    flights = load_flights(given.scenario, given.behaviour, world=given.world)
+    flights = load_mocked_scenario(given.scenario, given.behaviour, world=given.world)
     faults = [parse_fault(text) for text in given.fail]
     flights.check(faults)
     groot = groot_address(given.groot)

@@ -150,7 +150,7 @@ def parse_fault(text: str, known: Mapping[str, Sequence[str]] | None = None) -> 
     """
     match = _FAULT.fullmatch(text.strip())
     if match is None:
-        raise FaultError(f"fault '{text}': write WHAT, WHAT@SECONDS, WHAT@SECONDS-SECONDS or WHAT:HOW@..., as in zed:dark@30-40")
+        raise FaultError(f"fault '{text}': write WHAT, WHAT@SECONDS, WHAT@SECONDS-SECONDS or WHAT:HOW@..., as in camera:dark@30-40")
     begin_s, end_s = (None if match[name] is None else float(match[name]) for name in ("begin", "end"))
     if max(begin_s or 0.0, end_s or 0.0) > MAX_SECONDS:
         raise FaultError(f"fault '{text}': more than {MAX_SECONDS:g} s")

@@ -13,7 +13,8 @@ import sys
 from pathlib import Path
 from typing import Any
 
-NAME, CORE, CUDA = "open3d", "open3d.cpu.pybind", "cuda"
+NAME, CORE, CPU, CUDA = "open3d", "pybind", "cpu", "cuda"
+"""Up to version 0.19 the core is in a folder of the device, since 0.20 beside the package's other modules."""
 PARTS = ("core", "geometry", "io", "pipelines", "t", "utility")
 
 
@@ -21,9 +22,10 @@ def _import() -> Any:
     spec = importlib.util.find_spec(NAME)
     if NAME in sys.modules or spec is None or spec.origin is None or (Path(spec.origin).parent / CUDA).is_dir():
         return importlib.import_module(NAME)
+    inside = f"{NAME}.{CPU}" if (Path(spec.origin).parent / CPU).is_dir() else NAME
     package = sys.modules[NAME] = importlib.util.module_from_spec(spec)  # whose __init__ is not run
     try:
-        compiled = importlib.import_module(CORE)
+        compiled = importlib.import_module(f"{inside}.{CORE}")
     except ImportError:
         del sys.modules[NAME]
         raise

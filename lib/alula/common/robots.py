@@ -17,19 +17,16 @@ from pathlib import Path
 from typing import Any
 
 from alula.common.located_yaml import Located, choices, read_yaml
+from alula.common.robot_page import USUAL_PAGE, read_page
 
 FILE = "robot.yaml"
 VARIABLE = "ALULA_ROBOT"
 BEHAVIOUR, FAULTS = "mock.yaml", "faults.yaml"
 """Files beside the models: what mocks do, and what faults bring about."""
-PARTS = ("inputs", "missions", "hooks", "report", "run", "depths")
+PARTS = ("inputs", "missions", "hooks", "report", "run", "depths", "areas")
 """What a robot may add to the general commands, as ``module`` or ``module:name``; ``docs/robots.md`` says what each has to be."""
 WORLD_KEYS = ("packages", "python", "debian", "underlays")
 KEYS = ("name", "about", "skillsets", "scenarios", "worlds", "departure", "taken", "page", "python", "parts", "ros1", "ros2")
-PAGE_WORDS = {"departure": "departure", "away": "under way", "back": "back", "moved": "travelled"}
-"""What a report calls the departure, being away, having come back, and the way covered, where the robot has no words of its own."""
-PAGE_TABLES = ("live", "modes", "glossary")
-PAGE_FENCE = "fence"
 _NAME = re.compile(r"[a-z][a-z0-9_]*")
 
 
@@ -77,7 +74,7 @@ class RobotFolder:
     about: str = ""
     departure: tuple[str, str] | None = None
     taken: tuple[str, str] | None = None
-    page: Mapping[str, Any] = field(default_factory=lambda: dict(PAGE_WORDS))
+    page: Mapping[str, Any] = field(default_factory=lambda: dict(USUAL_PAGE))
     python: tuple[Path, ...] = ()
     parts: Mapping[str, str] = field(default_factory=dict)
     ros1: RosPart = RosPart()
@@ -149,7 +146,7 @@ def page_words() -> Mapping[str, Any]:
     try:
         return find_robot().page
     except RobotError:
-        return PAGE_WORDS
+        return USUAL_PAGE
 
 
 def load_robot_folder(root: Path) -> RobotFolder:
@@ -210,24 +207,6 @@ def _state(said: Mapping[str, Located], key: str) -> tuple[str, str] | None:
     if not resource or not state.isidentifier():
         raise said[key].wrong(f"`{key}` should be skillset.resource STATE, such as base.base_status DOCKED")
     return resource, state
-
-
-def read_page(part: Located | None) -> dict[str, Any]:
-    """Return the words of ``page``, its tables, and the fence as ``{radius_m, z: [floor, ceiling]}`` where there is one, metres.
-
-    ``live`` says what a live run is on: of each option of the run that is set, and under ``default``. ``modes`` are those in which the
-    mission does not command, and what the robot does in them; ``glossary`` explains words of the robot's field.
-    """
-    said = {} if part is None else part.record("`page`", (*PAGE_WORDS, *PAGE_TABLES, PAGE_FENCE))
-    words: dict[str, Any] = {name: said[name].text(f"`{name}`") if name in said else usual for name, usual in PAGE_WORDS.items()}
-    tables = {name: said[name].entries(f"`{name}`") if name in said else {} for name in PAGE_TABLES}
-    words |= {name: {key: one.text(f"`{key}`") for key, one in table.items()} for name, table in tables.items()}
-    if PAGE_FENCE in said:
-        numbers = [one.number("a number of `fence`", -1e6) for one in said[PAGE_FENCE].elements()]
-        if len(numbers) != 3:
-            raise said[PAGE_FENCE].wrong("`fence` should be [radius, floor, ceiling] in metres")
-        words[PAGE_FENCE] = {"radius_m": numbers[0], "z": numbers[1:]}
-    return words
 
 
 def _parts(part: Located | None) -> dict[str, str]:

@@ -11,8 +11,6 @@ from alula.common.processes import processes_of_run
 from alula.common.robots import RobotError, find_robot
 
 LATEST = "latest"
-INPUTS_FILE = "inputs.json"
-"""The inputs of a run's mission, in its folder."""
 
 
 class NoRunError(Exception):

@@ -10,7 +10,7 @@ from alula.common.robots import RobotError, find_robot
 from alula.common.suggestions import nearest
 
 NEEDED = ("about", "mission", "skillsets")
-KEYS = ("about", "world", "mission", "skillsets", "launch", "report", "faults", "processes", "ground_link", "fallback", "motion")
+KEYS = ("about", "world", "mission", "skillsets", "launch", "report", "faults", "processes", "fallback", "motion")
 
 
 class ScenarioError(Exception):
@@ -31,8 +31,7 @@ class Scenario:
         report: parts of the report, of those that the robot has.
         faults: what can fail besides what the robot's own options say, each with the ways in which it can.
         processes: which of those faults are of a process, and its node in the launch file.
-        ground_link: which of those faults are of the ground's link to the simulated autopilot; a real one is not connected to it.
-        fallback: the skill whose running means that the vehicle is safe again after a failure.
+        fallback: the skill whose running means that the robot is safe again after a failure.
         motion: the skills that take it on then.
     """
 
@@ -45,7 +44,6 @@ class Scenario:
     report: tuple[str, ...] = ()
     faults: tuple[tuple[str, tuple[str, ...]], ...] = ()
     processes: tuple[tuple[str, str], ...] = ()
-    ground_link: tuple[str, ...] = ()
     fallback: str = ""
     motion: tuple[str, ...] = ()
 
@@ -85,9 +83,6 @@ def load_scenario(name: str, folder: Path | None = None) -> Scenario:
     for what, node in processes.items():
         if what not in faults:
             raise node.wrong(f"`faults` does not say in which ways {what} can fail")
-    for part in said["ground_link"].elements() if "ground_link" in said else ():
-        if part.text("an entry of `ground_link`") not in faults:
-            raise part.wrong(f"`faults` does not say in which ways {part.value} can fail")
     return Scenario(
         name=name,
         about=said["about"].text("`about`"),
@@ -98,7 +93,6 @@ def load_scenario(name: str, folder: Path | None = None) -> Scenario:
         report=report,
         faults=tuple((what, tuple(way.text("a way to fail") for way in ways.elements())) for what, ways in faults.items()),
         processes=tuple((what, node.text("the node of a process")) for what, node in processes.items()),
-        ground_link=_words(said, "ground_link"),
         fallback=said["fallback"].text("`fallback`") if "fallback" in said else "",
         motion=_words(said, "motion"),
     )

@@ -1,4 +1,4 @@
-"""What the map shows of the space to fly in: the world's radio zones, and the fence."""
+"""What the map shows of the space to move in: areas that the robot reads from its world, as its part ``areas``."""
 
 from __future__ import annotations
 
@@ -6,56 +6,52 @@ from collections.abc import Iterator, Mapping
 from pathlib import Path
 from typing import Any
 
-import yaml
-
 from alula.common.robots import RobotError, find_robot
 
-QUALITIES = ("good", "degraded", "critical")
-MAX_ZONES = 100
+TONES = ("good", "fair", "bad")
+MAX_AREAS = 100
 
 
-def areas_of(world: str) -> dict[str, Any]:
-    """Return the zones of a world file and the robot's fence: ``{fence, radio: [{name, quality, box|cylinder|sphere}]}``.
+def areas_of(world: str) -> list[dict[str, Any]]:
+    """Return the robot's areas in a world file: ``{name, told, tone, box|cylinder|sphere}``, frame map, metres.
 
-    Frame map, metres; a robot without a fence has None there.
-
-    A world that is not there, as in a run that was flown elsewhere, has no zones.
+    ``told`` says what is so in it, ``tone`` how bad that is: good, fair or bad. ``box``: ``{low, high}``; ``cylinder``, upright:
+    ``{at: [x, y], radius_m, z: [from, to]}``; ``sphere``: ``{at, radius_m}``. A world that is not there, as in a run that was elsewhere,
+    has none.
 
     Raises:
-        ValueError: the file is no world.
+        ValueError: the file is no world, or the robot's part makes no sense.
         OSError: it can't be read.
     """
     path = Path(world)
-    return {"fence": _fence(), "radio": list(_zones(path)) if world and path.is_file() else []}
-
-
-def _fence() -> Any:
-    """Return the upright cylinder about home in which the robot stays, heights above home."""
+    if not world or not path.is_file():
+        return []
     try:
-        return find_robot().page.get("fence")
-    except RobotError:
-        return None
-
-
-def _zones(path: Path) -> Iterator[dict[str, Any]]:
+        read = find_robot().part("areas")
+    except RobotError as error:
+        raise ValueError(str(error)) from None
+    if read is None:
+        return []
     try:
-        world = yaml.safe_load(path.read_text(encoding="utf-8"))
-        for zone in (world.get("radio_zones") or [])[:MAX_ZONES]:
-            quality = str(zone["quality"])
-            yield {"name": str(zone["name"]), "quality": quality if quality in QUALITIES else "critical", **_volume(zone)}
-    except yaml.YAMLError as error:  # its own words quote the file
-        raise ValueError(f"{path.name} is no YAML: {getattr(error, 'problem', None) or 'its text is damaged'}") from error
+        return list(_areas(read(path)))
     except (AttributeError, KeyError, TypeError) as error:
-        raise ValueError(f"radio_zones of {path.name} can't be read: {error}") from error
+        raise ValueError(f"areas of {path.name} can't be read: {error}") from error
 
 
-def _volume(zone: Mapping[str, Any]) -> dict[str, Any]:
-    if "box" in zone:
-        return {"box": {corner: _numbers(zone["box"][corner], 3) for corner in ("low", "high")}}
-    if "cylinder" in zone:
-        cylinder = zone["cylinder"]
+def _areas(told: Any) -> Iterator[dict[str, Any]]:
+    for area in told[:MAX_AREAS]:
+        if area["tone"] not in TONES:
+            raise ValueError(f"{area['tone']} is no tone of an area; there are {', '.join(TONES)}")
+        yield {"name": str(area["name"]), "told": str(area["told"]), "tone": area["tone"], **_volume(area)}
+
+
+def _volume(area: Mapping[str, Any]) -> dict[str, Any]:
+    if "box" in area:
+        return {"box": {corner: _numbers(area["box"][corner], 3) for corner in ("low", "high")}}
+    if "cylinder" in area:
+        cylinder = area["cylinder"]
         return {"cylinder": {"at": _numbers(cylinder["at"], 2), "radius_m": float(cylinder["radius_m"]), "z": _numbers(cylinder["z"], 2)}}
-    return {"sphere": {"at": _numbers(zone["sphere"]["at"], 3), "radius_m": float(zone["sphere"]["radius_m"])}}
+    return {"sphere": {"at": _numbers(area["sphere"]["at"], 3), "radius_m": float(area["sphere"]["radius_m"])}}
 
 
 def _numbers(values: Any, count: int) -> list[float]:

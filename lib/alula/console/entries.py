@@ -1,7 +1,7 @@
 """What the page is made of: entries ``[topic, t_s, value]``, seconds of mission clock.
 
 Without a time are facts of the whole run (``FACTS``), and what came before the mission clock was heard: a clock that was not heard
-reads zero, and zero is no time of a flight whose clock is Unix time.
+reads zero, and zero is no time of a run whose clock is Unix time.
 
 Topics of the record (``alula.common.record``) keep their names and contents, with four exceptions. Of the tree the page gets the shape
 once and then what changed, because a tree of 500 nodes is too much to be sent at each change; of the ticks those that changed what the
@@ -29,7 +29,7 @@ RUN = "/run"
 ROUTE = "/route"
 """The waypoints that the mission means to reach: ``[[x, y, z], ...]``, frame map, metres."""
 AREAS = "/areas"
-"""Radio zones and the fence, see ``areas.areas_of``."""
+"""Areas of the map, see ``areas.areas_of``."""
 MAP = "/map"
 """Points of the map, see ``clouds.packed``."""
 WORLD = "/world"
@@ -37,7 +37,7 @@ WORLD = "/world"
 SUMMARY = "/summary"
 """The values of ``summary.json``."""
 PATH = "/path"
-"""Where the vehicle was: ``[x, y, z]``, frame map, metres."""
+"""Where the robot was: ``[x, y, z]``, frame map, metres."""
 FAULT = "/fault"
 """Something was made to fail: ``{sensor, mode}``."""
 HEALTH = "/health"
@@ -50,9 +50,9 @@ NODES = "/nodes"
 """Nodes of the tree that changed: ``[[index, status, message], ...]``; index as in the last tree."""
 
 PICTURE = "/picture"
-"""A small picture of a camera: ``{camera, jpeg}``, base64; ``depth``: from yellow, near, to violet, 20 m and more; ``screen``: received."""
+"""A small picture of a camera: ``{camera, jpeg}``, base64; what each shows, the robot's ``page`` says."""
 PICTURES_FILE = "pictures.jsonl"
-"""Where a flight writes them, a line each, with ``stamp_s``."""
+"""Where a run writes them, a line each, with ``stamp_s``."""
 
 RECORDINGS_FILE = "page.jsonl"
 """Where a report leaves, an entry a line, what it told of the run's other recordings: with these the live page is the report's equal."""
@@ -84,12 +84,17 @@ class Converter:
         self._sampled_s: dict[tuple[object, object], float] = {}
         self._start: object = None
         self._alarms: Alarms | None = None
+        self._route: list[list[float]] | None = None
 
     def convert(self, entry: Entry) -> Iterator[Wire]:
         """Yield what the page gets of an entry."""
         t_s = round(entry.stamp_s, 3) if entry.stamp_ns > 0 else None
         if entry.topic == TREE:
             yield from self._tree(t_s, entry.value)
+        elif entry.topic == MISSION and self._route is None and (route := route_of(entry.value)):
+            self._route = route
+            yield ROUTE, None, route
+            yield entry.topic, t_s, self._explained(entry)
         elif self._wanted(t_s, entry):
             yield entry.topic, t_s, self._explained(entry)
 
@@ -134,6 +139,16 @@ class Converter:
         self._nodes = nodes
         if changed:
             yield NODES, t_s, changed
+
+
+def route_of(mission: Mapping[str, Any]) -> list[list[float]]:
+    """Return the waypoints among a mission's inputs, frame map, metres; empty where it has none."""
+    inputs = mission.get("inputs")
+    try:
+        listed = inputs.get("route", ()) if isinstance(inputs, Mapping) else ()
+        return [[float(number) for number in (x, y, z)] for x, y, z in listed]
+    except (TypeError, ValueError):
+        return []
 
 
 def _source(view: Mapping[str, Any]) -> str:

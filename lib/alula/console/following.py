@@ -13,7 +13,7 @@ from alula.console import journal
 from alula.console.areas import areas_of
 from alula.console.causes import Causes
 from alula.console.clouds import CloudError, packed, read_points
-from alula.console.entries import AREAS, CAUSES, MAP, PICTURE, PICTURES_FILE, RECORDINGS_FILE, ROUTE, RUN, SUMMARY, Converter, Wire
+from alula.console.entries import AREAS, CAUSES, MAP, PICTURE, PICTURES_FILE, RECORDINGS_FILE, RUN, SUMMARY, Converter, Wire
 from alula.console.lines import LinesFollower
 
 OF_THE_MACHINE = ("out_dir", "run_id")
@@ -34,7 +34,6 @@ class RunFollower:
         self._files: list[tuple[Path, str, Callable[[Path], Any]]] = [
             (folder / "run.json", RUN, self._run),
             (folder / "run.json", AREAS, lambda path: areas_of(str(_json(path).get("world") or ""))),
-            (folder / "inputs.json", ROUTE, self._route),
             (folder / "map.ply", MAP, lambda path: packed(read_points(path))),
             (folder / "summary.json", SUMMARY, _json),
         ]
@@ -103,9 +102,6 @@ class RunFollower:
             "name": self.folder.name,
             "words": page_words(),
         }
-
-    def _route(self, path: Path) -> list[list[float]]:
-        return [[float(number) for number in waypoint[:3]] for waypoint in _json(path).get("route", [])]  # not every mission has one
 
 
 def _json(path: Path) -> Any:

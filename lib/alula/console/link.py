@@ -30,7 +30,7 @@ class Mission(Closable, Protocol):
     """The mission of a run. Its methods wait for the answer and may be called from any thread; asking again changes nothing."""
 
     def abort(self) -> str:
-        """Have it stop and land; return what it answers. Raises ActError where it gives no answer."""
+        """Have it stop; return what it answers. Raises ActError where it gives no answer."""
         ...
 
     def set_paused(self, *, paused: bool) -> str:

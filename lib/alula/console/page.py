@@ -18,7 +18,7 @@ REPORT = "report.html"
 PARTS = Path(__file__).parent / "page"
 MAX_PICTURES = 400
 """In a report: 3 MB of it at most."""
-PROGRAM = ("dom", "fold", "flight", "account", "state", "tree", "timeline", "map", "figures", "pictures", "operator", "manual", "main")
+PROGRAM = ("dom", "fold", "robot", "account", "state", "tree", "timeline", "map", "figures", "pictures", "operator", "manual", "main")
 """Files of the program, in the order in which they need each other."""
 
 

@@ -8,7 +8,6 @@ from pathlib import Path
 from alula.common.files import write_json, write_text
 from alula.common.record import BLACKBOARD, DATA, DECISIONS, EVENTS, FILE, MISSION, OPERATOR, REPORTS, TICKS, TREE, RecordWriter
 from alula.common.robots import RobotError, find_robot
-from alula.common.runs import INPUTS_FILE
 from alula.missions.director import Director, End, Outcome
 from alula.missions.drawing import draw
 from alula.missions.plan import MissionPlan
@@ -44,7 +43,6 @@ class MissionRecord:
         self._writer = RecordWriter(out / FILE)
         # So that a mission that is killed leaves one that says `running`.
         self._write_mission(End(Outcome.RUNNING), None, None)
-        self._write_inputs()
 
     @property
     def unended(self) -> bool:
@@ -137,12 +135,6 @@ class MissionRecord:
 
     def _write(self, topic: str, content: Mapping[str, object]) -> None:
         self._writer.write(topic, self._clock_ns(), content)
-
-    def _write_inputs(self) -> None:
-        try:
-            write_json(self._out / INPUTS_FILE, self._plan.inputs)
-        except OSError as error:
-            self.problems.append(f"{INPUTS_FILE} could not be written: {error.strerror or error}")
 
     def _write_mission(self, end: End, start_s: float | None, end_s: float | None) -> None:
         if self._writer.error and self._writer.error not in self.problems:

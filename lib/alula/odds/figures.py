@@ -82,7 +82,7 @@ class FaultFigures:
         rate: how often it comes, per second; ANY_RATE: nobody knows.
         stages: of the time to it: 1 is exponential.
         units: how many there are, of which all must have failed.
-        chances: how likely it comes at a use, by the use: a skill that starts, TAKE_OFF.
+        chances: how likely it comes at a use, by the use: a skill that starts, DEPARTURE.
         lasts: seconds; a range without a bound is one that nobody knows, None is for ever.
     """
 

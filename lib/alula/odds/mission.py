@@ -18,7 +18,7 @@ from typing import NamedTuple
 from alula.missions.director import Outcome as Ended
 from alula.model.model import Skill
 from alula.odds.figures import NEVER, Figures
-from alula.odds.system import TAKE_OFF, Kind, Outcome, Step
+from alula.odds.system import DEPARTURE, Kind, Outcome, Step
 from alula.prove.mission.oracle import Asked
 from alula.prove.mission.state import Event, State
 from alula.prove.mission.state import Kind as Happens
@@ -184,7 +184,7 @@ class MissionSteps:
             return ()
         resource, state = self._departure
         left = self._system.resource(before, resource) == state != self._system.resource(after, resource)
-        return (TAKE_OFF,) if left else ()
+        return (DEPARTURE,) if left else ()
 
 
 def _touches(fault: FaultEffects, system: System) -> bool:

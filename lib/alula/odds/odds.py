@@ -98,14 +98,14 @@ def _costs(graph: Graph, figures: Figures, storm: Storm) -> tuple[Cost, ...]:
 
 
 def changed(figures: Figures, text: str, graph: Graph) -> Figures:
-    """Return the figures with one change, as ``--with`` has it: ``zed=2``, so many units of what fails; ``zed=never``.
+    """Return the figures with one change, as ``--with`` has it: ``camera=2``, so many units of what fails; ``camera=never``.
 
     Raises:
         OddsError: it is not written so, or there is no such fault.
     """
     match = _UNITS.fullmatch(text)
     if match is None or match["units"] == "0":
-        raise OddsError(f"--with {text}: write FAULT=UNITS for several that must all fail, as zed=2, or FAULT=never")
+        raise OddsError(f"--with {text}: write FAULT=UNITS for several that must all fail, as camera=2, or FAULT=never")
     faults = sorted({step.name for steps in graph.steps for step in steps if step.kind is Kind.FAULT})
     name = match["name"]
     if name not in faults:

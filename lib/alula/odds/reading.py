@@ -2,7 +2,7 @@
 
     faults:
       zed:
-        happens: [1 per 500 h, 0.2 % at take-off]       # also `1 to 3 per 1000 h`, `0.01 per use of video.stream`, `never`
+        happens: [1 per 500 h, 0.2 % at departure]       # also `1 to 3 per 1000 h`, `0.01 per use of video.stream`, `never`
         lasts: 30 s                                     # also `10 to 60 s`, `for ever`
         source: maker's data sheet, table 3
     arrows:                                             # of the functional layer, that are nobody's fault
@@ -31,7 +31,7 @@ from alula.model.execution_state import ExecutionState
 from alula.model.model import Skill, Skillset
 from alula.odds.errors import OddsError
 from alula.odds.figures import ANY_RATE, NEVER, FaultFigures, Figures, Range, SkillFigures, corners
-from alula.odds.system import TAKE_OFF
+from alula.odds.system import DEPARTURE
 from alula.records.causes.fault_file import ARROWS, EFFECTS, FIGURES, ODDS, PARTS, SECTIONS
 
 SECONDS = {"ms": Fraction(1, 1000), "s": Fraction(1), "min": Fraction(60), "h": Fraction(3600), "d": Fraction(86400)}
@@ -45,7 +45,7 @@ _RANGE = rf"(?P<low>{_NUMBER})(?: to (?P<high>{_NUMBER}))?"
 _STAGES = r"(?:, in (?P<stages>\d+) stages)?"
 _RATE = re.compile(rf"{_RANGE} per (?:(?P<each>{_NUMBER}) )?(?P<unit>{_UNIT}){_STAGES}")
 _TIME = re.compile(rf"{_RANGE} (?P<unit>{_UNIT}){_STAGES}")
-_CHANCE = re.compile(rf"{_RANGE}(?P<percent> ?%)?(?: (?:per use of (?P<skill>\S+)|(?P<at>at take-off)))?")
+_CHANCE = re.compile(rf"{_RANGE}(?P<percent> ?%)?(?: (?:per use of (?P<skill>\S+)|(?P<at>at departure)))?")
 
 RATES = "as `1 per 500 h` or `1 to 3 per 1000 h`"
 CHANCES = "from 0 to 1, or in %, as `0.98` or `1 to 3 %`"
@@ -89,12 +89,12 @@ def _fault(part: Located, name: str, skills: Collection[str]) -> FaultFigures:
                     raise one.wrong(f"`{name}` has a rate already; add the two up")
                 rate, stages = _rate(one, match), _stages(one, match)
             elif (match := _CHANCE.fullmatch(text)) and (match["skill"] or match["at"]):
-                use = match["skill"] or TAKE_OFF
-                if use != TAKE_OFF and use not in skills:
+                use = match["skill"] or DEPARTURE
+                if use != DEPARTURE and use not in skills:
                     raise one.wrong(f"there is no skill `{use}`; there are {choices(use, skills)}")
                 chances[use] = _chance(one, match)
             elif text != "never":
-                raise one.wrong(f"`{text}` should be {RATES}, `0.01 per use of SKILL`, `0.2 % at take-off`, or `never`")
+                raise one.wrong(f"`{text}` should be {RATES}, `0.01 per use of SKILL`, `0.2 % at departure`, or `never`")
     lasts, lasts_stages = _lasts(said["lasts"]) if "lasts" in said else (ANY_RATE, 1)
     return FaultFigures(rate, stages, 1, chances, lasts, lasts_stages, _source(said))
 

@@ -9,7 +9,7 @@ from typing import Generic, Protocol, TypeVar
 
 State = TypeVar("State", bound=Hashable)
 
-TAKE_OFF = "take-off"
+DEPARTURE = "departure"
 """The use that the robot's departure is."""
 
 
@@ -47,7 +47,7 @@ class Step(Generic[State]):
     Attributes:
         name: of the skill that ends, ``skillset.skill``, or of the fault; of the others, what a reader calls it.
         result: how an execution ends.
-        uses: what is used from here on: skills that start, as ``skillset.skill``, and TAKE_OFF.
+        uses: what is used from here on: skills that start, as ``skillset.skill``, and DEPARTURE.
         seconds: how long a WAIT is; 0: the figures of the skill ``name`` say so.
     """
 

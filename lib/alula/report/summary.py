@@ -73,7 +73,7 @@ def read_bridge(facts: RunFacts, problems: Problems) -> dict[str, object] | None
     """Return the bridge's statistics, topic by topic."""
     statistics: object = None
     with problems.survive("bridge.json"):
-        statistics = mapping(read_json(facts.out_dir / "bridge.json")).get("topics")
+        statistics = mapping(read_json(facts.out_dir / "logs/bridge.json")).get("topics")
         if not isinstance(statistics, dict):
             raise ReportError("bridge.json holds no statistics of topics")
     return mapping(statistics) or None

@@ -1,4 +1,4 @@
-"""The last lines of a flight: how it went, in words and numbers, and where the pictures are."""
+"""The last lines of a run: how it went, in words and numbers, and where the pictures are."""
 
 from __future__ import annotations
 
@@ -23,7 +23,7 @@ MEANING = {
 BY_EXIT_CODE = {0: "accomplished", 1: "given_up", 2: "not_started"}
 TOLD_TO_END = "told to end by "
 """Begins the reason of a mission that a signal has ended: who sent it, it can't know."""
-PICTURES = ("report.html", "timeline.svg", "tree.svg", "map.png", "video.svg", "summary.json")
+PICTURES = (".svg", ".png")
 
 
 def number(value: float | None, unit: str, digits: int = 2) -> str:
@@ -76,39 +76,37 @@ def death_lines(died: Sequence[Death]) -> list[str]:
     return [f"  {death.sentence()}" + (f" ({times[name]} times in all)" if times[name] > 1 else "") for name, death in last.items()]
 
 
-def flight_lines(summary: Mapping[str, Any]) -> list[str]:
-    """Return what a flight through a world was."""
-    chart, words = summary.get("map") or {}, page_words()
-    coverage, collisions = chart.get("coverage"), summary.get("collisions")
-    lines = [
+def world_lines(summary: Mapping[str, Any]) -> list[str]:
+    """Return what a run through a world was."""
+    words, collisions = page_words(), summary.get("collisions")
+    return [
         "  "
         + ", ".join([*came_back(summary), duration_words(summary)])
         + (f", {words['moved']} {number(summary['distance_m'], 'm', 1)}" if "distance_m" in summary else "")
         + (f", collisions {'unknown' if collisions is None else collisions}" if "collisions" in summary else "")
-        + (f", nearest surface {number(summary['min_clearance_m'], 'm')}" if "min_clearance_m" in summary else "")
-    ]
-    if summary.get("video"):
-        return [*lines, video_line(summary["video"])]
-    if chart.get("points") is None:
-        return [*lines, "  map: none"] if "map" in summary else lines
-    return [
-        *lines,
-        f"  map: {chart.get('points')} points, rmse {number(chart.get('rmse_m'), 'm', 3)}, "
-        f"coverage {number(None if coverage is None else 100 * coverage, '%', 1)}",
+        + (f", nearest surface {number(summary['min_clearance_m'], 'm')}" if "min_clearance_m" in summary else ""),
+        *figure_lines(summary),
     ]
 
 
-def video_line(video: Mapping[str, Any]) -> str:
-    """Return what the telepilot saw."""
-    return (
-        f"  video: at least {number(video.get('min_fps'), 'frames a second', 0)}, SSIM {number(video.get('mean_ssim'), '', 3)} "
-        f"(least {number(video.get('min_ssim'), '', 3)}), delay {number(video.get('p95_delay_s'), 's')} (95 %), "
-        f"{video.get('freezes')} freezes, {video.get('adaptations')} adaptations, criterion missed: {video.get('criterion') or 'none'}"
-    )
+def figure_lines(summary: Mapping[str, Any]) -> list[str]:
+    """Return what the robot measures besides, a line for each group of figures that the summary has: ``map: rmse 0.03 m, ...``."""
+    groups: dict[str, list[str]] = {}
+    for path, told in page_words()["figures"].items():
+        group, _, name = path.rpartition(".")
+        values = summary.get(group) or {}
+        if values:
+            groups.setdefault(group, [])
+            value = values.get(name)
+            if isinstance(value, str):
+                groups[group].append(f"{told['label']} {value}")
+            elif value is not None:
+                groups[group].append(f"{told['label']} {number(told['factor'] * value, told['unit'], told['digits'])}")
+    return [f"  {group}: {', '.join(said) or 'none'}" for group, said in groups.items()]
 
 
 def mock_lines(summary: Mapping[str, Any]) -> list[str]:
-    """Return what a flight over mocks was; there is no world to collide with or to map."""
+    """Return what a run over mocks was; there is no world to collide with or to map."""
     mock = summary["mock"]
     return [
         f"  {', '.join([*came_back(summary), duration_words(summary)])}; "
@@ -117,7 +115,7 @@ def mock_lines(summary: Mapping[str, Any]) -> list[str]:
 
 
 def what_failed(summary: Mapping[str, Any]) -> str:
-    """Return what the vehicle had to recover from."""
+    """Return what the robot had to recover from."""
     failure_s = summary["recovery"]["failure_s"]
     return next((f"{one['sensor']} {one['told']}" for one in summary["answers"] if one["t_s"] == failure_s), "sensor failed")
 
@@ -141,8 +139,8 @@ def verdict_lines(summary: Mapping[str, Any], died: Sequence[Death], out: Path) 
     lines += [f"  it still waited for {wait}" for wait, over in read_waits(out).items() if not over]
     if summary.get("mock"):
         lines += mock_lines(summary)
-    elif summary.get("landed") is not None or summary.get("distance_m") is not None:  # else nothing is known to have flown
-        lines += flight_lines(summary)
+    elif summary.get("landed") is not None or summary.get("distance_m") is not None:  # else nothing is known of a way
+        lines += world_lines(summary)
     recovery = summary.get("recovery") or {}
     if recovery.get("failure_s") is not None:
         failure = recovery["failure_s"]
@@ -154,5 +152,6 @@ def verdict_lines(summary: Mapping[str, Any], died: Sequence[Death], out: Path) 
     if summary.get("conformance") is not None:
         lines += conformance_lines(summary["conformance"])
     lines += [f"  problem: {problem}" for problem in summary.get("problems") or ()]
-    lines += [f"  {out / name}" for name in PICTURES if (out / name).exists()]
+    pictures = sorted(path.name for path in out.glob("*") if path.suffix in PICTURES)
+    lines += [f"  {out / name}" for name in ("report.html", *pictures, "summary.json") if (out / name).exists()]
     return lines

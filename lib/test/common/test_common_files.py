@@ -10,7 +10,6 @@ import pytest
 
 from alula.common.files import write_aside, write_json, write_text
 from alula.common.located_yaml import YamlError, read_yaml
-from alula.common.scenarios import ScenarioError, load_scenario
 from alula.common.signals import END_SIGNALS, Interrupts
 from alula.common.suggestions import nearest
 
@@ -84,12 +83,3 @@ def test_hints_ignore_case_and_list_the_few():
     assert nearest("flie", ["fly", "replay", "bridge", "interrupt"]) == "did you mean `fly`?"
     assert nearest("xyz", ["mapping"]) == "there is `mapping`"
     assert nearest("xyz", []) == ""
-
-
-def test_a_fault_of_the_ground_link_is_one_that_the_scenario_has(tmp_path):
-    said = "about: x\nmission: a:b\nskillsets: [s]\nfaults: {control: [lost]}\nground_link: [WHAT]\n"
-    (tmp_path / "patrol.yaml").write_text(said.replace("WHAT", "control"))
-    assert load_scenario("patrol", tmp_path).ground_link == ("control",)
-    (tmp_path / "patrol.yaml").write_text(said.replace("WHAT", "radio"))
-    with pytest.raises(ScenarioError, match=r"patrol.yaml:5: `faults` does not say in which ways radio can fail"):
-        load_scenario("patrol", tmp_path)

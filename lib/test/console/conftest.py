@@ -37,7 +37,6 @@ def make_run(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Callable[..., P
             "run_id": f"id-{name}",
         }
         (folder / "run.json").write_text(json.dumps(run), encoding="utf-8")
-        (folder / "inputs.json").write_text(json.dumps({"route": [[0, 0, 3], [60, 1, 3]]}), encoding="utf-8")
         write_map(folder / "map.ply")
         return folder
 

@@ -45,13 +45,15 @@ def transition(resource: str, before: str, after: str) -> dict[str, Any]:
 
 Story = list[tuple[float, str, dict[str, Any]]]
 
+RUNNING = {"scenario": "mapping", "outcome": "running", "reason": "", "waypoints": 5, "waypoints_reached": 0}
+
 
 def failing_story(name: str = "navigate") -> Story:
     """Return the entries of a flight whose ZED breaks 30 s after lift-off; the LiDAR takes over 0.5 s later."""
     why = "zed_ok: zed_status is BROKEN, after zed_status OK -> BROKEN (extern)"
     start, broken = LIFT_OFF_S, {"zed_status": "BROKEN"}
     story: Story = [
-        (start - 3, MISSION, {"scenario": "mapping", "outcome": "running", "reason": "", "waypoints": 5, "waypoints_reached": 0}),
+        (start - 3, MISSION, {**RUNNING, "inputs": {"route": [[0, 0, 3], [60, 1, 3]]}}),
         (start - 2, TREE, tree("INVALID", "INVALID", name=name)),
         (start, EVENTS, transition("navigation.flight_status", "ON_GROUND", "IN_AIR")),
         (start + 1, EVENTS, execution("perception.zed_depthmap", "REQUESTED", 1)),
@@ -103,7 +105,18 @@ def lost_video() -> Story:
         **{"picture.fps_margin": -6},
     )
     return [
-        (start - 3, MISSION, {"scenario": "inspection", "outcome": "running", "reason": "", "waypoints": 10, "waypoints_reached": 0}),
+        (
+            start - 3,
+            MISSION,
+            {
+                "scenario": "inspection",
+                "outcome": "running",
+                "reason": "",
+                "waypoints": 10,
+                "waypoints_reached": 0,
+                "inputs": {"route": [[6, 0, 3], [12, 0, 3]]},
+            },
+        ),
         (start, EVENTS, transition("navigation.flight_status", "ON_GROUND", "IN_AIR")),
         (start + 1, EVENTS, execution("video.stream", "RUNNING", 1)),
         (start + 2, EVENTS, execution("navigation.goto", "RUNNING", 1)),

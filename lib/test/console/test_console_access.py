@@ -136,7 +136,7 @@ def test_a_browser_drops_the_token_and_says_that_it_may_only_watch(
         page.wait("document.querySelector('#operator')?.textContent.includes('you may only watch, as this page comes without TLS')")
         assert page.run("location.href") == f"http://{elsewhere.base}/"
         assert page.run("document.cookie") == ""
-        assert page.run("[...document.querySelectorAll('#flight button')].every((one) => one.disabled)") is True
+        assert page.run("[...document.querySelectorAll('#acts button')].every((one) => one.disabled)") is True
         browser.delete_all_cookies()
 
     elsewhere.serve(play, make_run())

@@ -29,8 +29,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 from hypothesis.extra import numpy as stn
 
-from alula.common.flight_limits import FLIGHT_LIMITS
-from alula.common.record import DATA, EVENTS, FILE, OPERATOR, REPORTS, TICKS, TREE, Entry
+from alula.common.record import DATA, EVENTS, FILE, MISSION, OPERATOR, REPORTS, TICKS, TREE, Entry
 from alula.common.robots import RobotError, load_robot_folder
 from alula.console.areas import areas_of
 from alula.console.clouds import MAX_POINTS, CloudError, packed, read_points, thinned
@@ -147,7 +146,7 @@ def test_a_run_is_followed_while_it_grows(tmp_path: Path) -> None:
     writer = write_record(tmp_path, story[:3], over=False)
     (tmp_path / "run.json").write_text('{"scenario": "mapping", "world": "/a/b/yard.yaml", "run_id": "x"}', encoding="utf-8")
     first = follower.poll()
-    assert [wire[0] for wire in first] == [RUN, AREAS, "/mission", TREE, NODES, EVENTS, CAUSES]
+    assert [wire[0] for wire in first] == [RUN, AREAS, ROUTE, "/mission", TREE, NODES, EVENTS, CAUSES]
     assert (first[0][1], first[0][2]["world"], "run_id" in first[0][2]) == (None, "yard", False)  # type: ignore[index, operator]
     assert follower.poll() == []
     writer.write(EVENTS, 1, {"kind": "x"})
@@ -221,7 +220,6 @@ def test_files_that_are_damaged_are_told_and_the_rest_is_read(tmp_path: Path) ->
     write_record(tmp_path, failing_story())
     for name, content in (
         ("run.json", "[1]"),
-        ("inputs.json", '{"route": [["x", 1, 2]]}'),
         ("map.ply", "ply"),
         ("operator.jsonl", "{\n[]\n1\n"),
     ):
@@ -229,8 +227,18 @@ def test_files_that_are_damaged_are_told_and_the_rest_is_read(tmp_path: Path) ->
     follower = RunFollower(tmp_path)
     topics = {wire[0] for wire in follower.poll()}
     assert EVENTS in topics
-    assert topics.isdisjoint({RUN, ROUTE, MAP, OPERATOR})
-    assert [problem.partition(":")[0] for problem in follower.problems] == ["run.json", "inputs.json", "map.ply"]
+    assert topics.isdisjoint({RUN, MAP, OPERATOR})
+    assert [problem.partition(":")[0] for problem in follower.problems] == ["run.json", "map.ply"]
+
+
+@pytest.mark.parametrize("route", [[["x", 1, 2]], [[1, 2]], 3, [[1, 2, None]]])
+def test_the_route_is_among_the_missions_inputs_once(route: object) -> None:
+    good = Entry(MISSION, 1, {"outcome": "running", "inputs": {"route": [[0, 0, 3], [6, 1, 3]]}})
+    converter = Converter()
+    assert [wire[0] for wire in converter.convert(good)] == [ROUTE, MISSION]
+    assert [wire[0] for wire in converter.convert(good)] == [MISSION]
+    for inputs in ({"route": route}, route, None):
+        assert [wire[0] for wire in Converter().convert(Entry(MISSION, 1, {"outcome": "running", "inputs": inputs}))] == [MISSION]
 
 
 def test_a_file_that_is_no_record_is_told(tmp_path: Path) -> None:
@@ -248,7 +256,7 @@ def world_file(path: Path, zones: object) -> str:
     return str(path)
 
 
-def test_zones_of_every_shape_and_the_fence_are_told(tmp_path: Path) -> None:
+def test_areas_of_every_shape_are_told(tmp_path: Path) -> None:
     box = {"name": HOSTILE, "quality": "degraded", "box": {"low": [0, 0, 0], "high": [1, 2, 3]}}
     cylinder = {"name": "mast", "quality": "good", "cylinder": {"at": [1, 2], "radius_m": 5, "z": [0, 20]}}
     sphere = {"name": "jammer", "quality": "critical", "sphere": {"at": [4, 5, 6], "radius_m": 8}}
@@ -256,11 +264,11 @@ def test_zones_of_every_shape_and_the_fence_are_told(tmp_path: Path) -> None:
     (tmp_path / "run.json").write_text(json.dumps({"scenario": "mapping", "world": world}), encoding="utf-8")
     follower = RunFollower(tmp_path)
     areas = {wire[0]: wire[2] for wire in follower.poll()}[AREAS]
-    limits = FLIGHT_LIMITS  # the guidance enforces what the page shows
-    assert areas["radio"] == [box, cylinder, sphere]
-    assert areas["fence"] == {"radius_m": limits.fence_radius_m, "z": [limits.fence_floor_m, limits.fence_height_m]}
+    told = [("radio degraded", "fair"), ("radio good", "good"), ("radio critical", "bad")]
+    zones = [{name: value for name, value in zone.items() if name != "quality"} for zone in (box, cylinder, sphere)]
+    assert areas == [{**zone, "told": text, "tone": tone} for zone, (text, tone) in zip(zones, told, strict=True)]
     assert follower.poll() == []
-    assert areas_of("")["radio"] == areas_of("/not/here.yaml")["radio"] == []
+    assert areas_of("") == areas_of("/not/here.yaml") == []
 
 
 @pytest.mark.parametrize(
@@ -344,7 +352,6 @@ def test_markup_of_a_run_is_no_markup_of_the_page() -> None:
 
 def test_a_viewer_is_sent_what_it_lacks(tmp_path: Path) -> None:
     write_record(tmp_path, failing_story())
-    (tmp_path / "inputs.json").write_text('{"route": [[0, 0, 1]]}', encoding="utf-8")
     feed, place = Feed(tmp_path), Place()
     feed.add(feed.read())
     first = json.loads(feed.message(place) or "")
@@ -376,10 +383,12 @@ def test_a_place_that_makes_no_sense_is_the_beginning(hello: dict[str, object]) 
 def test_a_robot_that_says_nothing_of_its_page_has_no_fence_and_usual_words(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     (tmp_path / "robot.yaml").write_text("name: rover\n", encoding="utf-8")
     monkeypatch.setenv("ALULA_ROBOT", str(tmp_path))
-    assert areas_of("") == {"fence": None, "radio": []}
+    (tmp_path / "world.yaml").write_text("radio_zones: 3\n", encoding="utf-8")
+    assert areas_of(str(tmp_path / "world.yaml")) == []
     (tmp_path / "run.json").write_text("{}", encoding="utf-8")
     words = next(value["words"] for topic, _, value in RunFollower(tmp_path).poll() if topic == RUN)
     assert [words[name] for name in ("departure", "away", "back", "moved")] == ["departure", "under way", "back", "travelled"]
+    assert words["fence"] is None
     assert words["modes"] == words["live"] == words["glossary"] == {}
     (tmp_path / "robot.yaml").write_text("name: rover\npage:\n  away: out\n  fence: [5, 0]\n", encoding="utf-8")
     with pytest.raises(RobotError, match=r"robot.yaml:4.*radius, floor, ceiling"):

@@ -44,7 +44,7 @@ def test_the_live_page_follows_says_when_it_is_cut_off_and_is_true_again(
         console.stop()
         page.wait("document.querySelector('#link').dataset.state === 'stale'")
         assert "disconnected" in page.text("#link")
-        assert page.run("document.querySelector('#flight .danger:not(:disabled)') === null")
+        assert page.run("document.querySelector('#acts .danger:not(:disabled)') === null")
         writer.write(MISSION, round((LIFT_OFF_S + 61) * 1e9), story[-1][2])
         console.start()
         page.wait("document.querySelector('#link').dataset.state !== 'stale'")
@@ -75,7 +75,7 @@ def test_a_run_that_ends_without_a_verdict_is_not_said_to_be_under_way(
         live[0] = False
         page.wait("document.querySelector('#headline').textContent === 'The mission\\'s process ended before the mission did'")
         page.wait("document.querySelector('#link').dataset.state === 'over'")
-        assert page.run("document.querySelector('#flight .danger:not(:disabled)') === null")
+        assert page.run("document.querySelector('#acts .danger:not(:disabled)') === null")
         assert page.complaints() == []
     writer.close()
 
@@ -115,14 +115,14 @@ def test_a_run_is_started_by_the_form_and_a_refusal_is_shown(
         button.click()
         assert asked == []
         button.click()
-        page.wait("document.querySelector('#flight output').textContent.startsWith('start: refused: <img src=x')")
+        page.wait("document.querySelector('#acts output').textContent.startsWith('start: refused: <img src=x')")
         assert page.run("document.querySelector('#operator details').open") is True
         world.clear()
         seed.send_keys("8")
         seed.send_keys(Keys.HOME, Keys.DELETE)
         button.click()
         button.click()
-        page.wait("document.querySelector('#flight output').textContent === 'start: refused: all DDS domains are taken'")
+        page.wait("document.querySelector('#acts output').textContent === 'start: refused: all DDS domains are taken'")
         seed.send_keys(Keys.HOME, Keys.DELETE, "7")
         button.click()
         button.click()
@@ -134,7 +134,7 @@ def test_a_run_is_started_by_the_form_and_a_refusal_is_shown(
         Select(record).select_by_visible_text("sensors")
         button.click()
         button.click()
-        page.wait("document.querySelector('#flight output').textContent === 'start: second is started'")
+        page.wait("document.querySelector('#acts output').textContent === 'start: second is started'")
     again = WantedRun("mapping", 7, ("zed@30", "lidar@60"), options=("--link=tcp:base:5", "--record=sensors"))
     assert asked[1:] == [WantedRun("mapping", 7, ("zed@30", "lidar@60"), mock=True), again]
 
@@ -147,17 +147,17 @@ def test_an_act_needs_two_presses_and_everything_off_a_word(
     monkeypatch.setattr("alula.console.acts.everything_off", lambda run: done.append(run.name) or "everything_off is done")
     with served(folder, Robot(abort=lambda: done.append("abort") or "abort is done")) as console:
         page = Page(browser, console.address)
-        abort, off = (f"document.querySelector('#flight {kind}')" for kind in (".stop", ".danger"))
-        page.wait(f"{abort} !== null && !{abort}.disabled")
+        abort, off = (f"document.querySelector('#acts {kind}')" for kind in (".stop", ".danger"))
+        page.wait(f"{abort} !== null && !{abort}.disabled && {abort}.textContent === 'stop and land'")
         page.run(f"{abort}.click()")
         assert page.run(f"{abort}.textContent") == "press again: stop and land"
         assert done == []
         page.run(f"{abort}.click()")
-        page.wait("document.querySelector('#flight output').textContent.includes('abort is done')")
+        page.wait("document.querySelector('#acts output').textContent.includes('abort is done')")
         assert page.run(f"{off}.disabled") is True
-        page.browser.find_element("css selector", "#flight input[placeholder='type OFF']").send_keys("off")
+        page.browser.find_element("css selector", "#acts input[placeholder='type OFF']").send_keys("off")
         page.run(f"{off}.click(), {off}.click()")
-        page.wait("document.querySelector('#flight output').textContent.includes('everything_off is done')")
+        page.wait("document.querySelector('#acts output').textContent.includes('everything_off is done')")
         page.wait("document.querySelector('#lines').textContent.includes('The operator switched everything off')")
         assert page.complaints() == []
     assert done == ["abort", "live"]
@@ -170,19 +170,19 @@ def test_the_acts_on_a_flight_stay_in_sight_and_an_answer_moves_nothing(
     folder = make_run("live")
     monkeypatch.setattr("alula.console.commands.is_live", lambda _run: True)
     link = Robot(pause=lambda: "held: " + "a skill that goes on, " * 40)
-    pause = "[...document.querySelectorAll('#flight button')][0]"
+    pause = "[...document.querySelectorAll('#acts button')][0]"
     with served(folder, link) as console:
         page = Page(browser, console.address, size)
         page.wait(f"{pause} !== undefined && !{pause}.disabled && document.querySelector('.row') !== null")
         page.wait("![...document.querySelectorAll('#operator details')].at(-1).open")  # folded up at lift-off
         page.run("scrollTo(0, document.documentElement.scrollHeight / 2)")
-        page.wait("document.querySelector('#flight').getBoundingClientRect().top === 0")
-        buttons = "[...document.querySelectorAll('#flight button:not([hidden])')]"
+        page.wait("document.querySelector('#acts').getBoundingClientRect().top === 0")
+        buttons = "[...document.querySelectorAll('#acts button:not([hidden])')]"
         assert page.run(f"{buttons}.every((one) => one.getBoundingClientRect().top < 120)")
         page.run("scrollTo(0, 0)")
         before = page.run("document.querySelector('main').getBoundingClientRect().top")
         page.run(f"{pause}.click(), {pause}.click()")
-        page.wait("document.querySelector('#flight output').textContent.includes('a skill that goes on')")
+        page.wait("document.querySelector('#acts output').textContent.includes('a skill that goes on')")
         assert page.run("document.querySelector('main').getBoundingClientRect().top") == before
         assert page.complaints() == []
 
@@ -211,7 +211,7 @@ def test_a_pause_is_shown_until_the_mission_goes_on(browser: Any, make_run: Call
     writer = write_record(folder, [entry for entry in failing_story() if entry[0] < LIFT_OFF_S + 20], over=False)
     monkeypatch.setattr("alula.console.commands.is_live", lambda _run: True)
     link = Robot(pause=lambda: done.append("pause") or "pause", resume=lambda: done.append("resume") or "resume")
-    button = "[...document.querySelectorAll('#flight button')].find((one) => one.textContent === '{}' && !one.hidden && !one.disabled)"
+    button = "[...document.querySelectorAll('#acts button')].find((one) => one.textContent === '{}' && !one.hidden && !one.disabled)"
     with served(folder, link) as console:
         page = Page(browser, console.address)
         page.wait(f"{button.format('pause')} !== undefined")
@@ -219,7 +219,7 @@ def test_a_pause_is_shown_until_the_mission_goes_on(browser: Any, make_run: Call
         page.run(f"{button.format('pause')}.click()")
         assert done == []
         page.run(f"{button.format('press again: pause')}.click()")
-        page.wait("document.querySelector('#flight output').textContent === 'pause: pause'")
+        page.wait("document.querySelector('#acts output').textContent === 'pause: pause'")
         writer.write(OPERATOR, round(33e9), {"command": "paused", "by": "mission", "reason": "navigation.goto holds"})
         page.wait("document.querySelector('.held').textContent === 'The mission is paused. navigation.goto holds'")
         page.wait("document.querySelector('#headline').textContent === 'The mission is paused'")
@@ -239,9 +239,9 @@ def test_what_was_sent_is_said_until_the_answer_comes_or_the_connection_breaks(
     monkeypatch.setattr("alula.console.commands.is_live", lambda _run: True)
     link = Robot(abort=lambda: "landing" if go.wait(WAIT_S) else "nothing came", pause=lambda: "paused")
     said, abort, pause = (
-        "document.querySelector('#flight output').textContent",
-        "document.querySelector('#flight .stop')",
-        "document.querySelector('#flight .hold')",
+        "document.querySelector('#acts output').textContent",
+        "document.querySelector('#acts .stop')",
+        "document.querySelector('#acts .hold')",
     )
     with served(folder, link) as console:
         page = Page(browser, console.address)
@@ -272,8 +272,8 @@ FIRST_SCREEN = (
     "#pictures img",
     "#recent",
     "#link",
-    "#flight .hold",
-    "#flight .stop",
+    "#acts .hold",
+    "#acts .stop",
 )
 
 
@@ -310,11 +310,9 @@ def test_the_first_screen_shows_what_matters(browser: Any, make_run: Callable[..
         assert page.text("#active li") == "lidar_depthmapsince 30.5 s"
         assert page.text("#wrong li") == "zed_depthmap: invariant zed_ok violated since 30.0 s | zed_status is BROKEN since 30.0 s"
         assert page.text("#recent li").startswith("30.50 sperception.lidar_depthmap runs")
-        hold, stop = (
-            page.run(f"getComputedStyle(document.querySelector('#flight {kind}')).backgroundColor") for kind in (".hold", ".stop")
-        )
+        hold, stop = (page.run(f"getComputedStyle(document.querySelector('#acts {kind}')).backgroundColor") for kind in (".hold", ".stop"))
         assert hold != stop
-        assert min(boxes[name]["height"] for name in ("#flight .hold", "#flight .stop")) >= 44
+        assert min(boxes[name]["height"] for name in ("#acts .hold", "#acts .stop")) >= 44
         page.choose(10.0)
         assert page.text("#active li") == "zed_depthmapsince 1.0 s"
         assert page.text("#wrong li") == "Nothing is known to be wrong."

@@ -40,7 +40,7 @@ def test_the_report_says_what_failed_when_what_was_done_and_what_it_cost(browser
     rows = [row.split(" | ") for row in page.run(ANSWERS)]
     assert [row[:2] for row in rows] == [["zed failed (dead, injected)", "29.90 s"], ["the whole mission", ""]]
     assert "the mission fell back from “ZED navigation” to “LiDAR navigation”; started lidar_depthmap" in rows[0][2]
-    assert rows[0][3] == "noticed after 0.10 s; the fallback ran after 0.60 s; the vehicle moved on after 4.10 s"
+    assert rows[0][3] == "noticed after 0.10 s; the fallback ran after 0.60 s; the robot moved on after 4.10 s"
     assert rows[1][2:] == ["mission accomplished in degraded mode; landed", "no waypoint was missed; nothing was hit"]
     assert page.complaints() == []
 
@@ -74,11 +74,13 @@ def test_the_map_shows_zones_of_the_radio_and_the_fence(browser: Any, tmp_path: 
     for t_s in (10.0, 15.0, 30.0, 50.0):
         page.choose(t_s)
         words[t_s] = page.text("#map-words")
-    assert f"In the radio zone “{HOSTILE}”: critical." in words[10.0]  # the first that is listed counts
-    assert "In the radio zone “mast”: degraded." in words[15.0]
-    assert "radio zone" not in words[30.0]
-    assert "In the radio zone “jammer”: degraded." in words[50.0]
+    assert f"In “{HOSTILE}”: radio critical." in words[10.0]  # the first that is listed counts
+    assert "In “mast”: radio degraded." in words[15.0]
+    assert ": radio" not in words[30.0]
+    assert "In “jammer”: radio degraded." in words[50.0]
     assert "Fence: 60 m around home, 10.0 m away." in words[50.0]
+    legend = page.text("#map-legend li").split(" | ")
+    assert [text for text in legend if "radio" in text or "fence" in text] == ["radio critical", "radio degraded", "fence"]
     page.run("document.querySelector('#map-3d').click()")
     assert page.complaints() == []
 

@@ -97,7 +97,6 @@ def test_the_report_says_where_the_vehicle_landed(browser: Any, tmp_path: Path, 
     story, summary = overtaken()
     places = [(LIFT_OFF_S + t_s, "/path", place) for t_s, place in ((-1.0, [0, 0, 0]), (30.0, [6, 0, 3]), (56.5, [*landed, 0]))]
     make_story_report(tmp_path, [*story, *places], summary)  # type: ignore[list-item]
-    (tmp_path / "inputs.json").write_text(json.dumps({"route": [[6, 0, 3], [12, 0, 3]]}), encoding="utf-8")
     write_report(tmp_path, [(topic, t_s, place) for t_s, topic, place in places], title="inspection")
     page = Page(browser, f"file://{tmp_path / REPORT}")
     page.wait(DRAWN)
@@ -106,7 +105,7 @@ def test_the_report_says_where_the_vehicle_landed(browser: Any, tmp_path: Path, 
     assert f"Landed {where}." in page.text("#map-words")
     page.choose(40.0)
     assert "Landed" not in page.text("#map-words")
-    assert "No position since 30.0 s; the last one: Vehicle at east 6.0 m" in page.text("#map-words")
+    assert "No position since 30.0 s; the last one: Robot at east 6.0 m" in page.text("#map-words")
     assert page.complaints() == []
 
 

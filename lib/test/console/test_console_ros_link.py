@@ -89,7 +89,7 @@ def test_a_mission_that_is_not_there_is_told_so_and_the_pilot_is_named_not_the_b
             robot.abort()
     finally:
         robot.close()
-    assert "its pilot takes it over" in str(refused.value)
+    assert "take it over by hand" in str(refused.value)
     assert "off" not in str(refused.value)
 
 

@@ -13,7 +13,7 @@ import pytest
 
 pytest.importorskip("py_trees")
 
-from alula.campaign.mock_flights import load_flights
+from alula.campaign.mocked_scenarios import load_mocked_scenario
 from alula.commands import run
 from alula.common.record import TREE, read_record
 from alula.common.scenarios import scenarios_folder
@@ -36,7 +36,7 @@ flown.run()
 
 def mission(scenario: str, out: Path | None = None, groot: str = "") -> MockedMission:
     """Return a mission over mocks, about to run."""
-    flights = load_flights(scenario)
+    flights = load_mocked_scenario(scenario)
     return MockedMission(flights.skillsets, flights.behaviour, flights.plan, out=out, groot=groot)
 
 

@@ -15,7 +15,7 @@ from alula.odds.figures import ANY_CHANCE, ANY_RATE, FaultFigures, Figures, Rang
 from alula.odds.graph import explore
 from alula.odds.process import Choice, Process, quantify
 from alula.odds.storm import Storm
-from alula.odds.system import TAKE_OFF, Kind, Outcome, Step
+from alula.odds.system import DEPARTURE, Kind, Outcome, Step
 
 FLIGHT = {"begin": [now("flying", "fly")], "flying": [end("fly", "DONE", "accomplished"), fault("motor", "given_up")]}
 
@@ -55,11 +55,11 @@ def test_a_second_unit_has_to_fail_too() -> None:
 
 
 def test_a_fault_at_a_use_comes_then_or_not() -> None:
-    table = {"begin": [now("flying", TAKE_OFF, "fly")], "flying": [end("fly", "DONE", "accomplished"), fault("motor", "given_up")]}
-    motor = FaultFigures(rate=point(0), chances={TAKE_OFF: point("0.01"), "fly": point("0.02")})
+    table = {"begin": [now("flying", DEPARTURE, "fly")], "flying": [end("fly", "DONE", "accomplished"), fault("motor", "given_up")]}
+    motor = FaultFigures(rate=point(0), chances={DEPARTURE: point("0.01"), "fly": point("0.02")})
     asked = storm(table, Figures({"motor": motor}, {"fly": SkillFigures(lasts=point(60))}))
     assert chances(asked) == (Fraction(99, 100) * Fraction(98, 100),) * 2
-    assert asked.slopes(asked.chance([ACCOMPLISHED], most=False))["motor at take-off"] == pytest.approx(-0.98)
+    assert asked.slopes(asked.chance([ACCOMPLISHED], most=False))["motor at departure"] == pytest.approx(-0.98)
 
 
 def test_a_figure_that_is_missing_is_a_range() -> None:

@@ -10,7 +10,7 @@ import pytest
 from alula.odds.errors import OddsError
 from alula.odds.figures import ANY_RATE, NEVER, FaultFigures, Figures, Range, SkillFigures, point
 from alula.odds.reading import load_figures
-from alula.odds.system import TAKE_OFF
+from alula.odds.system import DEPARTURE
 from alula.records.causes.fault_file import load_effects
 from alula.records.models import models_of
 
@@ -20,7 +20,7 @@ EXAMPLE = """
 faults:
   zed:
     states: {perception.zed_status: BROKEN}
-    happens: [1 to 3 per 1000 h, 0.2 % at take-off, 0.01 per use of perception.zed_depthmap]
+    happens: [1 to 3 per 1000 h, 0.2 % at departure, 0.01 per use of perception.zed_depthmap]
     lasts: 30 s
     source: maker's data sheet, table 3
   pilot: {happens: never, lasts: for ever, source: none is there}
@@ -46,7 +46,7 @@ def test_figures_are_read_with_units(tmp_path: Path) -> None:
     figures = read(tmp_path, EXAMPLE)
     zed = figures.faults["zed"]
     assert zed.rate == Range(Fraction(1, 3_600_000), Fraction(3, 3_600_000))
-    assert zed.chances == {TAKE_OFF: point("0.002"), "perception.zed_depthmap": point("0.01")}
+    assert zed.chances == {DEPARTURE: point("0.002"), "perception.zed_depthmap": point("0.01")}
     assert (zed.lasts, zed.source) == (point(30), "maker's data sheet, table 3")
     assert figures.faults["pilot"] == FaultFigures(rate=NEVER, lasts=None, source="none is there")
     assert figures.faults["zed_depth"] == FaultFigures(rate=point(Fraction(1, 1_800_000)), stages=4, source="log of crashes")
@@ -73,7 +73,7 @@ def test_what_reads_effects_reads_the_same_file(tmp_path: Path) -> None:
         ("faults:\n  zed: {happens: often, source: x}", "2:18", "`often` should be as `1 per 500 h` or `1 to 3 per 1000 h`, `0.01 per use"),
         ("faults:\n  zed: {happens: 0.1, source: x}", "2:18", "`0.1` should be as `1 per 500 h`"),
         ("faults:\n  zed: {happens: 1 per 0 h, source: x}", "2:18", "`1 per 0 h`: no time has no rate"),
-        ("faults:\n  zed: {happens: 2 at take-off, source: x}", "2:18", "`2 at take-off` is more than 1; write a chance from 0 to 1"),
+        ("faults:\n  zed: {happens: 2 at departure, source: x}", "2:18", "`2 at departure` is more than 1; write a chance from 0 to 1"),
         ("faults:\n  zed: {happens: [1 per 5 h, 1 per 6 h], source: x}", "2:30", "`zed` has a rate already; add the two up"),
         ("faults:\n  zed: {happens: 0.1 per use of video.steam, source: x}", "2:18", "there is no skill `video.steam`; there are"),
         ("faults:\n  zed: {lasts: 30, source: x}", "2:16", "`30` should be a time with its unit (ms, s, min, h, d), as `30 s`"),

@@ -1,4 +1,4 @@
-"""Campaigns: the same file gives the same flights, a table survives a kill, and the coverage counts what the rows say."""
+"""Campaigns: the same file gives the same runs, a table survives a kill, and the coverage counts what the rows say."""
 
 from __future__ import annotations
 
@@ -16,9 +16,9 @@ from records_mocks import fly_recorded
 from alula.campaign.__main__ import main
 from alula.campaign.coverage import cover, is_troubled, processes
 from alula.campaign.failures import ARROW, FAULT, INVARIANT, PROCESS, RESULT, Failure, Way, failures_in, ways_to_fail
-from alula.campaign.flying import fly
-from alula.campaign.mock_flights import load_flights
-from alula.campaign.plan import MOCKS, Flight, load_campaign
+from alula.campaign.mocked_scenarios import load_mocked_scenario
+from alula.campaign.plan import MOCKS, PlannedRun, load_campaign
+from alula.campaign.rows import rows_of
 from alula.campaign.table import ROWS, Table
 from alula.campaign.telling import as_page, as_text
 from alula.common.record import read_record
@@ -29,7 +29,7 @@ from alula.records.tree import Places, places_in, tip_of
 
 DRAWN = """
 scenarios: [mapping, inspection]
-flights: 12
+runs: 12
 seed: 3
 draw:
   faults: {mapping: [zed, lidar], inspection: [radio, "zed:dark"]}
@@ -59,24 +59,24 @@ def campaign_file(path, text):
     return path
 
 
-def test_drawn_flights_are_those_of_the_file_and_more_of_them_change_none(tmp_path):
-    drawn = load_campaign(campaign_file(tmp_path / "a.yaml", DRAWN)).flights
-    longer = load_campaign(campaign_file(tmp_path / "b.yaml", DRAWN.replace("12", "50"))).flights
-    other = load_campaign(campaign_file(tmp_path / "c.yaml", DRAWN.replace("seed: 3", "seed: 4"))).flights
+def test_drawn_runs_are_those_of_the_file_and_more_of_them_change_none(tmp_path):
+    drawn = load_campaign(campaign_file(tmp_path / "a.yaml", DRAWN)).runs
+    longer = load_campaign(campaign_file(tmp_path / "b.yaml", DRAWN.replace("12", "50"))).runs
+    other = load_campaign(campaign_file(tmp_path / "c.yaml", DRAWN.replace("seed: 3", "seed: 4"))).runs
     assert drawn == longer[:12]
     assert drawn != other
-    assert Counter(flight.scenario for flight in longer) == {"mapping": 25, "inspection": 25}
-    assert {len(flight.faults) for flight in longer} == {0, 1, 2}
-    assert {fault.what for flight in longer for fault in flight.requests} == {"zed", "lidar", "radio"}
-    assert all(0 <= fault.begin_s <= 60 for flight in longer for fault in flight.requests)
-    lasting = [fault.end_s - fault.begin_s for flight in longer for fault in flight.requests if fault.end_s is not None]
+    assert Counter(run.scenario for run in longer) == {"mapping": 25, "inspection": 25}
+    assert {len(run.faults) for run in longer} == {0, 1, 2}
+    assert {fault.what for run in longer for fault in run.requests} == {"zed", "lidar", "radio"}
+    assert all(0 <= fault.begin_s <= 60 for run in longer for fault in run.requests)
+    lasting = [fault.end_s - fault.begin_s for run in longer for fault in run.requests if fault.end_s is not None]
     assert lasting
     assert all(4.8 <= seconds <= 9.2 for seconds in lasting)
 
 
 IN_TURN = """
 scenarios: [inspection, mapping, inspection]
-flights: 12
+runs: 12
 draw:
   in_turn:
     mapping: [[], zed, [zed, lidar]]
@@ -86,9 +86,9 @@ draw:
 """
 
 
-def test_flights_take_the_lists_of_their_scenario_in_turn(tmp_path):
-    flights = load_campaign(campaign_file(tmp_path / "a.yaml", IN_TURN)).flights
-    taken = {scenario: [one.requests for one in flights if one.scenario == scenario] for scenario in ("mapping", "inspection")}
+def test_runs_take_the_lists_of_their_scenario_in_turn(tmp_path):
+    runs = load_campaign(campaign_file(tmp_path / "a.yaml", IN_TURN)).runs
+    taken = {scenario: [one.requests for one in runs if one.scenario == scenario] for scenario in ("mapping", "inspection")}
     names = {scenario: [sorted(f"{fault.what}:{fault.how}" for fault in one) for one in several] for scenario, several in taken.items()}
     assert names["mapping"] == [[], ["zed:"], ["lidar:", "zed:"], []]
     assert names["inspection"] == ([["radio:out"], ["control:", "encoder:hung"], ["radio:"]] * 3)[:8]
@@ -100,41 +100,41 @@ def test_flights_take_the_lists_of_their_scenario_in_turn(tmp_path):
     assert len(set(begins)) > len(begins) / 2, "times are drawn"
 
 
-def test_listed_flights_are_every_combination(tmp_path):
+def test_listed_runs_are_every_combination(tmp_path):
     text = "scenarios: [mapping]\nseeds: [1, 2]\nfaults: [[], [zed@30], [zed@30, lidar@40-50]]\n"
-    flights = load_campaign(campaign_file(tmp_path / "a.yaml", text)).flights
-    assert [(one.seed, one.faults) for one in flights] == [
+    runs = load_campaign(campaign_file(tmp_path / "a.yaml", text)).runs
+    assert [(one.seed, one.faults) for one in runs] == [
         (seed, faults) for seed in (1, 2) for faults in ((), ("zed@30",), ("zed@30", "lidar@40-50"))
     ]
 
 
 WRONG = {
     "": "is empty; a campaign may have about, over",
-    "flight: 3": "a.yaml:1: a campaign has no `flight`",
+    "run: 3": "a.yaml:1: a campaign has no `run`",
     "scenarios: [maping]": "a.yaml:1: there is no `maping`; there are inspection, mapping (did you mean `mapping`?)",
     "over: hills": "a.yaml:1: there is no `hills`; there are mocks, simulator",
-    "flights: 3\nfaults: [zed]": "a.yaml:2: `faults` lists flights, `flights` draws them; use only one of both",
-    "flights: 3": "a.yaml:1: a campaign that draws needs `draw`",
-    "flights: 1.5\ndraw: {faults: [zed]}": "a.yaml:1: `flights` should be a whole number",
-    "flights: 2\ndraw: {faults: [zed@3]}": "a.yaml:2: `zed@3` has a time",
-    "flights: 2\ndraw: {faults: [zed], at_s: [9, 3]}": "a.yaml:2: `at_s` should be [from, to]",
-    "flights: 2\nscenarios: [mapping, inspection]\ndraw: {faults: {mapping: zed}}": "a.yaml:3: `faults` has no entry for inspection",
-    "flights: 2\ndraw: {at_s: [0, 9]}": "a.yaml:2: `draw` needs `faults` to draw from, or `in_turn`",
-    "flights: 2\ndraw: {faults: [zed], in_turn: [zed]}": "a.yaml:2: `draw` needs `faults` to draw from, or `in_turn`",
-    "flights: 2\ndraw: {in_turn: [zed], most: 2}": "a.yaml:2: `most` says how many of `faults` are drawn",
-    "flights: 2\ndraw: {in_turn: []}": "a.yaml:2: `in_turn` has no list for mapping",
-    "flights: 2\ndraw: {in_turn: [zed@3]}": "a.yaml:2: `zed@3` has a time",
-    "flights: 2\ndraw: {in_turn: [{zed: 3, lidar: 4}]}": "a.yaml:2: a fault with its time is `{NAME: SECONDS}`",
-    "flights: 2\ndraw: {in_turn: [{zed: 0}]}": "a.yaml:2: how long a fault lasts should be a number from 0.1",
+    "runs: 3\nfaults: [zed]": "a.yaml:2: `faults` lists runs, `runs` draws them; use only one of both",
+    "runs: 3": "a.yaml:1: a campaign that draws needs `draw`",
+    "runs: 1.5\ndraw: {faults: [zed]}": "a.yaml:1: `runs` should be a whole number",
+    "runs: 2\ndraw: {faults: [zed@3]}": "a.yaml:2: `zed@3` has a time",
+    "runs: 2\ndraw: {faults: [zed], at_s: [9, 3]}": "a.yaml:2: `at_s` should be [from, to]",
+    "runs: 2\nscenarios: [mapping, inspection]\ndraw: {faults: {mapping: zed}}": "a.yaml:3: `faults` has no entry for inspection",
+    "runs: 2\ndraw: {at_s: [0, 9]}": "a.yaml:2: `draw` needs `faults` to draw from, or `in_turn`",
+    "runs: 2\ndraw: {faults: [zed], in_turn: [zed]}": "a.yaml:2: `draw` needs `faults` to draw from, or `in_turn`",
+    "runs: 2\ndraw: {in_turn: [zed], most: 2}": "a.yaml:2: `most` says how many of `faults` are drawn",
+    "runs: 2\ndraw: {in_turn: []}": "a.yaml:2: `in_turn` has no list for mapping",
+    "runs: 2\ndraw: {in_turn: [zed@3]}": "a.yaml:2: `zed@3` has a time",
+    "runs: 2\ndraw: {in_turn: [{zed: 3, lidar: 4}]}": "a.yaml:2: a fault with its time is `{NAME: SECONDS}`",
+    "runs: 2\ndraw: {in_turn: [{zed: 0}]}": "a.yaml:2: how long a fault lasts should be a number from 0.1",
     "faults: [[zed@3-1]]": "a.yaml:1: fault 'zed@3-1'",
     "behaviour: no.yaml": "a.yaml:1: there is no file ",
     "worlds: {mapping: no.yaml}": "a.yaml:1: `worlds` is for the simulator only",
     "over: simulator\nworlds: {mapping: no.yaml}": "a.yaml:2: there is no file ",
     "over: simulator\nworlds: {inspection: no.yaml}": "a.yaml:2: `worlds` has no `inspection`; it may have mapping",
     "over: simulator\nbehaviour: no.yaml": "a.yaml:2: `behaviour` is for mocks only",
-    "seeds: []": "a.yaml:1: `seeds` is empty, so there would be no flight",
-    "scenarios: []": "a.yaml:1: `scenarios` is empty, so there would be no flight",
-    "flights: 2\ndraw: {faults: []}": "a.yaml:2: `faults` has no fault to draw for mapping",
+    "seeds: []": "a.yaml:1: `seeds` is empty, so there would be no run",
+    "scenarios: []": "a.yaml:1: `scenarios` is empty, so there would be no run",
+    "runs: 2\ndraw: {faults: []}": "a.yaml:2: `faults` has no fault to draw for mapping",
     "faults: [[rotor@3]]": "there is no fault 'rotor' in the behaviour; it has zed",
 }
 
@@ -161,9 +161,9 @@ def test_the_ways_to_fail_are_those_of_the_models():
 
 
 def failures_of(scenario, *faults):
-    flights = load_flights(scenario)
-    flown = flights.fly(Flight(0, scenario, 0, faults).requests)
-    return failures_in(flown.events, ways_to_fail(flights.skillsets), flown.places)
+    mocked = load_mocked_scenario(scenario)
+    done = mocked.run(PlannedRun(0, scenario, 0, faults).requests)
+    return failures_in(done.events, ways_to_fail(mocked.skillsets), done.places)
 
 
 def test_a_failure_is_answered_by_the_branch_of_the_tree_that_takes_over():
@@ -183,7 +183,7 @@ def test_a_failure_after_which_nothing_is_started_is_answered_by_where_the_tree_
     assert isinstance(unused, Failure)
 
 
-def test_a_record_tells_the_same_places_in_the_tree_as_the_flight(tmp_path):
+def test_a_record_tells_the_same_places_in_the_tree_as_the_run(tmp_path):
     mission = fly_recorded(tmp_path, "zed@10", "lidar@25")
     places = places_in(read_record(tmp_path))
     assert places == Places(mission.places, tip_of(mission.director.view().as_dict()))
@@ -199,8 +199,8 @@ def test_the_branch_that_answers_is_the_first_node_that_leads_elsewhere():
     assert (places.response("a", "?"), places.response("?", "a"), Places().response("a", None)) == ("", "", "")
 
 
-def test_the_rows_of_flights_over_mocks_tell_of_their_faults():
-    rows = fly([Flight(0, "mapping", 0, ("zed@10-20", "lidar@3000"))], MOCKS, (), "")
+def test_the_rows_of_runs_over_mocks_tell_of_their_faults():
+    rows = rows_of([PlannedRun(0, "mapping", 0, ("zed@10-20", "lidar@3000"))], MOCKS, (), "")
     (fault,) = [failure for failure in rows[0]["failures"] if failure["kind"] == FAULT]
     assert (fault["name"], fault["at_s"], fault["answered_by"]) == ("zed, ends again", 10.0, "LiDAR navigation")
     assert 0.0 < fault["after_s"] < 1.0, "the fault that never came is none"
@@ -208,7 +208,7 @@ def test_the_rows_of_flights_over_mocks_tell_of_their_faults():
 
 def row(number=0, **other):
     known = {
-        "flight": number,
+        "run": number,
         "faults": [],
         "outcome": "degraded",
         "landed": True,
@@ -268,7 +268,7 @@ def test_what_must_not_be_is_trouble(other):
 
 @pytest.mark.parametrize(("fault", "landed"), [("pilot@20-40", True), ("pilot@20", None)])
 def test_a_vehicle_that_the_pilot_took_over_is_the_missions_to_land_only_when_it_is_given_back(fault, landed):
-    (row_,) = fly([Flight(0, "inspection", 0, (fault,))], MOCKS, (), "")
+    (row_,) = rows_of([PlannedRun(0, "inspection", 0, (fault,))], MOCKS, (), "")
     assert (row_["outcome"], row_["landed"], is_troubled(row_)) == ("given_up", landed, False)
 
 
@@ -278,7 +278,7 @@ def test_a_row_that_was_cut_off_is_flown_again_and_another_campaign_is_kept_out(
     table.add([row(3), row(1)])
     table.finish()
     path = tmp_path / "out" / ROWS
-    assert [json.loads(line)["flight"] for line in path.read_text(encoding="utf-8").splitlines()] == [1, 3]
+    assert [json.loads(line)["run"] for line in path.read_text(encoding="utf-8").splitlines()] == [1, 3]
     path.write_bytes(path.read_bytes()[:-5])
     again = Table(tmp_path / "out", campaign)
     assert set(again.rows) == {1}
@@ -291,7 +291,7 @@ def test_a_row_that_was_cut_off_is_flown_again_and_another_campaign_is_kept_out(
         Table(tmp_path, campaign)
 
 
-DAMAGED = {"bytes": b"\xff{\n", "cut": b"{\n", "number": b"3\n", "little": b'{"flight": 3}\n', "deep": b"[" * 10**5 + b"\n"}
+DAMAGED = {"bytes": b"\xff{\n", "cut": b"{\n", "number": b"3\n", "little": b'{"run": 3}\n', "deep": b"[" * 10**5 + b"\n"}
 
 
 @pytest.mark.parametrize("damaged", DAMAGED.values(), ids=DAMAGED)
@@ -304,7 +304,7 @@ def test_a_row_that_was_damaged_costs_no_other(damaged, tmp_path):
     again = Table(tmp_path / "out", campaign)
     assert set(again.rows) == {1, 2}
     again.add([row(3)])
-    assert [json.loads(line)["flight"] for line in path.read_text(encoding="utf-8").splitlines()] == [1, 2, 3]
+    assert [json.loads(line)["run"] for line in path.read_text(encoding="utf-8").splitlines()] == [1, 2, 3]
 
 
 def test_a_campaign_whose_plan_was_damaged_is_refused(tmp_path):
@@ -325,18 +325,18 @@ def test_a_folder_that_goes_away_is_told_in_a_line(tmp_path, capsys, monkeypatch
 
 @pytest.mark.long
 def test_a_campaign_that_is_killed_goes_on_and_has_the_same_table_in_the_end(tmp_path):
-    path, out = campaign_file(tmp_path / "a.yaml", DRAWN.replace("flights: 12", "flights: 14")), tmp_path / "out"
+    path, out = campaign_file(tmp_path / "a.yaml", DRAWN.replace("runs: 12", "runs: 14")), tmp_path / "out"
     words = [str(path), "--out", str(out)]
     killed = subprocess.run([sys.executable, "-c", KILLED_AFTER_FIRST_ROWS, *words], capture_output=True, timeout=300, check=False)
     assert killed.returncode == -signal.SIGKILL
     assert 0 < (out / ROWS).read_bytes().count(b"\n") < 14
     words = [sys.executable, "-m", "alula.campaign", *words]
     assert subprocess.run(words, capture_output=True, timeout=300, check=False).returncode in {0, 1}
-    flights = load_campaign(path).flights
+    runs = load_campaign(path).runs
     there = [json.loads(line) for line in (out / ROWS).read_text(encoding="utf-8").splitlines()]
-    assert [one["flight"] for one in there] == list(range(14))
-    assert there == json.loads(json.dumps(fly(flights, MOCKS, (), "")))
-    assert [asdict(flight)["seed"] for flight in flights] == [one["seed"] for one in there]
+    assert [one["run"] for one in there] == list(range(14))
+    assert there == json.loads(json.dumps(rows_of(runs, MOCKS, (), "")))
+    assert [asdict(run)["seed"] for run in runs] == [one["seed"] for one in there]
     for name in ("coverage.json", "coverage.txt", "coverage.html"):
         assert (out / name).is_file()
     assert all(one["conforms"] for one in there)

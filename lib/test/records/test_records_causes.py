@@ -7,8 +7,8 @@ from dataclasses import replace
 
 import pytest
 
-from alula.campaign.flying import fly
-from alula.campaign.plan import MOCKS, Flight
+from alula.campaign.plan import MOCKS, PlannedRun
+from alula.campaign.rows import rows_of
 from alula.common.faults import parse_fault
 from alula.common.record import REPORTS, Entry
 from alula.model.execution_state import ExecutionState as S
@@ -249,7 +249,7 @@ FLOWN = {
 @pytest.mark.parametrize("flight", FLOWN, ids=" ".join)
 def test_faults_of_flights_over_mocks_are_answered_by_what_follows_from_them(flight):
     scenario, *requests = flight
-    (row,) = fly([Flight(0, scenario, 0, tuple(requests))], MOCKS, (), "")
+    (row,) = rows_of([PlannedRun(0, scenario, 0, tuple(requests))], MOCKS, (), "")
     found = [(one["name"], one["answered_by"], one["after_s"]) for one in row["failures"] if one["kind"] == "fault"]
     assert found == [(name, branch, after_s if after_s is None else pytest.approx(after_s)) for name, branch, after_s in FLOWN[flight]]
 
@@ -257,7 +257,7 @@ def test_faults_of_flights_over_mocks_are_answered_by_what_follows_from_them(fli
 def test_a_skill_that_fails_by_chance_after_a_fault_does_not_answer_it(tmp_path):
     behaviour = tmp_path / "blocked.yaml"
     behaviour.write_text("skills: {navigation.goto: {result: ABORTED}}\n", encoding="utf-8")
-    (row,) = fly([Flight(0, "inspection", 0, ("zed@1",))], MOCKS, (str(behaviour),), "")
+    (row,) = rows_of([PlannedRun(0, "inspection", 0, ("zed@1",))], MOCKS, (str(behaviour),), "")
     found = {(one["kind"], one["name"]): one["answered_by"] for one in row["failures"]}
     assert found["fault", "zed"] == "nothing failed"
     assert found["result", "navigation.goto ABORTED"] == "given up"

@@ -8,7 +8,7 @@ from xml.etree import ElementTree as ET
 
 import pytest
 
-from alula.campaign.mock_flights import load_flights
+from alula.campaign.mocked_scenarios import load_mocked_scenario
 from alula.commands.compare import main
 from alula.common.faults import parse_fault
 from alula.records.comparing.telling import spread
@@ -17,9 +17,9 @@ from alula.runtime.core.events import event_record
 
 @pytest.fixture(scope="module")
 def folders(tmp_path_factory):
-    flights, base, found = load_flights("mapping"), tmp_path_factory.mktemp("runs"), {}
+    flights, base, found = load_mocked_scenario("mapping"), tmp_path_factory.mktemp("runs"), {}
     for name, fault in (("nominal", ""), ("again", ""), ("zed-fails", "zed@30")):
-        flown = flights.fly([parse_fault(fault)] if fault else [])
+        flown = flights.run([parse_fault(fault)] if fault else [])
         folder = found[name] = base / name
         folder.mkdir()
         lines = "".join(json.dumps(event_record(event)) + "\n" for event in flown.events)

@@ -10,7 +10,7 @@ from xml.etree import ElementTree as ET
 
 import pytest
 
-from alula.campaign.mock_flights import load_flights
+from alula.campaign.mocked_scenarios import load_mocked_scenario
 from alula.commands.expect import main
 from alula.common.faults import parse_fault
 from alula.records.errors import AnalysisError
@@ -24,8 +24,8 @@ FIGURES = ROOT / "tests" / "expectations"
 
 @pytest.fixture(scope="module")
 def runs():
-    flights = load_flights("mapping")
-    flown = {"nominal": flights.fly(), "failing": flights.fly([parse_fault("zed@30")])}
+    flights = load_mocked_scenario("mapping")
+    flown = {"nominal": flights.run(), "failing": flights.run([parse_fault("zed@30")])}
     return {name: RecordedRun(Path(name), one.events, {"outcome": one.end.outcome.value}) for name, one in flown.items()}
 
 

@@ -9,7 +9,7 @@ from textwrap import dedent
 import pytest
 
 from alula.campaign.coverage import processes
-from alula.campaign.mock_flights import load_flights
+from alula.campaign.mocked_scenarios import load_mocked_scenario
 from alula.common.scenarios import load_scenario, scenario_names
 from alula.records.causes.effects import FaultEffects
 from alula.records.causes.fault_file import effects_of_robot, load_effects
@@ -81,6 +81,6 @@ def test_the_drones_file_is_right_and_names_what_there_is():
     known = effects_of_robot().known
     scenarios = [load_scenario(name) for name in scenario_names()]
     faults = {what for scenario in scenarios for what, _ in scenario.faults}
-    faults |= {name.partition(":")[0] for scenario in scenarios for name in load_flights(scenario.name).behaviour.faults}
+    faults |= {name.partition(":")[0] for scenario in scenarios for name in load_mocked_scenario(scenario.name).behaviour.faults}
     assert known.keys() - faults - set(processes(scenarios)) == {"master"}
     assert faults <= known.keys()

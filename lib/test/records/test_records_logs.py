@@ -12,7 +12,7 @@ from rosbags.rosbag2 import StoragePlugin
 from rosbags.rosbag2 import Writer as BagWriter
 from rosbags.typesys import Stores, get_types_from_msg, get_typestore
 
-from alula.campaign.mock_flights import load_flights
+from alula.campaign.mocked_scenarios import load_mocked_scenario
 from alula.commands.conform import main
 from alula.common.faults import parse_fault
 from alula.common.record import EVENTS, FILE, MISSION, RecordWriter
@@ -24,8 +24,8 @@ ROOT = Path(os.environ["ALULA_ROOT"])
 
 @pytest.fixture(scope="module")
 def flown():
-    flights = load_flights("mapping")
-    return flights.fly([parse_fault("zed@30")]).events
+    flights = load_mocked_scenario("mapping")
+    return flights.run([parse_fault("zed@30")]).events
 
 
 def record(path, events):

@@ -10,8 +10,8 @@ from pathlib import Path
 import pytest
 from records_mocks import fly_recorded
 
-from alula.campaign.flying import fly
-from alula.campaign.plan import SIMULATOR, Flight, load_campaign
+from alula.campaign.plan import SIMULATOR, PlannedRun, load_campaign
+from alula.campaign.rows import rows_of
 from alula.common.record import FILE, MISSION, RecordWriter
 from alula.common.scenarios import load_scenario
 
@@ -40,11 +40,11 @@ def recorded_flights(tmp_path, monkeypatch):
 
 
 def test_a_flight_of_the_simulator_becomes_a_row_and_keeps_its_folder(recorded_flights, tmp_path):
-    flights = [Flight(4, "mapping", 7, ("zed@6", "lidar@9"), tmp_path / "hill.yaml"), Flight(5, "mapping", 13, ())]
-    (tmp_path / "out" / "flight-00004").mkdir(parents=True)
-    row, failed = fly(flights, SIMULATOR, (), str(tmp_path / "out"), ("--rate", "0"))
+    flights = [PlannedRun(4, "mapping", 7, ("zed@6", "lidar@9"), tmp_path / "hill.yaml"), PlannedRun(5, "mapping", 13, ())]
+    (tmp_path / "out" / "run-00004").mkdir(parents=True)
+    row, failed = rows_of(flights, SIMULATOR, (), str(tmp_path / "out"), ("--rate", "0"))
     asked = (tmp_path / "asked").read_text(encoding="utf-8").splitlines()
-    folder = tmp_path / "out" / "flight-00004-2"  # what a crash has left half done stays as it is
+    folder = tmp_path / "out" / "run-00004-2"  # what a crash has left half done stays as it is
     assert asked[0] == f"run mapping --seed 7 --rate 0 --world {tmp_path / 'hill.yaml'} --fail zed@6 --fail lidar@9 --out {folder}"
     assert (folder / "skills.mcap").is_file()
     found = (row["outcome"], row["landed"], row["collisions"], row["min_clearance_m"], row["open"], row["exit_code"], row["conforms"])
@@ -63,7 +63,7 @@ def test_managers_that_died_are_answered_by_what_the_mission_was_told(recorded_f
     died = [{"name": name, "when_s": 20.0 - lift_off_s, "how": "signal SIGKILL"} for name in ("perception", "lidar_mapping")]
     summary = {"outcome": "given_up", "reason": "the managers have gone", "landed": True, "skills": [], "died": died}
     (recorded_flights / "summary.json").write_text(json.dumps(summary), encoding="utf-8")
-    (row,) = fly([Flight(4, "mapping", 7, ())], SIMULATOR, (), str(tmp_path / "out"))
+    (row,) = rows_of([PlannedRun(4, "mapping", 7, ())], SIMULATOR, (), str(tmp_path / "out"))
     answers = {one["name"]: (one["answered_by"], one["skill"]) for one in row["failures"] if one["kind"] == "process"}
     assert answers == {"perception": ("given up", "navigation.hover"), "lidar_mapping": ("not detected", "not detected")}
     assert row["conforms"] is True
@@ -75,7 +75,7 @@ def test_a_flight_in_which_no_skill_was_started_keeps_its_own_reason(recorded_fl
     writer = RecordWriter(recorded_flights / "recorded" / FILE)
     writer.write(MISSION, 0, {"scenario": "inspection"})
     writer.close()
-    (row,) = fly([Flight(4, "inspection", 7, ())], SIMULATOR, (), str(tmp_path / "out"))
+    (row,) = rows_of([PlannedRun(4, "inspection", 7, ())], SIMULATOR, (), str(tmp_path / "out"))
     assert {name: row[name] for name in summary} == summary
     assert (row["events"], row["failures"]) == (0, [])
 
@@ -83,13 +83,13 @@ def test_a_flight_in_which_no_skill_was_started_keeps_its_own_reason(recorded_fl
 @pytest.mark.parametrize("file", ["uav-simulator.yaml", "uav-simulator-short.yaml"])
 def test_the_campaigns_of_thirty_flights_try_everything_that_can_fail_in_the_simulator(file):
     campaign = load_campaign(CAMPAIGNS / file)
-    assert {flight.world is None for flight in campaign.flights} == {file == "uav-simulator.yaml"}
-    assert (campaign.over, campaign.at_once, len(campaign.flights)) == (SIMULATOR, 1, 30)
+    assert {flight.world is None for flight in campaign.runs} == {file == "uav-simulator.yaml"}
+    assert (campaign.over, campaign.at_once, len(campaign.runs)) == (SIMULATOR, 1, 30)
     for name, sensors in (("inspection", ["zed", "lidar"]), ("mapping", ["zed", "lidar"])):
-        faults = [fault for flight in campaign.flights if flight.scenario == name for fault in flight.requests]
+        faults = [fault for flight in campaign.runs if flight.scenario == name for fault in flight.requests]
         others = {(what, how) for what, ways in load_scenario(name).faults for how in ways}
         assert {(fault.what, fault.how) for fault in faults} >= others
         assert {fault.what for fault in faults} >= set(sensors)
-        assert () in {flight.faults for flight in campaign.flights if flight.scenario == name}
-    out_s = {round(fault.end_s - fault.begin_s, 6) for flight in campaign.flights for fault in flight.requests if fault.how == "out"}
+        assert () in {flight.faults for flight in campaign.runs if flight.scenario == name}
+    out_s = {round(fault.end_s - fault.begin_s, 6) for flight in campaign.runs for fault in flight.requests if fault.how == "out"}
     assert out_s == {1.0, 5.0, 20.0}

@@ -55,7 +55,9 @@ def test_a_mission_that_could_not_start_tells_no_figures() -> None:
 
 def test_what_is_not_known_of_a_flight_is_said_so() -> None:
     of_every_robot = {"outcome": "given_up", "landed": True, "duration_s": 9.0}
-    lines = verdict_lines({**of_every_robot, "collisions": None, "distance_m": None, "min_clearance_m": None, "map": None}, [], OUT)
+    lines = verdict_lines(
+        {**of_every_robot, "collisions": None, "distance_m": None, "min_clearance_m": None, "map": {"points": None}, "video": None}, [], OUT
+    )
     assert lines[2:] == [
         "  landed: yes, duration 9.0 s, flown unknown, collisions unknown, nearest surface unknown",
         "  map: none",

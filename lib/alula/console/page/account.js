@@ -11,7 +11,7 @@ const OUTCOMES = {
 };
 
 const APART_S = 0.1; // an event's stamp may be some ticks of the clock older than what caused it
-const REACTION_S = 3; // for so long an act of the autopilot, or a death, goes with a failure
+const REACTION_S = 3; // for so long an act of the controller, or a death, goes with a failure
 
 const NO_CAUSES = { departed_s: null, back_s: null, faults: [], failures: [] };
 
@@ -48,19 +48,19 @@ function keyFigures(run) {
   const add = (label, value, unit = "", digits = 1) => {
     if (value !== null && value !== undefined) figures.push([label, typeof value === "number" ? `${fixed(value, digits)}${unit ? ` ${unit}` : ""}` : value]);
   };
-  const landed = summary.landed ?? (landing(run) === null ? null : true);
-  const crash = summary.crash && ["no, it crashed", landedWhere(run), summary.crash].filter(Boolean).join(": ");
-  add(robotWords(run).back, crash || (landed ? landedWhere(run) || "yes" : landed === false ? "no" : null));
+  const back = summary.landed ?? (comingBack(run) === null ? null : true);
+  const crash = summary.crash && ["no, it crashed", restWhere(run), summary.crash].filter(Boolean).join(": ");
+  add(robotWords(run).back, crash || (back ? restWhere(run) || "yes" : back === false ? "no" : null));
   add(robotWords(run).away, summary.duration_s, "s");
   add(robotWords(run).moved, summary.distance_m, "m");
   const reached = last(run.blackboard.get("waypoints_reached")?.v ?? []) ?? mission.waypoints_reached;
   if (mission.waypoints) add("waypoints reached", `${reached} of ${mission.waypoints}`);
   add("collisions", summary.collisions, "", 0);
   add("nearest surface", summary.min_clearance_m, "m", 2);
-  add("map coverage", summary.map?.coverage != null ? 100 * summary.map.coverage : null, "%");
-  add("map error (RMS)", summary.map?.rmse_m, "m", 3);
-  add("least picture quality (SSIM)", summary.video?.min_ssim, "", 2);
-  add("least frame rate", summary.video?.min_fps, "frames/s", 0);
+  for (const [path, { label, unit, digits, factor }] of Object.entries(robotWords(run).figures)) {
+    const value = path.split(".").reduce((values, name) => values?.[name], summary);
+    if (typeof value === "number") add(`${path.includes(".") ? `${path.split(".")[0]} ` : ""}${label}`, factor * value, unit, digits);
+  }
   return figures;
 }
 
@@ -86,32 +86,32 @@ function account(run) {
   const say = (t, text, kind = "") => lines.push({ t, text, kind });
   const recovery = run.facts["/summary"]?.recovery;
   const zero = origin(run);
-  if (run.departure !== null) say(run.departure, "Lift-off.");
+  if (run.departure !== null) say(run.departure, `${sentence(robotWords(run).departure)}.`);
   for (const { t, until, began, ended } of faultsOf(run)) {
     if (began) say(t, began, "bad"); // of a process that died it is told how, below
     if (until !== null) say(until, ended, "bad");
   }
   operatorTold(run, say);
   for (const { t, text } of noticed(run)) say(t, `${text}.`, "bad");
-  for (const { t, text } of autopilotActs(run)) say(t, `The autopilot ${text}.`, "reaction");
+  for (const { t, text } of controllerActs(run)) say(t, `${sentence(text)}.`, "reaction");
   for (const { t, text, reaction } of failures(run)) {
     say(t, text, "bad");
     if (reaction) say(Math.max(t, reaction.t), `Reaction: ${reaction.text}.`, "reaction");
   }
   if (recovery?.fallback_running_s != null) say(zero + recovery.fallback_running_s, fallbackTold(run, zero + recovery.fallback_running_s), "reaction");
-  if (recovery?.moving_again_s != null) say(zero + recovery.moving_again_s, "The vehicle moves on.", "reaction");
+  if (recovery?.moving_again_s != null) say(zero + recovery.moving_again_s, "The robot moves on.", "reaction");
   for (const { name, when_s: when, how } of run.facts["/summary"]?.died ?? []) say(when === null ? run.begin : zero + when, `The process ${name} died: ${how}.`, "bad");
-  const landed = landing(run);
-  const where = landedWhere(run);
+  const back = comingBack(run);
+  const where = restWhere(run);
   const crash = run.facts["/summary"]?.crash;
-  if (landed !== null && crash) say(landed, `Crashed${where && `, ${where}`}: ${crash}.`, "bad");
-  else if (landed !== null) say(landed, `${sentence(robotWords(run).back)}${where && `, ${where}`}.`);
+  if (back !== null && crash) say(back, `Crashed${where && `, ${where}`}: ${crash}.`, "bad");
+  else if (back !== null) say(back, `${sentence(robotWords(run).back)}${where && `, ${where}`}.`);
   const mission = last(run.mission.v);
   if (mission && mission.outcome !== "running") say(mission.end_s ?? last(run.mission.t), `${OUTCOMES[mission.outcome]?.[0] ?? words(mission.outcome)}.`);
   return lines.sort(byTime);
 }
 
-/** Changes of resources that came before a skill failed of them, in the air: [{t, text}]. */
+/** Changes of resources that came before a skill failed of them, while the robot was away: [{t, text}]. */
 function noticed(run) {
   const ends = failures(run).map(({ t }) => t);
   const changes = new Map(); // those that are a step of several chains count once
@@ -174,7 +174,7 @@ function failureRow(run, fault, own, failed) {
   const next = failed[failed.indexOf(final) + 1];
   const done = own.map(({ reaction }) => reaction?.text).filter(Boolean);
   const until = Math.min(next?.t ?? Infinity, abortAfter(run, final.t));
-  for (const { t, text } of autopilotActs(run)) if (t >= first.t - REACTION_S && t < until) done.push(`the autopilot ${text}`);
+  for (const { t, text } of controllerActs(run)) if (t >= first.t - REACTION_S && t < until) done.push(text);
   const later = started(run, final.reacts_until ?? Infinity, until);
   if (later) done.push(`afterwards ${later}`);
   const since = fault?.t ?? first.t;
@@ -186,13 +186,13 @@ function failureRow(run, fault, own, failed) {
     cost.push(`the fallback ran after ${seconds(recovery.fallback_running_s - (recovery.failure_s ?? recovery.detected_s), 2)}`);
     cost.push(...[heldTold(run, origin(run) + recovery.fallback_running_s)].filter(Boolean));
   }
-  if (recovered && recovery.moving_again_s != null) cost.push(`the vehicle moved on after ${seconds(recovery.moving_again_s - (recovery.failure_s ?? recovery.detected_s), 2)}`);
+  if (recovered && recovery.moving_again_s != null) cost.push(`the robot moved on after ${seconds(recovery.moving_again_s - (recovery.failure_s ?? recovery.detected_s), 2)}`);
   const endings = own.map(({ text }) => text);
   const what = fault ? fault.text : endings.shift().replace(/\.$/, ""); // each ending is told once
   return { what, why: endings.join(" "), failed: true, t: since, until: fault?.until ?? null, done: done.join("; ") || "nothing followed", cost: cost.join("; ") };
 }
 
-/** The skills that were started between two moments, in their order, as "hover, land"; empty where there are none. */
+/** The skills that were started between two moments, in their order, as "wait, dock"; empty where there are none. */
 function started(run, from, to) {
   const found = [...run.executions.values()].filter(({ running }) => running !== null && running > from && running < to);
   return [...new Set(found.map(({ skill }) => skill))].join(", ");
@@ -202,8 +202,8 @@ function started(run, from, to) {
 function wholeDone(run) {
   const outcome = run.facts["/summary"]?.outcome ?? last(run.mission.v)?.outcome;
   if (!outcome || outcome === "running") return "";
-  const { landed: on, crash } = run.facts["/summary"] ?? {};
-  const down = crash ? "crashed" : on === true ? robotWords(run).back : on === false ? `not ${robotWords(run).back}` : "";
+  const { landed: back, crash } = run.facts["/summary"] ?? {};
+  const down = crash ? "crashed" : back === true ? robotWords(run).back : back === false ? `not ${robotWords(run).back}` : "";
   return [(OUTCOMES[outcome]?.[0] ?? words(outcome)).toLowerCase(), down].filter(Boolean).join("; ");
 }
 

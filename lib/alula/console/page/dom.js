@@ -25,7 +25,7 @@ function setText(node, text) {
 
 const fixed = (value, digits) => (Object.is(Math.round(value * 10 ** digits), -0) ? 0 : value).toFixed(digits);
 
-/** Seconds since lift-off as "12.3 s"; a dash for what has no time. */
+/** Seconds since the departure as "12.3 s"; a dash for what has no time. */
 const seconds = (value, digits = 1) => (Number.isFinite(value) ? `${fixed(value, digits)} s` : "–");
 
 /** A number for people: four significant digits, no exponents of everyday sizes. */

@@ -1,6 +1,5 @@
 // Numbers in time, a small chart each: height and speed of the path, and what the skillsets' data hold.
 
-const PREFERRED = [/guidance_state\.distance_to_go_m$/, /guidance_state\.obstacle_m$/, /_obstacle\.distance_m$/, /picture\.fps$/, /picture\.quality$/, /picture\.delay_s$/, /mapping_state\.points$/, /mapping_state\.uncertainty_m$/];
 const MAX_CHARTS = 9;
 const CHART = { width: 320, height: 96, left: 58, bottom: 16 };
 
@@ -22,7 +21,7 @@ class FiguresView {
       this.shown = names;
       this.charts = new Map(names.map((name) => [name, this.frame(name)]));
       byId("charts").replaceChildren(...[...this.charts.values()].map(({ figure }) => figure));
-      if (!names.length) byId("charts").append(el("p", { class: "hint" }, "The record holds no figures: a flight over mocks measures nothing."));
+      if (!names.length) byId("charts").append(el("p", { class: "hint" }, "The record holds no figures: a run over mocks measures nothing."));
     }
     if (run.data.size !== this.offeredOf || this.news !== run.news) this.offer();
     [this.offeredOf, this.news] = [run.data.size, run.news];
@@ -32,7 +31,7 @@ class FiguresView {
 
   names() {
     const all = this.all();
-    const wanted = PREFERRED.flatMap((pattern) => all.filter((name) => pattern.test(name)));
+    const wanted = robotWords(this.run).charts.filter((name) => all.includes(name));
     const path = this.run.path.t.length ? ["height", "ground speed"] : [];
     return [...new Set([...this.added.filter((name) => all.includes(name)), ...path, ...wanted])].slice(0, MAX_CHARTS);
   }

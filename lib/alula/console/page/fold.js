@@ -1,7 +1,7 @@
 // What a run was, folded from its entries [topic, t_s, value]. Live they come over a socket, in a report they are inside the page: one fold.
 //
 // The fold only appends: to tracks (what something was, from when on), to lists, to facts of the whole run. What was so at a moment is
-// looked up in the tracks by bisection, so the slider costs the same at any moment of a flight of hours.
+// looked up in the tracks by bisection, so the slider costs the same at any moment of a run of hours.
 
 const TERMINAL = new Set(["NOT_VALIDATED", "NOT_READY", "RESOURCE_INVARIANT_VIOLATED", "INTERRUPTED", "TERMINATED", "FAILED"]);
 
@@ -65,7 +65,7 @@ function newRun() {
     decisions: [],
     operator: [],
     moments: [], // what the list of events shows: {t, kind, text, bad}
-    departure: null, // when the vehicle left the ground
+    departure: null, // when the robot left where it began
     back: null, // when it was back there for the last time
   };
 }
@@ -155,10 +155,10 @@ function foldTransition(run, t, value) {
   if (value.cause === "extern" || bad) moment(run, t, "resource", `${name}: ${value.from_state} → ${value.to_state} (${value.cause})${value.reason ? `: ${value.reason}` : ""}`, bad);
 }
 
-/** Whether the vehicle is away from where it began, at t. */
+/** Whether the robot is away from where it began, at t. */
 const isAway = (run, t) => run.departure !== null && t >= run.departure && (run.back === null || t < run.back);
 
-/** Whether a resource's state is bad news at t: some are only while the vehicle is away. */
+/** Whether a resource's state is bad news at t: some are only while the robot is away. */
 const isAlarm = (run, alarm, t) => alarm === "always" || (alarm === "away" && isAway(run, t));
 
 function foldExecution(run, t, value) {
@@ -208,7 +208,7 @@ function foldData(run, t, { skillset, data, value }) {
 
 const OF_FRAMES = new Set(["quality", "quality_margin", "delay_s", "loss", "received_bps"]);
 
-/** Which fields of a message repeat an old measurement: of a video that is not sent every number, of one without frames those of frames. */
+/** Which fields of a message repeat an old measurement: of a stream that is not sent every number, of one without frames those of frames. */
 function repeatedIn(value) {
   if (value?.streaming === false) return (field, leaf) => typeof leaf === "number";
   return value?.fps === 0 ? (field) => OF_FRAMES.has(field) : () => false;
@@ -260,7 +260,7 @@ function endingOf({ state, result_kind: kind }) {
   return { RESOURCE_INVARIANT_VIOLATED: "violated", INTERRUPTED: "interrupted" }[state] ?? "failure";
 }
 
-/** Lift-off, the origin of all times that are shown; the first moment where nothing left the ground. */
+/** The departure, origin of all times that are shown; the first moment of a run without one. */
 function origin(run) {
   return run.facts["/summary"]?.lift_off?.stamp_s ?? run.departure ?? run.begin ?? 0;
 }

@@ -51,7 +51,7 @@ class ManualControlView {
   draw() {
     const one = this.manual?.skillsets.find(({ root }) => root === this.root);
     const problems = this.manual?.problems ?? [];
-    const said = one ? (one.alive ? "The managers decide; a mission that flies commands these skills, too: pause it first." : `The managers of ${one.root} have gone.`) : "No skillset answers in this run yet.";
+    const said = one ? (one.alive ? "The managers decide; a mission under way commands these skills, too: pause it first." : `The managers of ${one.root} have gone.`) : "No skillset answers in this run yet.";
     setText(this.note, [...problems, this.may ? said : `${said} You watch: to act, take over, in a run that is under way.`].join("; "));
     this.showSkills(one);
     this.showForm(one);

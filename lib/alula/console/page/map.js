@@ -1,4 +1,4 @@
-// Map, route, flown path and vehicle, orthographic: from above, or in 3D, which is the same drawing seen from another side.
+// Map, route, path and robot, orthographic: from above, or in 3D, which is the same drawing seen from another side.
 
 const ABOVE = { yaw: 0, pitch: Math.PI / 2 };
 const SLANTED = { yaw: -0.6, pitch: 0.65 };
@@ -33,7 +33,13 @@ class MapView {
     const line = (colour, dashes = "") => svg("svg", { width: 22, height: 10 }, svg("line", { x2: 22, y1: 5, y2: 5, stroke: colour, "stroke-width": 2.5, "stroke-dasharray": dashes }));
     const dot = (colour) => svg("svg", { width: 10, height: 10 }, svg("circle", { cx: 5, cy: 5, r: 4.5, fill: colour }));
     const place = (letter) => svg("svg", { width: 16, height: 16 }, svg("circle", { cx: 8, cy: 8, r: 7, fill: "var(--card)", stroke: "var(--ink)", "stroke-width": 1.5 }), svg("text", { x: 8, y: 12, "text-anchor": "middle", "font-size": 10, "font-weight": 700, fill: "var(--ink)" }, letter));
-    byId("map-legend").append(...[[line("var(--path)"), "way"], [line("var(--route)", "5 4"), "route"], [dot("var(--place)"), "vehicle"], [place("H"), "home: where it departed"], [place("L"), "where it came to rest"], [line("var(--bad)", "2 2"), "obstacle ahead"], [line("var(--edge)"), "true surfaces"], [line("var(--fair)", "7 4"), "radio degraded"], [line("var(--bad)", "7 3 2 3"), "radio critical"], [line("var(--ink)", "1 4"), "fence"], [dot("rgb(33,145,140)"), "map, coloured by height"]].map(([sign, text]) => el("li", {}, sign, text)));
+    const legend = [[line("var(--path)"), "way"], [line("var(--route)", "5 4"), "route"], [dot("var(--place)"), "robot"], [place("H"), "home: where it departed"], [place("L"), "where it came to rest"], [line("var(--bad)", "2 2"), "obstacle ahead"], [line("var(--edge)"), "true surfaces"], [dot("rgb(33,145,140)"), "map, coloured by height"]];
+    /** Signs of what every map may show, and of the areas of this one. */
+    this.explain = (areas, fence) => {
+      const told = new Map(areas.map(({ tone, told: text }) => [text, line(`var(${TONES[tone][0]})`, TONES[tone][1].join(" "))]));
+      const signs = [...legend, ...[...told].map(([text, sign]) => [sign, text]), ...(fence ? [[line("var(--ink)", "1 4"), "fence"]] : [])];
+      byId("map-legend").replaceChildren(...signs.map(([sign, text]) => el("li", {}, sign, text)));
+    };
   }
 
   turn(view) {
@@ -73,16 +79,17 @@ class MapView {
 
   draw(run, t, redrawn = false) {
     [this.run, this.t] = [run, t];
-    const { radio = [], fence } = run.facts["/areas"] ?? {};
-    byId("map-card").hidden = !run.path.t.length && !radio.length && !fence && !["/map", "/world", "/route"].some((topic) => run.facts[topic]?.length !== 0 && run.facts[topic]);
+    const [areas, { fence }] = [run.facts["/areas"] ?? [], robotWords(run)];
+    byId("map-card").hidden = !run.path.t.length && !areas.length && !fence && !["/map", "/world", "/route"].some((topic) => run.facts[topic]?.length !== 0 && run.facts[topic]);
     const ratio = Math.min(window.devicePixelRatio || 1, 2);
     this.size ??= [this.canvas.clientWidth, this.canvas.clientHeight]; // asking at each drawing would have the browser lay out the page each time
     const [width, height] = this.size;
     if (!width) return;
     const sized = this.canvas.width !== Math.round(width * ratio) || this.canvas.height !== Math.round(height * ratio);
     if (sized) for (const canvas of [this.canvas, this.cloud]) [canvas.width, canvas.height] = [Math.round(width * ratio), Math.round(height * ratio)];
-    const facts = [run.facts["/map"], run.facts["/world"], run.facts["/route"], run.facts["/areas"]];
+    const facts = [run.facts["/map"], run.facts["/world"], run.facts["/route"], run.facts["/areas"], run.facts["/run"]];
     const changed = facts.some((fact, index) => fact !== this.facts?.[index]);
+    if (changed) this.explain(areas, fence);
     if (facts[0] !== this.facts?.[0]) this.points = unpack(facts[0]);
     this.facts = facts;
     const box = this.box(changed);
@@ -106,7 +113,7 @@ class MapView {
     });
     if (!this.boxedPlaces) {
       for (const place of this.run.facts["/route"] ?? []) stretchBy(...place);
-      for (const [ring] of (this.run.facts["/areas"]?.radio ?? []).map(rings)) for (const place of ring) stretchBy(...place);
+      for (const [ring] of (this.run.facts["/areas"] ?? []).map(rings)) for (const place of ring) stretchBy(...place);
       for (let at = 0; at < (this.points?.length ?? 0); at += 30) stretchBy(this.points[at], this.points[at + 1], this.points[at + 2]);
     }
     for (; this.boxedPlaces < path.v.length; this.boxedPlaces += 1) stretchBy(...path.v[this.boxedPlaces]);
@@ -204,12 +211,12 @@ class MapView {
     pen.stroke();
   }
 
-  /** Radio zones, filled from below to above, with their names; and the fence. */
+  /** The robot's areas, filled from below to above, with their names; and the fence. */
   areas(pen) {
-    const { radio = [], fence } = this.run.facts["/areas"] ?? {};
+    const { fence } = robotWords(this.run);
     this.named = [];
-    for (const zone of radio) {
-      const [colour, dashes] = RADIO[zone.quality];
+    for (const zone of this.run.facts["/areas"] ?? []) {
+      const [colour, dashes] = TONES[zone.tone];
       const outlines = rings(zone);
       pen.fillStyle = this.colour(colour);
       pen.globalAlpha = 0.1;
@@ -218,7 +225,7 @@ class MapView {
       pen.fill();
       pen.globalAlpha = 1;
       this.cage(pen, outlines, colour, dashes);
-      this.name(pen, `${zone.name}: radio ${zone.quality}`, last(outlines), colour);
+      this.name(pen, `${zone.name}: ${zone.told}`, last(outlines), colour);
     }
     if (fence) this.cage(pen, fence.z.map((z) => circle([0, 0], fence.radius_m, z)), "--ink", [1, 4]);
   }
@@ -292,10 +299,10 @@ class MapView {
       pen.strokeText(entry.label, u + 10, v - 8);
       pen.fillText(entry.label, u + 10, v - 8);
     }
-    const { home, landed } = places(this.run);
-    const both = home && landed && Math.hypot(home[0] - landed[0], home[1] - landed[1]) <= AT_PLACE_M;
-    if (home) this.sign(pen, home, "H", both ? `home, ${cameDown(this.run)} here` : "home");
-    if (landed && !both) this.sign(pen, landed, "L", cameDown(this.run));
+    const { home, rest } = places(this.run);
+    const both = home && rest && Math.hypot(home[0] - rest[0], home[1] - rest[1]) <= AT_PLACE_M;
+    if (home) this.sign(pen, home, "H", both ? `home, ${cameBack(this.run)} here` : "home");
+    if (rest && !both) this.sign(pen, rest, "L", cameBack(this.run));
     if (index < 0) return;
     const here = path.v[index];
     if (this.t - path.t[index] > STALE_S) pen.globalAlpha = 0.4;
@@ -346,14 +353,14 @@ class MapView {
     const map = this.run.facts["/map"];
     const ahead = this.obstacle();
     const old = index >= 0 && this.t - path.t[index] > STALE_S ? `No position since ${seconds(path.t[index] - origin(this.run))}; the last one: ` : "";
-    const parts = [index < 0 ? "Nothing is recorded of the vehicle's place." : `${old}Vehicle at east ${fixed(path.v[index][0], 1)} m, north ${fixed(path.v[index][1], 1)} m, height ${fixed(path.v[index][2], 1)} m.`];
+    const parts = [index < 0 ? "Nothing is recorded of the robot's place." : `${old}Robot at east ${fixed(path.v[index][0], 1)} m, north ${fixed(path.v[index][1], 1)} m, height ${fixed(path.v[index][2], 1)} m.`];
     if (ahead) parts.push(`Obstacle ${Number.isFinite(ahead.distance) ? `${fixed(ahead.distance, 1)} m ` : ""}ahead (${ahead.name}).`);
-    const [landed, where] = [landing(this.run), landedWhere(this.run)];
-    if (where && this.t >= landed) parts.push(`${sentence(cameDown(this.run))} ${where}.`);
+    const [back, where] = [comingBack(this.run), restWhere(this.run)];
+    if (where && this.t >= back) parts.push(`${sentence(cameBack(this.run))} ${where}.`);
     const place = index < 0 ? null : path.v[index];
-    const { radio = [], fence } = this.run.facts["/areas"] ?? {};
-    const zone = place && radio.find((one) => holds(one, place)); // the first that is listed counts
-    if (zone) parts.push(`In the radio zone “${zone.name}”: ${zone.quality}.`);
+    const { fence } = robotWords(this.run);
+    const zone = place && (this.run.facts["/areas"] ?? []).find((one) => holds(one, place)); // the first that is listed counts
+    if (zone) parts.push(`In “${zone.name}”: ${zone.told}.`);
     if (fence) parts.push(`Fence: ${fixed(fence.radius_m, 0)} m around home${place ? `, ${fixed(fence.radius_m - Math.hypot(place[0], place[1]), 1)} m away` : ""}.`);
     if (map) parts.push(`Map: ${map.of} points, ${map.count} drawn${this.run.facts["/summary"] ? ", as it was at the end" : ""}.`);
     const text = parts.join(" ");
@@ -371,18 +378,18 @@ function thin(places, count) {
   return [...Array.from({ length: Math.floor(count / step) }, (_, index) => places[index * step]), places[count - 1]];
 }
 
-const RADIO = { good: ["--good", []], degraded: ["--fair", [7, 4]], critical: ["--bad", [7, 3, 2, 3]] };
+const TONES = { good: ["--good", []], fair: ["--fair", [7, 4]], bad: ["--bad", [7, 3, 2, 3]] };
 
 const circle = ([x, y], radius, z) => Array.from({ length: 48 }, (_, index) => [x + radius * Math.cos((index * Math.PI) / 24), y + radius * Math.sin((index * Math.PI) / 24), z]);
 
-/** The outlines of a zone, from below to above. */
+/** The outlines of an area, from below to above. */
 function rings({ box, cylinder, sphere }) {
   if (box) return [box.low[2], box.high[2]].map((z) => [[box.low[0], box.low[1], z], [box.high[0], box.low[1], z], [box.high[0], box.high[1], z], [box.low[0], box.high[1], z]]);
   if (cylinder) return cylinder.z.map((z) => circle(cylinder.at, cylinder.radius_m, z));
   return [-0.7, 0, 0.7].map((share) => circle(sphere.at, sphere.radius_m * Math.sqrt(1 - share * share), sphere.at[2] + share * sphere.radius_m));
 }
 
-/** Whether a place lies in a zone, its surface included. */
+/** Whether a place lies in an area, its surface included. */
 function holds({ box, cylinder, sphere }, place) {
   const away = (at) => Math.hypot(...at.map((value, axis) => value - place[axis]));
   if (box) return place.every((value, axis) => box.low[axis] <= value && value <= box.high[axis]);

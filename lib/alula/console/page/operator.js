@@ -1,10 +1,13 @@
-// The operator's acts, on the live page: take over, start, pause, stop and land, everything off. Each needs more than a slip of the
-// finger: two presses in turn, and for everything off a word that is typed. The acts on a flight under way stay in sight.
+// The operator's acts, on the live page: take over, start, pause, stop, everything off. Each needs more than a slip of the
+// finger: two presses in turn, and for everything off a word that is typed. The acts on a run under way stay in sight.
 
 const ARMED_MS = 4000;
-const CALLED = { abort: "stop and land", resume: "go on", off: "everything off", take: "take over" };
+const CALLED = { resume: "go on", off: "everything off", take: "take over" };
 const SIGNS = { pause: "M1 1h4v10h-4zM7 1h4v10h-4z", resume: "M2 1v10l9 -5z", abort: "M6 11l-5 -6h3v-4h4v4h3z" };
 const DOUBT_MS = 3000; // an answer takes some milliseconds; after so long the operator is told that it is late
+
+/** An act as its button has it. */
+const called = (command) => (command === "abort" ? robotWords(run).stop : CALLED[command] ?? command);
 
 /** Fills a select or a datalist with names; what was chosen stays chosen. */
 function offer(node, names) {
@@ -29,7 +32,7 @@ class OperatorBar {
     this.pause = this.armed("pause", "press again: pause", () => this.tell("pause"), "hold", SIGNS.pause);
     this.resume = this.armed("go on", "press again: go on", () => this.tell("resume"), "go", SIGNS.resume);
     this.held = el("p", { class: "held", role: "status" });
-    this.abort = this.armed("stop and land", "press again: stop and land", () => this.tell("abort"), "stop", SIGNS.abort);
+    this.abort = this.armed(robotWords(run).stop, `press again: ${robotWords(run).stop}`, () => this.tell("abort"), "stop", SIGNS.abort);
     this.word = el("input", { type: "text", size: 5, "aria-label": "type OFF to switch everything off", placeholder: "type OFF", oninput: () => this.enable() });
     this.off = this.armed("everything off", "press again: end all processes", () => {
       this.tell("off");
@@ -45,8 +48,8 @@ class OperatorBar {
       this.starting,
       this.before,
     );
-    byId("flight").hidden = false;
-    byId("flight").append(this.pause, this.resume, this.abort, el("div", { class: "said" }, this.held, this.answer), el("span", { class: "off" }, this.word, this.off));
+    byId("acts").hidden = false;
+    byId("acts").append(this.pause, this.resume, this.abort, el("div", { class: "said" }, this.held, this.answer), el("span", { class: "off" }, this.word, this.off));
   }
 
   startForm() {
@@ -98,7 +101,7 @@ class OperatorBar {
   /** An answer came. */
   hear(command, answer) {
     this.waiting.delete(command);
-    this.say(`${CALLED[command] ?? command}: ${answer}`);
+    this.say(`${called(command)}: ${answer}`);
     if (this.waiting.size) this.showWaiting();
   }
 
@@ -109,7 +112,7 @@ class OperatorBar {
   }
 
   names() {
-    return [...this.waiting.keys()].map((command) => CALLED[command] ?? command).join(", ");
+    return [...this.waiting.keys()].map(called).join(", ");
   }
 
   showWaiting() {
@@ -129,6 +132,11 @@ class OperatorBar {
       button.classList.remove("armed");
       setText(words_, text);
     };
+    button.rename = (name) => {
+      if (name === text) return;
+      [text, again] = [name, `press again: ${name}`];
+      setText(words_, timer === null ? text : again);
+    };
     button.addEventListener("click", () => {
       if (timer !== null) {
         disarm();
@@ -146,10 +154,10 @@ class OperatorBar {
     setText(this.answer, text);
   }
 
-  /** How things are; `start`: what the mission needs to start, `held`: what a pause holds, null when there is none; `flew`: it took off. */
-  show(status, start, held, flew) {
-    if (this.status?.run !== status.run || (flew && !this.flew)) this.before.open = !flew; // once a run and at lift-off: what is opened later stays so
-    this.flew = flew;
+  /** How things are; `start`: what the mission needs to start, `held`: what a pause holds, null when there is none; `left`: it has departed. */
+  show(status, start, held, left) {
+    if (this.status?.run !== status.run || (left && !this.left)) this.before.open = !left; // once a run and at the departure: what is opened later stays so
+    this.left = left;
     [this.status, this.paused] = [status, held !== null];
     const met = (start ?? []).filter(([, otherwise]) => !otherwise).length;
     setText(this.met, start?.length ? `before the start: ${met} of ${start.length} conditions met` : "before the start");
@@ -172,6 +180,7 @@ class OperatorBar {
 
   enable() {
     const may = Boolean(this.status?.commands) && live.state !== "stale";
+    this.abort.rename(robotWords(run).stop);
     this.begin.disabled = !may;
     this.abort.disabled = this.pause.disabled = this.resume.disabled = !may || !this.status.live;
     [this.pause.hidden, this.resume.hidden] = [this.paused, !this.paused];

@@ -1,7 +1,5 @@
-// What the cameras showed at the moment: the depth image, and the inspection's video as it was received, with its figures.
+// What the cameras showed at the moment; what each shows, and the figures below its picture, the robot says.
 
-const CAMERAS = { depth: "depth camera: near is yellow, 20 m and more violet, black was not measured", screen: "the telepilot's screen: the video as it was received" };
-const SCREEN_FIGURES = [["fps", "frame rate", "frames/s", 0], ["quality", "quality", "SSIM", 2], ["bit_rate_bps", "bit rate", "kbit/s", 0, 1e-3], ["delay_s", "delay", "s delay", 2], ["loss", "loss", "% lost", 1, 100]];
 const OLD_S = 3;
 
 class PicturesView {
@@ -20,7 +18,7 @@ class PicturesView {
   frame(camera) {
     const image = el("img", { alt: "", width: 512, height: 288 });
     const [when, numbers] = [el("b", {}), el("p", { class: "hint" })];
-    this.box.append(el("figure", {}, el("figcaption", {}, el("span", {}, CAMERAS[camera] ?? camera), when), image, numbers));
+    this.box.append(el("figure", {}, el("figcaption", {}, el("span", {}, this.about(camera)), when), image, numbers));
     this.figures.set(camera, { image, when, numbers, shown: null });
   }
 
@@ -37,22 +35,27 @@ class PicturesView {
     figure.image.classList.toggle("old", age !== null && age > OLD_S);
     const said = age === null ? "no picture yet" : `${seconds(track.t[index] - origin(this.run))}${age > OLD_S ? `, ${seconds(age, 0)} old` : ""}`;
     setText(figure.when, said);
-    const numbers = camera === "screen" ? this.numbers() : "";
+    const numbers = this.numbers(camera);
     setText(figure.numbers, numbers);
-    figure.image.alt = `${CAMERAS[camera] ?? camera}; picture of ${said}. ${numbers}`;
+    figure.image.alt = `${this.about(camera)}; picture of ${said}. ${numbers}`;
   }
 
-  /** The figures of the received video at the moment, and since when some of them have not been measured. */
-  numbers() {
-    const samples = this.run.data.get("video.picture");
+  about(camera) {
+    return robotWords(this.run).cameras[camera]?.about ?? camera;
+  }
+
+  /** The figures that belong to a camera's picture at the moment, and since when some of them have not been measured. */
+  numbers(camera) {
+    const { data, figures = {} } = robotWords(this.run).cameras[camera] ?? {};
+    const samples = this.run.data.get(data);
     const measured = [];
     const missing = new Map();
-    for (const [name, title, unit, digits, factor = 1] of samples ? SCREEN_FIGURES : []) {
+    for (const [name, { label, unit, digits, factor }] of samples ? Object.entries(figures) : []) {
       const column = samples.columns.get(name);
       if (!column) continue;
       const { value, since } = readingAt(samples.t, column, this.t);
       if (typeof value === "number") measured.push(`${fixed(factor * value, digits)} ${unit}`);
-      else if (since !== null) missing.set(since, [...(missing.get(since) ?? []), title]);
+      else if (since !== null) missing.set(since, [...(missing.get(since) ?? []), label]);
     }
     const gaps = [...missing].map(([since, titles]) => `no data since ${seconds(since - origin(this.run))}: ${titles.join(", ")}`);
     return [measured.join(", "), ...gaps].filter(Boolean).join("; ");

@@ -1,4 +1,4 @@
-// The first thing that is looked at: how the mission is, what is active, the vehicle's figures, what is wrong, the last events; at one moment.
+// The first thing that is looked at: how the mission is, what is active, the robot's figures, what is wrong, the last events; at one moment.
 // At the end of a run that is over the figures are those of the whole run.
 
 const RECENT = 6;
@@ -9,13 +9,27 @@ function activeAt(run, t) {
   return open.sort((one, other) => one.running - other.running).map(({ skill, running, inputs }) => ({ name: skill, since: running, inputs: listed(inputs) }));
 }
 
+/** Times and values of a field that is named as "skillset.data.field"; undefined where the record has none. */
+function columnOf(run, name) {
+  const [skillset, data, ...field] = (name ?? "").split(".");
+  const samples = run.data.get(`${skillset}.${data}`);
+  const column = samples?.columns.get(field.join("."));
+  return column && { t: samples.t, column };
+}
+
+/** The newest reading at t of a field that is named so: {name, value, since}; undefined where the record has none. */
+function namedFieldAt(run, t, name) {
+  const found = columnOf(run, name);
+  return found && { name, ...readingAt(found.t, found.column, t) };
+}
+
 /** The newest reading at t of the first data that has such a field: {value, since}; undefined where no data has it. */
 function fieldAt(run, t, pattern) {
   for (const { t: times, columns } of run.data.values()) for (const [name, column] of columns) if (pattern.test(name)) return { name, ...readingAt(times, column, t) };
   return undefined;
 }
 
-/** The vehicle's figures at t: [{label, text, tone}]; what nothing measures says so. */
+/** The robot's figures at t: [{label, text, tone}]; what nothing measures says so. */
 function readings(run, t) {
   const numbers = (patterns) => patterns.map((pattern) => fieldAt(run, t, pattern));
   const told = (label, fields, write) => {
@@ -35,17 +49,17 @@ function readings(run, t) {
     told("battery", [battery], (value) => batteryTold(battery.name, value)),
     linkAt(run, t, told),
     told("east, north of home", position, (x, y) => ({ text: `${fixed(x, 1)} m, ${fixed(y, 1)} m` })),
-    { label: robotWords(run).away, text: inTheAir(run, t) },
+    { label: robotWords(run).away, text: awayTold(run, t) },
     ...(of ? [{ label: "waypoints", text: `${reached} of ${of}` }] : []),
-    told("autopilot's mode", numbers([/(^|\.)mode$/]), (mode) => ({ text: String(mode), tone: modesOf(run)[mode] ? "fair" : "" })),
+    told(`${robotWords(run).controller}'s mode`, [namedFieldAt(run, t, robotWords(run).mode)], (mode) => ({ text: String(mode), tone: modesOf(run)[mode] ? "fair" : "" })),
   ];
   return shown.filter(Boolean);
 }
 
-function inTheAir(run, t) {
+function awayTold(run, t) {
   if (run.departure === null || t < run.departure) return "not yet";
-  const landed = landing(run);
-  return landed !== null && t >= landed ? `${seconds(landed - origin(run))}, ${cameDown(run)}` : seconds(t - origin(run));
+  const back = comingBack(run);
+  return back !== null && t >= back ? `${seconds(back - origin(run))}, ${cameBack(run)}` : seconds(t - origin(run));
 }
 
 /** A battery's charge: a share or per cent; other units as they are. */
@@ -56,14 +70,14 @@ function batteryTold(name, value) {
   return { text: `${fixed(percent, 0)} %`, tone: percent < 20 ? "bad" : percent < 35 ? "fair" : "" };
 }
 
-/** The links: the autopilot's, and each resource that is one. */
+/** The links: the controller's, and each resource that is one. */
 function linkAt(run, t, told) {
   const parts = [];
-  const autopilot = fieldAt(run, t, /(^|\.)link$/);
-  if (autopilot) parts.push(told("link", [autopilot], (up) => (up ? { text: "autopilot up" } : { text: "autopilot lost", tone: "bad" })));
-  for (const [name, track] of run.resources) {
-    if (!/\.(\w+_)?link$/.test(name)) continue;
-    const { state, alarm } = valueAt(track, t) ?? { state: "unknown" };
+  const { controller, link, links } = robotWords(run);
+  const heard = namedFieldAt(run, t, link);
+  if (heard) parts.push(told("link", [heard], (up) => (up ? { text: `${controller} up` } : { text: `${controller} lost`, tone: "bad" })));
+  for (const name of links.filter((one) => run.resources.has(one))) {
+    const { state, alarm } = valueAt(run.resources.get(name), t) ?? { state: "unknown" };
     parts.push({ text: `${name.split(".")[0]} ${state.toLowerCase()}`, tone: isAlarm(run, alarm, t) ? "bad" : "" });
   }
   const tone = ["bad", "fair", "soft"].find((one) => parts.some((part) => part.tone === one));
@@ -73,8 +87,8 @@ function linkAt(run, t, told) {
 /** What is wrong at t: [{text, tone, since}]. */
 function wrongAt(run, t) {
   const found = [];
-  const flew = run.departure !== null && t >= run.departure;
-  if (!flew && !run.over) for (const [needed, otherwise] of valueAt(run.start, t) ?? []) if (otherwise) found.push({ text: `before the start: ${otherwise || needed}`, tone: "fair", since: null });
+  const left = run.departure !== null && t >= run.departure;
+  if (!left && !run.over) for (const [needed, otherwise] of valueAt(run.start, t) ?? []) if (otherwise) found.push({ text: `before the start: ${otherwise || needed}`, tone: "fair", since: null });
   const held = valueAt(run.held, t) ?? null;
   if (held !== null && (run.facts["/summary"]?.outcome ?? last(run.mission.v)?.outcome) === "running") found.push({ text: "the mission is paused", tone: "fair", since: run.held.t[indexAt(run.held.t, t)] });
   found.push(...faultsAt(run, t), ...endedBadly(run, t));
@@ -89,7 +103,7 @@ function wrongAt(run, t) {
   const since = isAway(run, t) ? fieldAt(run, t, /position_enu_m\.z$/)?.since : null;
   if (since) found.push({ text: "no position", tone: "bad", since });
   const crash = run.facts["/summary"]?.crash;
-  if (crash && t >= (landing(run) ?? Infinity)) found.push({ text: `crashed: ${crash}`, tone: "bad", since: landing(run) });
+  if (crash && t >= (comingBack(run) ?? Infinity)) found.push({ text: `crashed: ${crash}`, tone: "bad", since: comingBack(run) });
   return found;
 }
 

@@ -9,7 +9,7 @@ import matplotlib as mpl
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
-from alula.records.comparing.sides import FIGURES, Compared
+from alula.records.comparing.sides import Compared, known_figures
 from alula.records.comparing.telling import SIDE_BY_SIDE
 
 # After Okabe and Ito (2008): told apart by the colour-blind.
@@ -42,7 +42,7 @@ def _timeline(compared: Compared) -> Figure:
             axes.axvline(side.decisions[at].at_s, color=COLOURS[number], linestyle="--", linewidth=1.0)
     axes.set_yticks([row * height + (len(sides) - 1) / 2 for row in range(len(skills))], skills)
     axes.invert_yaxis()
-    axes.set_xlabel("seconds since lift-off; dashed: the first decision that is not that of the first run")
+    axes.set_xlabel("seconds since the departure; dashed: the first decision that is not that of the first run")
     axes.grid(axis="x", color="#dddddd", linewidth=0.6)
     axes.set_axisbelow(True)
     figure.legend(loc="outside upper left", ncols=min(3, len(sides)), frameon=False)
@@ -50,14 +50,14 @@ def _timeline(compared: Compared) -> Figure:
 
 
 def _distributions(compared: Compared) -> Figure:
-    values = {name: [value for side in compared.sides if (value := side.figures[name]) is not None] for name in FIGURES}
+    values = {name: [value for side in compared.sides if (value := side.figures[name]) is not None] for name in known_figures()}
     shown = {name: some for name, some in values.items() if some}
     figure = Figure(figsize=(WIDTH_IN, 0.75 * len(shown) + 0.6), layout="constrained")
     rows = figure.subplots(max(len(shown), 1), 1, squeeze=False)[:, 0]
     for axes, (name, some) in zip(rows, shown.items(), strict=False):
         axes.plot(some, [0.0] * len(some), "|", color=COLOURS[0], markersize=14, alpha=0.5)
         axes.plot([median(some)], [0.0], "o", color=COLOURS[5], markersize=5)
-        axes.set_yticks([0.0], [f"{name} {FIGURES[name][1]}".rstrip()])
+        axes.set_yticks([0.0], [f"{name} {known_figures()[name][1]}".rstrip()])
         axes.spines[["top", "right", "left"]].set_visible(False)
     figure.suptitle(f"{len(compared.sides)} runs; a stroke a run, the dot is the median")
     return figure

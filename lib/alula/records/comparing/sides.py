@@ -9,6 +9,7 @@ from itertools import zip_longest
 from pathlib import Path
 from typing import Any
 
+from alula.common.robots import page_words
 from alula.model.execution_state import ExecutionState as S
 from alula.records.errors import AnalysisError
 from alula.records.run import RecordedRun, load_recorded_run
@@ -23,21 +24,21 @@ FIGURES: Mapping[str, tuple[tuple[str, ...], str]] = {
     "moving after": (("recovery", "moving_again_s"), "s"),
     "clearance": (("min_clearance_m",), "m"),
     "collisions": (("collisions",), ""),
-    "flown": (("distance_m",), "m"),
-    "map points": (("map", "points"), ""),
-    "map coverage": (("map", "coverage"), ""),
-    "map rmse": (("map", "rmse_m"), "m"),
-    "least frames": (("video", "min_fps"), "1/s"),
-    "least SSIM": (("video", "min_ssim"), ""),
-    "video delay": (("video", "p95_delay_s"), "s"),
-    "freezes": (("video", "freezes"), ""),
+    "distance": (("distance_m",), "m"),
 }
-"""What ``summary.json`` has of each figure, and its unit. Recovery times count from the failure."""
+"""What ``summary.json`` has of each figure, and its unit, of every robot. Recovery times count from the failure."""
+
+
+def known_figures() -> Mapping[str, tuple[tuple[str, ...], str]]:
+    """Return FIGURES, and those that the robot says it has; without the factors by which reports tell them."""
+    of_robot = page_words()["figures"]
+    own = {path.replace(".", " "): (tuple(path.split(".")), told["unit"] if told["factor"] == 1 else "") for path, told in of_robot.items()}
+    return {**FIGURES, **own}
 
 
 @dataclass(frozen=True)
 class ComparedDecision:
-    """The mission starts or interrupts a skill, ``at_s`` seconds after lift-off."""
+    """The mission starts or interrupts a skill, ``at_s`` seconds after the departure."""
 
     what: str
     at_s: float
@@ -71,7 +72,7 @@ def load_side(path: Path, name: str) -> Side:
     """Read a run; raises AnalysisError."""
     run = load_recorded_run(path)
     summary = _summary(path)
-    figures = {figure: _figure(summary, where) for figure, (where, _) in FIGURES.items()}
+    figures = {figure: _figure(summary, where) for figure, (where, _) in known_figures().items()}
     if figures["duration"] is None:
         figures["duration"] = run.events[-1].stamp_s - run.events[0].stamp_s
     return Side(name, run.outcome, decisions_of(run), list(_spans(run)), figures)
@@ -116,7 +117,7 @@ def _ordered(events: Sequence[ExecutionEvent]) -> list[ExecutionEvent]:
 
 
 def _spans(run: RecordedRun) -> Iterator[tuple[str, float, float]]:
-    """Yield each execution that ran: skill, and from when to when, seconds since lift-off."""
+    """Yield each execution that ran: skill, and from when to when, seconds since the departure."""
     since: dict[str, float] = {}
     for event in run.events:
         if isinstance(event, ExecutionEvent):

@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Iterator, Sequence
 from statistics import median
 
-from alula.records.comparing.sides import FIGURES, Compared, Side
+from alula.records.comparing.sides import Compared, Side, known_figures
 
 SIDE_BY_SIDE = 6
 """More runs than these are told as distributions."""
@@ -32,7 +32,7 @@ def _plain(side: Side) -> list[dict[str, object]]:
 
 def _known(compared: Compared) -> dict[str, list[float]]:
     """Return the values of each figure that some run has."""
-    found = {name: [value for side in compared.sides if (value := side.figures[name]) is not None] for name in FIGURES}
+    found = {name: [value for side in compared.sides if (value := side.figures[name]) is not None] for name in known_figures()}
     return {name: values for name, values in found.items() if values}
 
 
@@ -59,7 +59,7 @@ def _columns(compared: Compared) -> Iterator[list[str]]:
 
 
 def _titled(name: str) -> str:
-    unit = FIGURES[name][1]
+    unit = known_figures()[name][1]
     return f"{name} ({unit})" if unit else name
 
 

@@ -60,7 +60,7 @@ def _moment(part: Located, tolerance_s: float) -> ExpectedMoment:
         return ExpectedMoment(part.place, _pattern(part))
     said = part.record("an event", ("what", "at_s", "tolerance_s"))
     if "what" not in said:
-        raise part.wrong("an event needs `what`, as in {what: takeoff RUNNING, at_s: 2.5}")
+        raise part.wrong("an event needs `what`, as in {what: drive RUNNING, at_s: 2.5}")
     at_s = said["at_s"].number("`at_s`", -FURTHEST_S, FURTHEST_S) if "at_s" in said else None
     if "tolerance_s" in said:
         tolerance_s = said["tolerance_s"].number("`tolerance_s`", 0.0)
@@ -72,14 +72,14 @@ def _never(part: Located) -> Never:
         return Never(part.place, _pattern(part))
     said = part.record("what must not happen", ("what", "after"))
     if "what" not in said:
-        raise part.wrong("what must not happen needs `what`, as in {what: goto RUNNING, after: zed_status BROKEN}")
+        raise part.wrong("what must not happen needs `what`, as in {what: drive RUNNING, after: bumper PRESSED}")
     return Never(part.place, _pattern(said["what"]), _pattern(said["after"]) if "after" in said else None)
 
 
 def _states(part: Located) -> States:
     said = part.entries("states")
     if "at_s" not in said:
-        raise part.wrong("states need `at_s`, as in {at_s: 31, perception.zed_status: BROKEN}")
+        raise part.wrong("states need `at_s`, as in {at_s: 31, base.bumper: PRESSED}")
     at_s = said.pop("at_s").number("`at_s`", -FURTHEST_S, FURTHEST_S)
     for name, one in said.items():
         if name.count(".") != 1:
@@ -90,5 +90,5 @@ def _states(part: Located) -> States:
 def _pattern(part: Located) -> Pattern:
     words = part.text("an event").split()
     if not 2 <= len(words) <= 3:
-        raise part.wrong("an event is SKILL STATE, SKILL STATE RESULT or RESOURCE STATE, as in takeoff TERMINATED AT_ALTITUDE")
+        raise part.wrong("an event is SKILL STATE, SKILL STATE RESULT or RESOURCE STATE, as in drive TERMINATED ARRIVED")
     return Pattern(*words)

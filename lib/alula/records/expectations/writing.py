@@ -20,7 +20,7 @@ REST_S = 4 * TOLERANCE_S
 def expectations_of(run: RecordedRun) -> str:
     """Return a YAML text that the run fulfils."""
     lines = [
-        f"# What {run.path.name} was. Times are seconds of mission clock after lift-off.",
+        f"# What {run.path.name} was. Times are seconds of mission clock after the departure.",
         *([f"outcome: {run.outcome}"] if run.outcome else []),
         f"tolerance_s: {TOLERANCE_S:g}",
         "",

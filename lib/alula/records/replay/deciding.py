@@ -72,7 +72,7 @@ def bag_of(recorded: Recorded, given: Path) -> Path:
     """Return the bag that was given, or the one beside the record; raises ReplayError."""
     path = given if given.suffix == ".bag" else recorded.path.parent / BAG
     if not path.is_file():
-        raise ReplayError(f"{path}: there is no such bag; a flight over mocks has none, replay it with --from skills")
+        raise ReplayError(f"{path}: there is no such bag; a run over mocks has none, replay it with --from skills")
     return path
 
 

@@ -1,4 +1,4 @@
-"""A recorded mission: what the vehicle answered and when, what the tree decided, and what it knew then."""
+"""A recorded mission: what the robot answered and when, what the tree decided, and what it knew then."""
 
 from __future__ import annotations
 
@@ -106,13 +106,13 @@ class Recorded:
 
     @property
     def lift_off_s(self) -> float | None:
-        """When the vehicle lifted off, seconds of mission clock; None: never."""
+        """When the robot departed, seconds of mission clock; None: never."""
         lift_off_s = self.mission.get("lift_off_s")
         return float(lift_off_s) if isinstance(lift_off_s, int | float) else None
 
     @property
     def zero_s(self) -> float:
-        """What times count from: lift-off, or the record's beginning where there was none."""
+        """What times count from: the departure, or the record's beginning where there was none."""
         return self.begun_s if self.lift_off_s is None else self.lift_off_s
 
     @property
@@ -152,7 +152,7 @@ def load(path: Path) -> Recorded:
     """
     file = path / FILE if path.is_dir() else path.with_name(FILE) if path.suffix == ".bag" else path
     if not file.is_file():
-        bag = f"; {path.name} alone does not tell which mission was flown" if path.suffix == ".bag" else ""
+        bag = f"; {path.name} alone does not tell which mission was run" if path.suffix == ".bag" else ""
         raise ReplayError(f"{file}: there is no such record{bag}")
     follower = RecordFollower(file)
     try:

@@ -170,7 +170,7 @@ class _Reader:
     def _anchor(self, part: Located) -> tuple[Place, str]:
         words = part.text("`since`").split()
         if len(words) != 2:
-            raise part.wrong(f"`since` is `{part.text('since')}`; write a resource and a state, as `navigation.flight_status IN_AIR`")
+            raise part.wrong(f"`since` is `{part.text('since')}`; write a resource and a state, as `base.base_status DRIVING`")
         return self._resource(words[0], words[1], part)
 
     def _states(self, part: Located) -> dict[Place, str]:

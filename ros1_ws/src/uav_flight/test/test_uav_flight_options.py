@@ -23,7 +23,7 @@ ARDUPILOT = ["mapping", "--autopilot", "tcp:127.0.0.1:5760", "--sensors", "simul
     [
         (["nosuch"], ["nosuch", "mapping"]),
         (["mapping", "--fail", "nosuch"], ["nosuch", "zed", "lidar"]),
-        (["mapping", "--fail", "zed@x"], ["--fail", "zed@x", "zed:dark@30-40"]),
+        (["mapping", "--fail", "zed@x"], ["--fail", "zed@x", "camera:dark@30-40"]),
         (["mapping", "--fail", "zed:thinned"], ["zed can't be 'thinned'", "dark"]),
         (["mapping", "--world", "nowhere"], ["--world", "nowhere", "yard", "forest"]),
         (["mapping", "--fail", "zed@-1"], ["zed@-1"]),

@@ -117,14 +117,14 @@ def test_files_are_read_or_refused(tmp_path):
             TrueSurfaces.load(tmp_path / name)
     with pytest.raises(ReportError, match=r"nothing.ply is missing"):
         TrueSurfaces.load(tmp_path / "nothing.ply")
-    for text in ("[]", "{}", "[[1, 2]]", '[[1, 2, "x"]]', "[[1, 2, NaN]]", "[[1, 2,"):
-        (tmp_path / "inputs.json").write_text(text)
-        with pytest.raises(ReportError, match=r"inputs.json"):
-            load_route(tmp_path / "inputs.json")
-    (tmp_path / "inputs.json").write_text("[[0, 0, 3], [1, 0, 3]]")
-    np.testing.assert_allclose(load_route(tmp_path / "inputs.json"), [[0, 0, 3], [1, 0, 3]])
-    (tmp_path / "inputs.json").write_text('{"frame": "map", "route": [[0, 0, 3], [1, 0, 3]]}')
-    np.testing.assert_allclose(load_route(tmp_path / "inputs.json"), [[0, 0, 3], [1, 0, 3]])
+    mission = tmp_path / "mission.json"
+    routes = ("[]", "{}", "[[1, 2]]", '[[1, 2, "x"]]', "[[1, 2, NaN]]", "[[1, 2,")
+    for text in ("[]", '{"inputs": 3}', *(f'{{"inputs": {{"route": {route}}}}}' for route in routes)):
+        mission.write_text(text)
+        with pytest.raises(ReportError, match=r"mission.json"):
+            load_route(mission)
+    mission.write_text('{"inputs": {"frame": "map", "route": [[0, 0, 3], [1, 0, 3]]}}')
+    np.testing.assert_allclose(load_route(mission), [[0, 0, 3], [1, 0, 3]])
 
 
 def test_the_outline_of_a_box_is_its_twelve_edges(tmp_path):

@@ -80,9 +80,10 @@ def lay_out(folder: Path) -> None:
     xs, ys = np.meshgrid(np.arange(-20, 60, 0.2), np.arange(-25, 35, 0.2))
     ground = np.stack([xs.ravel(), ys.ravel(), np.full(xs.size, 0.04)], axis=1)
     write_map(folder / "map.ply", ground)
-    (folder / "inputs.json").write_text(json.dumps(ROUTE))
-    (folder / "mission.json").write_text('{"outcome": "degraded", "reason": "zed_depthmap: zed_works was violated"}')
-    (folder / "bridge.json").write_text('{"topics": {"/clock": {"count": 5000, "p50_ms": 0.4, "p95_ms": 1.5, "dropped": 0}}}')
+    mission = {"outcome": "degraded", "reason": "zed_depthmap: zed_works was violated", "inputs": {"route": ROUTE}}
+    (folder / "mission.json").write_text(json.dumps(mission))
+    (folder / "logs").mkdir(exist_ok=True)
+    (folder / "logs/bridge.json").write_text('{"topics": {"/clock": {"count": 5000, "p50_ms": 0.4, "p95_ms": 1.5, "dropped": 0}}}')
     t_s, position = poses()
     fault = {"sensor": "zed", "mode": "dead", "t_s": LIFT_OFF_S + 30.0}
     state = {"t_s": 113.0, "lift_off_s": LIFT_OFF_S, "collisions": 0, "min_clearance_m": 1.1, "distance_m": 83.0, "faults": [fault]}
@@ -247,7 +248,7 @@ def test_an_empty_folder(tmp_path):
     assert {key for key, value in summary.items() if value is not None} == known
     assert summary["skills"] == summary["resources"] == []
     assert set(summary["map"].values()) == {None}
-    for name in (RECORD, "functional.bag", "world.ply", "map.ply", "inputs.json", "mission.json", "bridge.json"):
+    for name in (RECORD, "functional.bag", "world.ply", "map.ply", "mission.json", "bridge.json"):
         assert [problem for problem in summary["problems"] if name in problem], name
     assert {path.name for path in tmp_path.iterdir()} == OUTPUTS
 
@@ -268,7 +269,8 @@ def test_what_the_mission_could_not_record_is_a_problem_of_the_flight(folder):
 
 @pytest.mark.parametrize("content", [b"", b"\x00\xff\x80garbage", b"{", b"[]", b"null", b'"text"'], ids=repr)
 def test_garbage_everywhere(tmp_path, content):
-    for name in (RECORD, "mission.json", "inputs.json", "functional.bag", "bridge.json", "map.ply", "world.ply"):
+    (tmp_path / "logs").mkdir()
+    for name in (RECORD, "mission.json", "functional.bag", "logs/bridge.json", "map.ply", "world.ply"):
         (tmp_path / name).write_bytes(content)
     summary = make_report(facts(tmp_path))
     assert summary["outcome"] is None
@@ -277,17 +279,16 @@ def test_garbage_everywhere(tmp_path, content):
     assert json.loads((tmp_path / "summary.json").read_text())["problems"] == summary["problems"]
 
 
-@pytest.mark.parametrize("missing", [RECORD, "mission.json", "inputs.json", "functional.bag", "bridge.json", "map.ply", "world.ply"])
+@pytest.mark.parametrize("missing", [RECORD, "mission.json", "functional.bag", "logs/bridge.json", "map.ply", "world.ply"])
 def test_each_file_may_be_missing(folder, missing):
     (folder / missing).unlink()
     summary = make_report(facts(folder))
-    assert any(missing in problem for problem in summary["problems"])
+    assert any(Path(missing).name in problem for problem in summary["problems"])
     unknown = {
         RECORD: summary["skills"] == [],
-        "mission.json": summary["outcome"] is None,
-        "inputs.json": summary["map"]["coverage"] is None and summary["map"]["rmse_m"] is not None,
+        "mission.json": summary["outcome"] is None and summary["map"]["coverage"] is None and summary["map"]["rmse_m"] is not None,
         "functional.bag": summary["min_clearance_m"] is None and summary["lift_off"]["source"] == "flight_status",
-        "bridge.json": summary["bridge"] is None,
+        "logs/bridge.json": summary["bridge"] is None,
         "map.ply": summary["map"]["points"] == 5 and summary["map"]["rmse_m"] is None,
         "world.ply": summary["min_clearance_m"] == 1.1 and summary["map"]["rmse_m"] is None,
     }

@@ -220,7 +220,7 @@ def parse(arguments: Sequence[str] | None) -> argparse.Namespace:
     for name, function in COMMANDS.items():
         command = commands.add_parser(name, help=str(function.__doc__), description=function.__doc__)
         if name in {"start", "interrupt", "why"}:
-            command.add_argument("skill", metavar="SKILL", help="a skill, such as takeoff or navigation.takeoff")
+            command.add_argument("skill", metavar="SKILL", help="a skill, such as drive or base.drive")
         if name in {"start", "why"}:
             command.add_argument("inputs", nargs="*", metavar="key=value", help="inputs of the skill; values as in YAML")
         if name == "transition":

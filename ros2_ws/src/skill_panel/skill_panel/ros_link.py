@@ -16,7 +16,7 @@ ANSWER_S = 20.0
 """How long (wall clock) a mission may take to be found and to answer; a machine at its limit took 10 s."""
 AGAIN_S = 3.0
 LOOK_S = 0.05
-LEFT = "press again; where the vehicle does not obey, its pilot takes it over"
+LEFT = "press again; where the robot does not obey, take it over by hand"
 
 
 class RosLink:
@@ -49,7 +49,7 @@ class RosMission:
         self._session.close()
 
     def abort(self) -> str:
-        """Have the mission stop and land; return what it answers."""
+        """Have the mission stop; return what it answers."""
         return str(self._ask(self._abort, Trigger.Request()).message)
 
     def set_paused(self, *, paused: bool) -> str:

@@ -9,14 +9,14 @@ import sys
 
 import pytest
 
-from alula.campaign.mock_flights import load_flights
+from alula.campaign.mocked_scenarios import load_mocked_scenario
 from alula.common.robots import find_robot
 from alula.missions.director import Outcome
 from alula.missions.plan import InputError, inputs_of, plan_of
 
 
 def test_a_file_tells_its_parameters_and_what_is_told_of_it():
-    told = load_flights("mapping").plan
+    told = load_mocked_scenario("mapping").plan
     assert told.parameters["takeoff_height_m"] == 3.0
     assert told.facts() == {"waypoints": 0.0, "waypoints_reached": 0.0}
     assert told.skillsets == ("navigation", "perception", "mapping")
@@ -30,7 +30,7 @@ def changed(name, tmp_path, old, new):
     for part in folder.glob("*.xml"):
         (tmp_path / part.name).write_text(part.read_text(encoding="utf-8"), encoding="utf-8")
     (tmp_path / f"{name}.xml").write_text(text.replace(old, new), encoding="utf-8")
-    flights = load_flights(name)
+    flights = load_mocked_scenario(name)
     return dataclasses.replace(flights.scenario, mission=str(tmp_path / f"{name}.xml")), flights.inputs
 
 
@@ -58,10 +58,10 @@ def test_what_is_wrong_in_a_mission_is_told_before_it_begins(old, new, message, 
 def test_a_change_of_the_file_is_flown(tmp_path):
     """A newcomer's change: fly higher, and hover for longer."""
     scenario, _ = changed("inspection", tmp_path, 'name="takeoff_height_m" default="3.0"', 'name="takeoff_height_m" default="4.5"')
-    flights = dataclasses.replace(load_flights("inspection"), scenario=scenario)
+    flights = dataclasses.replace(load_mocked_scenario("inspection"), scenario=scenario)
     plan = plan_of(scenario, inputs_of(scenario))
     assert plan.parameters["takeoff_height_m"] == 4.5
-    assert flights.fly().end.outcome is Outcome.ACCOMPLISHED
+    assert flights.run().end.outcome is Outcome.ACCOMPLISHED
 
 
 def command(name, *words):

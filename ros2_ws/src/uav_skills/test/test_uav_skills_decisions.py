@@ -2,11 +2,14 @@ from __future__ import annotations
 
 import math
 from dataclasses import dataclass
+from pathlib import Path
 
 import pytest
 from hypothesis import given
 from hypothesis import strategies as st
+from uav_msgs.msg import FlightLimits
 
+from alula.common.robots import load_robot_folder
 from uav_skills import checks, decisions
 from uav_skills.decisions import IN_AIR, ON_GROUND, SkillEnd
 
@@ -170,3 +173,8 @@ def test_turns_and_durations():
     assert "rate is 2 rad/s" in checks.check_turn(heading_rad=0.0, rate_rad_s=2.0)
     assert checks.check_duration(duration_s=2.0) == ""
     assert "duration is -1 s" in checks.check_duration(duration_s=-1.0)
+
+
+def test_the_page_shows_the_fence_that_the_guidance_enforces():
+    fence = load_robot_folder(Path(__file__).parents[4]).page["fence"]
+    assert fence == {"radius_m": FlightLimits.FENCE_RADIUS_M, "z": [FlightLimits.FENCE_FLOOR_M, FlightLimits.FENCE_HEIGHT_M]}

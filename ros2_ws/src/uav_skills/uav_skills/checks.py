@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 
-from alula.common.flight_limits import FLIGHT_LIMITS
+from uav_msgs.msg import FlightLimits
 
 MAX_DURATION_S = 600.0
 
@@ -20,8 +20,8 @@ def check_between(name: str, value: float, low: float, high: float, unit: str) -
 
 def check_takeoff(*, height_m: float, speed_m_s: float) -> str:
     """Refuse a height outside the fence or a speed that the vehicle must not fly."""
-    return check_between("height", height_m, 0.0, FLIGHT_LIMITS.fence_height_m, "m") or check_between(
-        "speed", speed_m_s, 0.0, FLIGHT_LIMITS.max_speed_m_s, "m/s"
+    return check_between("height", height_m, 0.0, FlightLimits.FENCE_HEIGHT_M, "m") or check_between(
+        "speed", speed_m_s, 0.0, FlightLimits.MAX_SPEED_M_S, "m/s"
     )
 
 
@@ -31,10 +31,10 @@ def check_target(*, target_enu_m: tuple[float, float, float], speed_m_s: float) 
     if not all(math.isfinite(value) for value in target_enu_m):
         return f"target ({x}, {y}, {z}) has a coordinate that is not a finite number"
     radius_m = math.hypot(x, y)
-    if radius_m > FLIGHT_LIMITS.fence_radius_m:
-        return f"target ({x:g}, {y:g}, {z:g}) is {radius_m:.1f} m from home; the fence is at {FLIGHT_LIMITS.fence_radius_m:g} m"
-    return check_between("target height", z, 0.0, FLIGHT_LIMITS.fence_height_m, "m") or check_between(
-        "speed", speed_m_s, 0.0, FLIGHT_LIMITS.max_speed_m_s, "m/s"
+    if radius_m > FlightLimits.FENCE_RADIUS_M:
+        return f"target ({x:g}, {y:g}, {z:g}) is {radius_m:.1f} m from home; the fence is at {FlightLimits.FENCE_RADIUS_M:g} m"
+    return check_between("target height", z, 0.0, FlightLimits.FENCE_HEIGHT_M, "m") or check_between(
+        "speed", speed_m_s, 0.0, FlightLimits.MAX_SPEED_M_S, "m/s"
     )
 
 
@@ -42,7 +42,7 @@ def check_turn(*, heading_rad: float, rate_rad_s: float) -> str:
     """Refuse a heading that is no number or a rate that would smear the sensors' measurements."""
     if not math.isfinite(heading_rad):
         return f"heading is {heading_rad}, not a finite number"
-    return check_between("rate", rate_rad_s, 0.0, FLIGHT_LIMITS.max_yaw_rate_rad_s, "rad/s")
+    return check_between("rate", rate_rad_s, 0.0, FlightLimits.MAX_YAW_RATE_RAD_S, "rad/s")
 
 
 def check_duration(*, duration_s: float) -> str:

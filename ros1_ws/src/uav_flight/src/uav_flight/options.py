@@ -7,13 +7,14 @@ from collections.abc import Mapping, Sequence
 from typing import Any
 
 from alula.common.network import free_port
-from alula.common.scenarios import Scenario
 from alula.live.spec import RequestError
 from uav_flight.autopilot import check_body_port, check_connection, read_sensors
 from uav_simulator.errors import ConfigError
 from uav_simulator.imperfections import parse_imperfections
 
 MAX_RATE = 1000
+GROUND_LINK = {"control", "ground_station"}
+"""Faults of the ground's link to the simulated autopilot; a real one is not connected to it."""
 
 
 class Options(Namespace):
@@ -55,11 +56,11 @@ def add_options(parser: ArgumentParser) -> None:
     )
 
 
-def read_options(given: Options, scenario: Scenario) -> Mapping[str, Any]:
+def read_options(given: Options) -> Mapping[str, Any]:
     """Check them; return what a run keeps of them, by name as in ``Flight``. Raises RequestError."""
     if not 0 <= given.rate <= MAX_RATE:  # also refuses nan
         raise RequestError(f"--rate {given.rate:g}: must be 0 (no limit) or a positive factor up to {MAX_RATE}")
-    _check_autopilot(given, scenario)
+    _check_autopilot(given)
     try:
         parse_imperfections(given.imperfections)
     except ConfigError as error:
@@ -76,7 +77,7 @@ def read_options(given: Options, scenario: Scenario) -> Mapping[str, Any]:
     }
 
 
-def _check_autopilot(given: Options, scenario: Scenario) -> None:
+def _check_autopilot(given: Options) -> None:
     """Refuse what does not go together with another autopilot, or without one."""
     if given.sensors is not None and given.autopilot is None:
         raise RequestError("--sensors is for a real autopilot; add --autopilot URL")
@@ -86,7 +87,7 @@ def _check_autopilot(given: Options, scenario: Scenario) -> None:
         return
     check_connection(given.autopilot)
     if given.sensors is not None:
-        _check_ground_link(given.fail, scenario)
+        _check_ground_link(given.fail)
         return
     if given.fail:
         raise RequestError("--fail breaks simulated sensors; with --autopilot there are none, unless --sensors simulated is added")
@@ -94,9 +95,9 @@ def _check_autopilot(given: Options, scenario: Scenario) -> None:
         raise RequestError("--imperfections are those of simulated sensors; with --autopilot there are none")
 
 
-def _check_ground_link(faults: Sequence[str], scenario: Scenario) -> None:
+def _check_ground_link(faults: Sequence[str]) -> None:
     """Refuse to break what only the simulated autopilot is connected to."""
-    broken = [what for what in scenario.ground_link if any(text.partition("@")[0].partition(":")[0] == what for text in faults)]
+    broken = [what for text in faults if (what := text.partition("@")[0].partition(":")[0]) in GROUND_LINK]
     if broken:
         raise RequestError(
             f"--fail {broken[0]}: is of the ground's link to the autopilot, which only the simulated one is connected to; "

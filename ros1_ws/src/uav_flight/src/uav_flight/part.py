@@ -79,9 +79,9 @@ class DronePart(RunPart):
         """Add rate, recording, autopilot, sensors and imperfections."""
         add_options(parser)
 
-    def read(self, given: Namespace, scenario: Scenario) -> Mapping[str, Any]:
+    def read(self, given: Namespace, scenario: Scenario) -> Mapping[str, Any]:  # noqa: ARG002
         """Return the drone's options as fields of the run; raises RequestError where they do not go together."""
-        return read_options(Options(**vars(given)), scenario)
+        return read_options(Options(**vars(given)))
 
     def check_world(self, path: str) -> None:
         """Refuse what the simulator can't build."""

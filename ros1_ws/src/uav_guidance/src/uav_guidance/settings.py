@@ -5,7 +5,8 @@ from __future__ import annotations
 import math
 from dataclasses import dataclass, field
 
-from alula.common.flight_limits import FLIGHT_LIMITS
+from uav_msgs.msg import FlightLimits
+
 from perception_core import tunable
 from perception_core.tunable import KEY, Range
 
@@ -22,16 +23,16 @@ class GuidanceSettings:
     baud: int = 921600
     """Of a serial port."""
 
-    fence_radius_m: float = tunable(FLIGHT_LIMITS.fence_radius_m, 1.0, FLIGHT_LIMITS.fence_radius_m, "from home, for targets")
-    fence_height_m: float = tunable(FLIGHT_LIMITS.fence_height_m, 1.0, FLIGHT_LIMITS.fence_height_m, "above home, for targets")
-    fence_floor_m: float = tunable(FLIGHT_LIMITS.fence_floor_m, 0.1, 1.0, "above home, least height of a target")
-    max_speed_m_s: float = tunable(FLIGHT_LIMITS.max_speed_m_s, 0.1, FLIGHT_LIMITS.max_speed_m_s, "that may be asked for")
-    max_yaw_rate_rad_s: float = tunable(FLIGHT_LIMITS.max_yaw_rate_rad_s, 0.05, FLIGHT_LIMITS.max_yaw_rate_rad_s, "that may be asked for")
+    fence_radius_m: float = tunable(FlightLimits.FENCE_RADIUS_M, 1.0, FlightLimits.FENCE_RADIUS_M, "from home, for targets")
+    fence_height_m: float = tunable(FlightLimits.FENCE_HEIGHT_M, 1.0, FlightLimits.FENCE_HEIGHT_M, "above home, for targets")
+    fence_floor_m: float = tunable(FlightLimits.FENCE_FLOOR_M, 0.1, 1.0, "above home, least height of a target")
+    max_speed_m_s: float = tunable(FlightLimits.MAX_SPEED_M_S, 0.1, FlightLimits.MAX_SPEED_M_S, "that may be asked for")
+    max_yaw_rate_rad_s: float = tunable(FlightLimits.MAX_YAW_RATE_RAD_S, 0.05, FlightLimits.MAX_YAW_RATE_RAD_S, "that may be asked for")
 
     max_accel_m_s2: float = tunable(1.5, 0.2, 4.0, "of the carrot, and for planned braking")
     carrot_lead_m: float = tunable(1.0, 0.2, 5.0, "ahead of the vehicle at which the carrot slows down, or ...")
     carrot_lead_s: float = tunable(1.25, 0.2, 5.0, "... at the reference's speed, if that is more: a vehicle follows about 1 s late")
-    yaw_rate_rad_s: float = tunable(0.7, 0.05, FLIGHT_LIMITS.max_yaw_rate_rad_s, "at which the nose is turned into the travel")
+    yaw_rate_rad_s: float = tunable(0.7, 0.05, FlightLimits.MAX_YAW_RATE_RAD_S, "at which the nose is turned into the travel")
     yaw_aligned_rad: float = tunable(math.radians(10.0), 0.01, 1.0, "from the travel at which the vehicle begins to move")
 
     obstacle_stop_m: float = tunable(3.0, 1.0, 20.0, "from the vehicle's centre: an obstacle nearer than this makes it brake and hold")

@@ -10,7 +10,6 @@ import numpy as np
 
 from alula.common.faults import FaultChange
 from alula.common.files import write_aside
-from alula.common.runs import INPUTS_FILE
 from alula.records.causes.effects import EffectsByFault, FaultEffects
 from alula.records.causes.faults import Fault
 from alula.report.observed import Observed, read_process_faults
@@ -144,8 +143,8 @@ class FlightReport:
         if "map" in self._run.scenario.report:
             with problems.survive("map.ply"):
                 points = load_map(folder / "map.ply")
-        with problems.survive(INPUTS_FILE):
-            route = load_route(folder / INPUTS_FILE)
+        with problems.survive("the route of mission.json"):
+            route = load_route(folder / "mission.json")
         quality = MapQuality()
         with problems.survive("the map's quality"):
             quality = judge_map(points, route, world, problems)

@@ -18,7 +18,7 @@ from numpy.typing import NDArray
 from scipy.spatial import cKDTree
 
 from alula.common.open3d_core import o3d
-from alula.report.files import Problems, ReportError, finite, read_json, sequence
+from alula.report.files import Problems, ReportError, finite, mapping, read_json, sequence
 from uav_report.world import TrueSurfaces
 
 PATCH_M = 0.25  # one sample for each square of this side
@@ -64,10 +64,9 @@ def load_map(path: Path) -> Floats:
 def load_route(path: Path) -> Floats:
     """Return the planned waypoints, (N, 3), frame map; raise ReportError when they are missing or unreadable.
 
-    The mission writes them under the key ``route``; a bare list is read, too.
+    The mission writes its inputs into its file, these under the key ``route``.
     """
-    written = read_json(path)
-    listed = written.get("route") if isinstance(written, dict) else written
+    listed = mapping(mapping(read_json(path)).get("inputs")).get("route")
     waypoints = [[finite(number) for number in sequence(waypoint)] for waypoint in sequence(listed)]
     if not waypoints or any(len(waypoint) != 3 or None in waypoint for waypoint in waypoints):
         raise ReportError(f"{path.name} is no list of [x, y, z]")

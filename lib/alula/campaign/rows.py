@@ -1,4 +1,4 @@
-"""Flies the flights of a campaign, in whatever process, and makes a row of each. A row says nothing of the machine or the time of day."""
+"""Does the runs of a campaign, in whatever process, and makes a row of each. A row says nothing of the machine or the time of day."""
 
 from __future__ import annotations
 
@@ -11,8 +11,8 @@ from pathlib import Path
 from typing import Any
 
 from alula.campaign.failures import FAULT, PROCESS, Way, as_dict, failures_by, failures_in, name_of, ways_to_fail
-from alula.campaign.mock_flights import MockFlights, load_flights
-from alula.campaign.plan import SIMULATOR, Flight
+from alula.campaign.mocked_scenarios import MockedScenario, load_mocked_scenario
+from alula.campaign.plan import SIMULATOR, PlannedRun
 from alula.common.record import RecordError, read_record
 from alula.common.robots import find_robot
 from alula.live.options import entry
@@ -31,27 +31,27 @@ from alula.runtime.mock import Behaviour
 Row = dict[str, Any]
 
 
-def fly(flights: Sequence[Flight], over: str, behaviour: tuple[str, ...], out: str, options: tuple[str, ...] = ()) -> list[Row]:
-    """Fly one after another; return a row of each. ``out`` is the campaign's folder: flights in the simulator leave theirs there."""
+def rows_of(runs: Sequence[PlannedRun], over: str, behaviour: tuple[str, ...], out: str, options: tuple[str, ...] = ()) -> list[Row]:
+    """Do one after another; return a row of each. ``out`` is the campaign's folder: runs in the simulator leave theirs there."""
     if over == SIMULATOR:
-        return [_simulated(flight, options, Path(out)) for flight in flights]
-    return [_mocked(flight, behaviour) for flight in flights]
+        return [_simulated(planned, options, Path(out)) for planned in runs]
+    return [_mocked(planned, behaviour) for planned in runs]
 
 
 @functools.cache
-def _scenario(name: str, behaviour: tuple[str, ...]) -> tuple[MockFlights, list[Way]]:
-    flights = load_flights(name, tuple(map(Path, behaviour)))
-    return flights, ways_to_fail(flights.skillsets)
+def _scenario(name: str, behaviour: tuple[str, ...]) -> tuple[MockedScenario, list[Way]]:
+    scenario = load_mocked_scenario(name, tuple(map(Path, behaviour)))
+    return scenario, ways_to_fail(scenario.skillsets)
 
 
-def _mocked(flight: Flight, behaviour: tuple[str, ...]) -> Row:
-    scenario, ways = _scenario(flight.scenario, behaviour)
-    flown = scenario.fly(flight.requests, flight.seed)
+def _mocked(planned: PlannedRun, behaviour: tuple[str, ...]) -> Row:
+    scenario, ways = _scenario(planned.scenario, behaviour)
+    mocked = scenario.run(planned.requests, planned.seed)
     monitor = Monitor(scenario.skillsets)
-    landed = _landed(flown.events)
-    found = {"outcome": flown.end.outcome.value, "reason": flown.end.reason, "landed": landed, "open": list(flown.open)}
-    found |= {"problems": list(flown.notes), "collisions": None, "min_clearance_m": None, "died": [], "exit_code": None}
-    return _row(flight, found, _Evidence(flown.events, flown.places, first_s=flown.faults, behaviour=scenario.behaviour), monitor, ways)
+    landed = _landed(mocked.events)
+    found = {"outcome": mocked.end.outcome.value, "reason": mocked.end.reason, "landed": landed, "open": list(mocked.open)}
+    found |= {"problems": list(mocked.notes), "collisions": None, "min_clearance_m": None, "died": [], "exit_code": None}
+    return _row(planned, found, _Evidence(mocked.events, mocked.places, first_s=mocked.faults, behaviour=scenario.behaviour), monitor, ways)
 
 
 def _landed(events: Sequence[EngineEvent]) -> bool | None:
@@ -74,7 +74,7 @@ def _landed(events: Sequence[EngineEvent]) -> bool | None:
 
 @dataclass(frozen=True)
 class _Evidence:
-    """What a flight has left.
+    """What a run has left.
 
     Attributes:
         events: of its managers.
@@ -91,23 +91,23 @@ class _Evidence:
     behaviour: Behaviour | None = None
 
 
-def _row(flight: Flight, found: Mapping[str, Any], left: _Evidence, monitor: Monitor, ways: Sequence[Way]) -> Row:
-    """Return a row; ``found`` is how the flight went besides its events."""
+def _row(planned: PlannedRun, found: Mapping[str, Any], left: _Evidence, monitor: Monitor, ways: Sequence[Way]) -> Row:
+    """Return a row; ``found`` is how the run went besides its events."""
     for event in left.events:
         monitor.take(event)
     events = left.events if left.known is None else left.known
     origin_s = origin_of(events)
     effects = effects_of_robot()
-    asked = faults_asked(flight.requests, events, lift_off_of(events), effects, first_s=left.first_s, behaviour=left.behaviour)
+    asked = faults_asked(planned.requests, events, lift_off_of(events), effects, first_s=left.first_s, behaviour=left.behaviour)
     begun = [(Way(FAULT, name_of(request)), fault) for request, fault in asked]
     died = [(Way(PROCESS, one["name"]), _ended(one, events, effects)) for one in found["died"]]
     every = [failure for causes in (begun, died) for failure in failures_by(causes, events, left.places)]
     every += failures_in(events, ways, left.places)
     return {
-        "flight": flight.number,
-        "scenario": flight.scenario,
-        "seed": flight.seed,
-        "faults": list(flight.faults),
+        "run": planned.number,
+        "scenario": planned.scenario,
+        "seed": planned.seed,
+        "faults": list(planned.faults),
         **found,
         "duration_s": round(events[-1].stamp_s - events[0].stamp_s, 6) if events else 0.0,
         "events": len(left.events),
@@ -126,17 +126,17 @@ def _ended(died: Mapping[str, Any], events: Sequence[EngineEvent], effects: Effe
 # --- in the simulator ---------------------------------------------------------------------------------------------------
 
 
-def _simulated(flight: Flight, options: Sequence[str], out: Path) -> Row:
-    """Fly as a user does; the flight's folder stays."""
-    folder = out / f"flight-{flight.number:05d}"
+def _simulated(planned: PlannedRun, options: Sequence[str], out: Path) -> Row:
+    """Run as a user does; the run's folder stays."""
+    folder = out / f"run-{planned.number:05d}"
     for number in range(2, 1000):  # one that a crash has left half done stays as it is
         if not folder.exists():
             break
-        folder = out / f"flight-{flight.number:05d}-{number}"
-    words = [entry(), "run", flight.scenario, "--seed", str(flight.seed), *options]
-    if flight.world is not None:
-        words += ["--world", str(flight.world.absolute())]
-    for fault in flight.faults:
+        folder = out / f"run-{planned.number:05d}-{number}"
+    words = [entry(), "run", planned.scenario, "--seed", str(planned.seed), *options]
+    if planned.world is not None:
+        words += ["--world", str(planned.world.absolute())]
+    for fault in planned.faults:
         words += ["--fail", fault]
     done = subprocess.run([*words, "--out", str(folder)], capture_output=True, text=True, check=False, stdin=subprocess.DEVNULL)
     try:
@@ -155,4 +155,4 @@ def _simulated(flight: Flight, options: Sequence[str], out: Path) -> Row:
     found |= {"problems": summary.get("problems") or [], "died": summary.get("died") or [], "exit_code": done.returncode}
     models = models_of(names)
     left = _Evidence(run.events, places_in(record), with_told_ends(run.events, record))
-    return _row(flight, found, left, Monitor(models), ways_to_fail(models))
+    return _row(planned, found, left, Monitor(models), ways_to_fail(models))

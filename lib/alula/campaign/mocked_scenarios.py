@@ -23,8 +23,8 @@ from alula.runtime.mock import Behaviour, load_behaviour
 
 
 @dataclass(frozen=True)
-class Flown:
-    """A flight over mocks: what happened, how it ended, what went wrong in the mocks themselves, and what is open."""
+class MockedRun:
+    """A run over mocks: what happened, how it ended, what went wrong in the mocks themselves, and what is open."""
 
     events: Sequence[EngineEvent]
     end: End
@@ -37,8 +37,8 @@ class Flown:
 
 
 @dataclass(frozen=True)
-class MockFlights:
-    """A scenario, ready to be flown."""
+class MockedScenario:
+    """A scenario, ready to be run."""
 
     scenario: Scenario
     skillsets: tuple[Skillset, ...]
@@ -47,7 +47,7 @@ class MockFlights:
 
     @cached_property
     def plan(self) -> MissionPlan:
-        """The mission, read once for all flights; raises RobotError and InputError."""
+        """The mission, read once for all runs; raises RobotError and InputError."""
         return plan_of(self.scenario, self.inputs)
 
     def check(self, faults: Sequence[FaultRequest]) -> None:
@@ -62,15 +62,15 @@ class MockFlights:
         except (FaultError, SkillRuntimeError) as error:
             raise AnalysisError(str(error)) from None
 
-    def fly(self, faults: Sequence[FaultRequest] = (), seed: int = 0) -> Flown:
-        """Fly the mission once over mocks, in virtual time; the same faults and seed give the same flight."""
+    def run(self, faults: Sequence[FaultRequest] = (), seed: int = 0) -> MockedRun:
+        """Run the mission once over mocks, in virtual time; the same faults and seed give the same run."""
         mission = MockedMission(self.skillsets, self.behaviour, self.plan, faults=faults, seed=seed)
         end = mission.run()
         places = Places(mission.places, tip_of(mission.director.view().as_dict()))
-        return Flown(mission.events, end, mission.notes, mission.open_executions, dict(mission.robot.faults), places)
+        return MockedRun(mission.events, end, mission.notes, mission.open_executions, dict(mission.robot.faults), places)
 
 
-def load_flights(name: str, behaviour: Sequence[Path] = (), *, world: str = "") -> MockFlights:
+def load_mocked_scenario(name: str, behaviour: Sequence[Path] = (), *, world: str = "") -> MockedScenario:
     """Read what runs of a scenario over mocks need: the robot's own mocks, with behaviour files on top of them.
 
     Raises:
@@ -82,4 +82,4 @@ def load_flights(name: str, behaviour: Sequence[Path] = (), *, world: str = "") 
         known = load_behaviour([*robot.behaviour_files, *behaviour], robot_skillsets()).of(frozenset(scenario.skillsets))
     except (ScenarioError, RobotError, InputError, SkillRuntimeError) as error:
         raise AnalysisError(str(error)) from None
-    return MockFlights(scenario, tuple(robot_skillsets(scenario.skillsets)), known, inputs)
+    return MockedScenario(scenario, tuple(robot_skillsets(scenario.skillsets)), known, inputs)
