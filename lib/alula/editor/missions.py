@@ -10,6 +10,7 @@ from pathlib import Path
 from alula.common.robots import RobotError, find_robot
 from alula.editor.completion import Completion, Place
 from alula.language.errors import Diagnostic, Severity
+from alula.language.messages import NO_MESSAGES, Messages, messages_of
 from alula.language.models import ModelFile, check_files, models_in
 from alula.missions.check.findings import findings_of
 from alula.missions.check.skills import Skills
@@ -48,7 +49,7 @@ class Missions:
         """Return a mission with its findings."""
         file = ModelFile(path, text)
         skillsets = tuple(self.skills(path).skillsets.values())
-        found = findings_of(path, text.encode("utf-8", "replace"), skillsets, part=self._part(path))
+        found = findings_of(path, text.encode("utf-8", "replace"), skillsets, part=self._part(path), messages=self._messages(path))
         file.findings = [_perhaps_own(one) for one in found] if self._has_untrusted_part(path) else found
         return file
 
@@ -86,6 +87,12 @@ class Missions:
             return find_robot(Path(path).parent).part("missions") or NO_PART
         except RobotError:
             return NO_PART
+
+    def _messages(self, path: str) -> Messages:
+        try:
+            return messages_of(find_robot(Path(path).parent))
+        except RobotError:
+            return NO_MESSAGES
 
     def _has_untrusted_part(self, path: str) -> bool:
         try:
