@@ -107,7 +107,7 @@ class MissionDriver:
         except Exception as error:  # noqa: BLE001 - whatever breaks in a tree, the robot has to come to rest
             reason = f"the tree raised {type(error).__name__}: {error}"
             self._say(reason)
-            self.director.abort(reason)
+            self.director.broken(reason)
         self._note_step()
 
     def _note_step(self) -> None:

@@ -11,6 +11,9 @@ from __future__ import annotations
 from collections.abc import Mapping, Sequence
 from pathlib import Path
 
+from py_trees.behaviour import Behaviour
+from py_trees.behaviours import Success
+
 from alula.missions.blackboard import Blackboard
 from alula.missions.conditions import Condition, condition
 from alula.missions.filed.nodes import Needs
@@ -63,9 +66,9 @@ class FiledMission:
         ]
         return answers + [Condition(node.name, node.unmet) for node in self._needs]
 
-    def stop_here(self) -> Node:
-        """Make a tree that brings the robot to rest where it is."""
-        return self.stop_tree().root
+    def stop_here(self) -> Behaviour:
+        """Make a tree that brings the robot to rest where it is; where the file has none, there is nothing to add to the halt."""
+        return self.stop_tree().root if STOP_HERE in self._make.files.trees else Success(STOP_HERE)
 
     def stop_tree(self) -> Tree:
         """Make the tree `stop_here`, whole."""
