@@ -175,7 +175,7 @@ class MissionDriver:
 
     def finish(self, end: End) -> None:
         """Write what is left to write, and show the tree no more."""
-        problem = "" if self._watched is None else self._watched.close()
+        problems = [] if self._watched is None else self._watched.close()
         if self.record is not None:
-            self.record.problems += [problem] if problem else []
+            self.record.problems += problems
             self.record.finish(end, self.director, self._clock_ns() / 1e9)
