@@ -17,7 +17,7 @@ from alula.trees.script import Program, ScriptError, parse
 from alula.trees.script.scope import Unknown
 from alula.trees.structure import verify
 from alula.trees.tree import Subtree, Tree
-from alula.trees.values import ANY, STRING
+from alula.trees.values import ANY, STRING, literal
 
 SUBTREE = NodeType("SubTree", Category.SUBTREE, {}, "Another tree of the files.", SubTree, CHILDREN[Category.SUBTREE])
 
@@ -241,10 +241,10 @@ class _Builder:
 
 
 def _write(board: Blackboard, constants: Mapping[str, str]) -> None:
-    """Write what a subtree is given as plain text; these entries are its own, whatever is remapped."""
+    """Write what a subtree is given as plain text, a number as one; these entries are its own, whatever is remapped."""
     autoremap, board.autoremap = board.autoremap, False
     for name, text in constants.items():
-        board.set(name, text)
+        board.set(name, literal(text))
     board.autoremap = autoremap
 
 
