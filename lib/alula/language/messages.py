@@ -52,6 +52,14 @@ class Messages:
             type_ = fields[name]
         return type_
 
+    def inside(self, type_name: str, path: Sequence[str]) -> Fields:
+        """Return the fields of a field; none where it has none, or they are not known."""
+        try:
+            type_ = self.field(type_name, path)
+        except FieldError:
+            return {}
+        return self._fields(type_) or {} if type_ is not None and type_.package and not type_.array else {}
+
     def _fields(self, message: RosType) -> Fields | None:
         if message not in self._read:
             self._read[message] = self._definition(message)
