@@ -17,6 +17,7 @@ from time import monotonic
 
 from alula.commands.check_missions import SUFFIX, check_missions, prove_missions
 from alula.common.robots import RobotError, find_robot
+from alula.language.check.fields import check_fields
 from alula.language.errors import Diagnostic, Severity, has_errors, render
 from alula.language.models import ModelFile, check_files, models_in
 from alula.language.notation import Notation
@@ -49,6 +50,8 @@ def main(arguments: Sequence[str] | None = None) -> int:
     missions = [place for place in dict.fromkeys(given) if place.endswith(SUFFIX)]
     paths = dict.fromkeys(path for place in given if place not in missions for path in models_in(place))
     models, trees = check_files(list(paths), sys.stdin.buffer), check_missions(missions, options.palette)
+    for model in models:
+        check_fields(model)
     files = [*models, *trees]
     if options.proofs and options.to is None:
         _prove(models, options.time, closed_world=options.closed_world)

@@ -11,6 +11,7 @@ from pathlib import Path
 from alula.commands.mission_robot import models_of, part_of
 from alula.common.robots import RobotError, find_robot
 from alula.language.errors import Diagnostic, Severity, has_errors
+from alula.language.messages import NO_MESSAGES, Messages, messages_of
 from alula.language.models import ModelFile
 from alula.missions.check.findings import findings_of
 from alula.missions.filed.part import NO_PART, MissionPart
@@ -27,8 +28,8 @@ def check_missions(paths: Sequence[str], palettes: Sequence[str]) -> list[ModelF
     """Return each mission with its findings; what can't be read is told on standard error, too, in one line."""
     if not paths:
         return []
-    skillsets, part = _robot()
-    return [_checked(path, skillsets, [Path(palette) for palette in palettes], part) for path in paths]
+    skillsets, part, messages = _robot()
+    return [_checked(path, skillsets, [Path(palette) for palette in palettes], part, messages) for path in paths]
 
 
 def prove_missions(files: Sequence[ModelFile], timeout_s: float) -> None:
@@ -38,7 +39,7 @@ def prove_missions(files: Sequence[ModelFile], timeout_s: float) -> None:
         return
     from alula.prove.mission.prover import prove_mission  # which brings its solvers along
 
-    skillsets, part = _robot()
+    skillsets, part, _ = _robot()
     for file in sound if skillsets else []:
         tell = partial(_tell, file.path)
         proved = prove_mission(Path(file.path), skillsets, part, timeout_s=timeout_s, tell=tell)
@@ -54,20 +55,20 @@ def _tell(path: str, progress: str) -> None:
     sys.stderr.write(f"{COMMAND}: {path}: looking at its runs: {progress}\n")
 
 
-def _robot() -> tuple[tuple[Skillset, ...], MissionPart]:
+def _robot() -> tuple[tuple[Skillset, ...], MissionPart, Messages]:
     """Return what is known of the robot, nothing where there is none: a foreign tree has its palette."""
     try:
         robot = find_robot()
     except RobotError as error:
         sys.stderr.write(f"{COMMAND}: no skills are known: {error}\n")
-        return (), NO_PART
-    return models_of(robot, COMMAND), part_of(robot, COMMAND)
+        return (), NO_PART, NO_MESSAGES
+    return models_of(robot, COMMAND), part_of(robot, COMMAND), messages_of(robot)
 
 
-def _checked(path: str, skillsets: Sequence[Skillset], palettes: Sequence[Path], part: MissionPart) -> ModelFile:
+def _checked(path: str, skillsets: Sequence[Skillset], palettes: Sequence[Path], part: MissionPart, messages: Messages) -> ModelFile:
     file = ModelFile(path)
     try:
-        file.findings = findings_of(path, read_source(Path(path)), skillsets, palettes, part)
+        file.findings = findings_of(path, read_source(Path(path)), skillsets, palettes, part, messages)
     except FileError as error:
         file.findings = [Diagnostic("ALU001", error.problem.message, Span(path, 0, 0, 0))]
     for finding in file.findings:

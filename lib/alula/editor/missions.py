@@ -4,12 +4,14 @@ from __future__ import annotations
 
 import re
 from collections.abc import Iterator
+from contextlib import suppress
 from dataclasses import replace
 from pathlib import Path
 
 from alula.common.robots import RobotError, find_robot
 from alula.editor.completion import Completion, Place
 from alula.language.errors import Diagnostic, Severity
+from alula.language.messages import FieldError, messages_of
 from alula.language.models import ModelFile, check_files, models_in
 from alula.missions.check.findings import findings_of
 from alula.missions.check.skills import Skills
@@ -17,7 +19,7 @@ from alula.missions.filed.palette import mission_palette
 from alula.missions.filed.part import NO_PART, MissionPart
 from alula.missions.filed.world import FUNCTIONS
 from alula.missions.skill_types import SUCCESS_PORT
-from alula.model.model import ResultKind, Skill
+from alula.model.model import ResultKind, Skill, Skillset
 from alula.trees.palette import NodeType
 from alula.trees.reading import POSTCONDITIONS, PRECONDITIONS
 
@@ -28,7 +30,7 @@ _VALUE = re.compile(r"""([\w:]+)\s*=\s*(?:"([^"]*)|'([^']*))$""")
 _OPEN = re.compile(r"""<([\w.]+)((?:\s+[\w:]+\s*=\s*(?:"[^"]*"|'[^']*'))*)\s*([^<>]*)$""")
 _STATE = re.compile(r"(\w+)\.(\w+)\s*(?:==|!=)\s*'?\w*$")
 _CALL = re.compile(r"(\w+)\(\s*[\w.]*$")
-_MEMBER = re.compile(r"(\w+)\.\w*$")
+_MEMBER = re.compile(r"(\w+)\.((?:\w+\.)*)\w*$")
 _WORD = re.compile(r"[\w.]+")
 _SCRIPTS = frozenset({"code", "if", "otherwise", *PRECONDITIONS, *POSTCONDITIONS})
 
@@ -42,26 +44,28 @@ class Missions:
 
     def __init__(self, *, trusted: bool = False) -> None:
         self.trusted = trusted
-        self._read: dict[tuple[tuple[str, int], ...], Skills] = {}
+        self._read: dict[tuple[tuple[str, int], ...], tuple[Skillset, ...]] = {}
 
     def checked(self, path: str, text: str) -> ModelFile:
         """Return a mission with its findings."""
         file = ModelFile(path, text)
-        skillsets = tuple(self.skills(path).skillsets.values())
-        found = findings_of(path, text.encode("utf-8", "replace"), skillsets, part=self._part(path))
+        skills = self.skills(path)
+        skillsets = tuple(skills.skillsets.values())
+        found = findings_of(path, text.encode("utf-8", "replace"), skillsets, part=self._part(path), messages=skills.messages)
         file.findings = [_perhaps_own(one) for one in found] if self._has_untrusted_part(path) else found
         return file
 
     def skills(self, path: str) -> Skills:
         """Return the skills of the robot whose folder a file lies in, none where there is no robot."""
         try:
-            places = models_in(str(find_robot(Path(path).parent).skillsets))
+            robot = find_robot(Path(path).parent)
+            places = models_in(str(robot.skillsets))
             stamps = tuple((place, Path(place).stat().st_mtime_ns) for place in places)
         except (RobotError, OSError):
             return Skills(())
         if stamps not in self._read:
-            self._read = {stamps: Skills(skillset for file in check_files(places) for skillset in file.skillsets)}
-        return self._read[stamps]
+            self._read = {stamps: tuple(skillset for file in check_files(places) for skillset in file.skillsets)}
+        return Skills(self._read[stamps], messages_of(robot))
 
     def completions(self, file: ModelFile, place: Place) -> list[Completion]:
         """Return what may stand at a place."""
@@ -143,6 +147,11 @@ def _in_script(text: str, skills: Skills) -> Iterator[Completion]:
         yield from (Completion(name, "skill") for name in sorted(skills.names[FUNCTIONS[called[1]].kind]))
     elif member and member[1] in skills.skillsets:
         skillset = skills.skillsets[member[1]]
+        data, *path = member[2].split(".")[:-1] or [""]
+        if data:
+            fields = skills.messages.inside(skillset.data_index[data].type, path) if data in skillset.data_index else {}
+            yield from (Completion(name, "data", one.interface if one else "") for name, one in fields.items())
+            return
         yield from (Completion(name, "resource") for name in skillset.resource_index)
         yield from (Completion(name, "data") for name in skillset.data_index)
     else:
@@ -158,6 +167,11 @@ def _described(name: str, skills: Skills) -> str:
     known = skills.skillsets.get(skillset)
     if known and resource in known.resource_index:
         return f"resource {name} {{ {' '.join(known.resource_index[resource].states)} }}"
+    data, *path = resource.split(".")
+    if known and data in known.data_index:
+        with suppress(FieldError):
+            field = skills.messages.field(known.data_index[data].type, path)
+            return f"data {name}: {field.interface}" if field else f"data {name}"
     return ""
 
 

@@ -20,6 +20,7 @@ from alula.editor import names
 from alula.editor.completion import Place, completions
 from alula.editor.missions import SUFFIX, Missions
 from alula.editor.occurrences import Occurrence
+from alula.language.check.fields import check_fields
 from alula.language.errors import Diagnostic, Severity, has_errors
 from alula.language.layout import formatted
 from alula.language.lexer import MAX_CHARACTERS
@@ -73,7 +74,7 @@ class SkillLanguageServer(LanguageServer):
         known = self._files.get(uri)
         if known is None or known[0] != document.version:
             path, text = self._text(uri)
-            file = self.missions.checked(path, text) if is_mission(uri) else check_texts([ModelFile(path, text)])[0]
+            file = self.missions.checked(path, text) if is_mission(uri) else _checked(ModelFile(path, text))
             known = self._files[uri] = (document.version, file)
         return known[1]
 
@@ -91,6 +92,12 @@ class SkillLanguageServer(LanguageServer):
         """Return the path and the text of a document, whether it is open or not."""
         source = self.workspace.get_text_document(uri).source[: MAX_CHARACTERS + 1]
         return to_fs_path(uri) or Path(uri).name, source.removeprefix("\ufeff").replace("\r\n", "\n").replace("\r", "\n")
+
+
+def _checked(file: ModelFile) -> ModelFile:
+    check_texts([file])
+    check_fields(file)
+    return file
 
 
 def is_mission(uri: str) -> bool:

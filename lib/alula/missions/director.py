@@ -86,6 +86,19 @@ class DirectorMemory:
     stops: bool
 
 
+def halted(root: Behaviour) -> list[str]:
+    """Halt all that runs in a tree, whatever breaks on the way; return what did, in words."""
+    broken: list[str] = []
+    # The root halts what is below it, in the order of the tree. Where that breaks, the others are halted one by one, from the leaves up.
+    for node in (root, *root.iterate()):
+        try:
+            if node is root or node.status is Status.RUNNING:
+                node.stop(Status.INVALID)
+        except Exception as error:  # noqa: BLE001 - whatever breaks in a halt, no other skill may go on for that
+            broken.append(f"its halt raised {type(error).__name__}: {error}")
+    return list(dict.fromkeys(broken))
+
+
 class Director:
     """Waits for the robot, has the tree ticked, and knows the outcome. ``step`` is to be called at 10 Hz and after each event."""
 
@@ -176,13 +189,16 @@ class Director:
             return "the mission does not start"
         if self._stop is not None or self._mission.stopping:
             return "the robot is being stopped already"
-        self._abort_reason = reason
-        self._pause = None
-        self._mission.root.stop(Status.INVALID)
-        self._stop = self._mission.stop_here()
-        self._stop_watch = TreeWatch(self._stop)
-        self._phase = self._halt
+        self._leave(reason)
         return "the robot stops where it is"
+
+    def broken(self, reason: str) -> None:
+        """Leave a tree that has raised an error: the mission's, also on its way to rest, for what stops the robot; that one for good."""
+        if self._stop is None:
+            self._leave(reason)
+            return
+        self._abort_reason = "; then ".join([self._abort_reason, reason, *halted(self._stop)])
+        self._phase = self._settle
 
     def conditions(self) -> list[Condition]:
         """Return what the mission needs to start; nothing once it has started, or is over."""
@@ -201,6 +217,13 @@ class Director:
             return tree
         stop = self._stop_watch.look()
         return NodeView("aborted mission", "sequence", stop.status, self._abort_reason, "", (tree, stop))
+
+    def _leave(self, reason: str) -> None:
+        self._pause = None
+        self._abort_reason = "; then ".join([reason, *halted(self._mission.root)])
+        self._stop = self._mission.stop_here()
+        self._stop_watch = TreeWatch(self._stop)
+        self._phase = self._halt
 
     # --- phases ------------------------------------------------------------------------------------------------------
 

@@ -107,7 +107,7 @@ class MissionDriver:
         except Exception as error:  # noqa: BLE001 - whatever breaks in a tree, the robot has to come to rest
             reason = f"the tree raised {type(error).__name__}: {error}"
             self._say(reason)
-            self.director.abort(reason)
+            self.director.broken(reason)
         self._note_step()
 
     def _note_step(self) -> None:
@@ -175,7 +175,7 @@ class MissionDriver:
 
     def finish(self, end: End) -> None:
         """Write what is left to write, and show the tree no more."""
-        problem = "" if self._watched is None else self._watched.close()
+        problems = [] if self._watched is None else self._watched.close()
         if self.record is not None:
-            self.record.problems += [problem] if problem else []
+            self.record.problems += problems
             self.record.finish(end, self.director, self._clock_ns() / 1e9)

@@ -18,8 +18,8 @@ from alula.runtime.plain import to_plain
 from alula.trees.groot.watching import Watch
 from alula.trees.view import NodeView
 
-TREE_LOG = "mission.btlog"
-"""Of a mission that is a file."""
+TREE_LOG, STOP_LOG = "mission.btlog", "stop_here.btlog"
+"""Of a mission that is a file, and of what brought the robot to rest after it was left."""
 
 
 class MissionRecord:
@@ -76,12 +76,12 @@ class MissionRecord:
         content = {"skillset": skillset, "data": data, "value": to_plain(value), "stamp_s": stamp_ns / 1e9}
         self._writer.write(DATA, stamp_ns, content)
 
-    def log_tree(self, watch: Watch) -> None:
-        """Have the statuses of the tree's nodes logged, for Groot2 to replay."""
+    def log_tree(self, watch: Watch, name: str = TREE_LOG) -> None:
+        """Have the statuses of a tree's nodes logged, for Groot2 to replay."""
         try:
-            watch.log(self._out / TREE_LOG)
+            watch.log(self._out / name)
         except OSError as error:
-            self.problems.append(f"{TREE_LOG} could not be written: {error.strerror or error}")
+            self.problems.append(f"{name} could not be written: {error.strerror or error}")
 
     def abort(self, reason: str) -> None:
         """Write that the mission is told from outside to stop; to be called before it does."""

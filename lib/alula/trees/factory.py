@@ -17,7 +17,7 @@ from alula.trees.script import Program, ScriptError, parse
 from alula.trees.script.scope import Unknown
 from alula.trees.structure import verify
 from alula.trees.tree import Subtree, Tree
-from alula.trees.values import ANY, STRING
+from alula.trees.values import ANY, STRING, literal
 
 SUBTREE = NodeType("SubTree", Category.SUBTREE, {}, "Another tree of the files.", SubTree, CHILDREN[Category.SUBTREE])
 
@@ -139,21 +139,27 @@ def build_tree(
     enums: Mapping[str, float] | None = None,
     surroundings: Surroundings | None = None,
     blackboard: Blackboard | None = None,
+    after: int = 0,
 ) -> Tree:
-    """Build a tree of files that were verified, as `make_tree` does: for one that needs several of them."""
-    return _Builder(files, palette, Shared(clock), enums or {}, surroundings or Nothing()).tree(main or files.main, blackboard)
+    """Build a tree of files that were verified, as `make_tree` does: for one that needs several of them.
+
+    Its nodes have the uids behind ``after``.
+    """
+    return _Builder(files, palette, Shared(clock), enums or {}, surroundings or Nothing(), after).tree(main or files.main, blackboard)
 
 
 class _Builder:
     """Builds node by node; the limits on depth and number of nodes were verified."""
 
-    def __init__(self, files: TreeFiles, palette: Palette, shared: Shared, enums: Mapping[str, float], surroundings: Surroundings) -> None:
+    def __init__(
+        self, files: TreeFiles, palette: Palette, shared: Shared, enums: Mapping[str, float], surroundings: Surroundings, after: int
+    ) -> None:
         self._files = files
         self._palette = palette
         self._shared = shared
         self._enums = enums
         self._surroundings = surroundings
-        self._count = 0
+        self._count = after
         self._subtrees: list[Subtree] = []
 
     def tree(self, main: str, blackboard: Blackboard | None) -> Tree:
@@ -235,10 +241,10 @@ class _Builder:
 
 
 def _write(board: Blackboard, constants: Mapping[str, str]) -> None:
-    """Write what a subtree is given as plain text; these entries are its own, whatever is remapped."""
+    """Write what a subtree is given as plain text, a number as one; these entries are its own, whatever is remapped."""
     autoremap, board.autoremap = board.autoremap, False
     for name, text in constants.items():
-        board.set(name, text)
+        board.set(name, literal(text))
     board.autoremap = autoremap
 
 

@@ -300,10 +300,12 @@ class Action(Leaf):
         return self.on_start() if self.status is IDLE else self.status
 
     def halt(self) -> None:
-        """Have it interrupted while it runs."""
-        if self.status is RUNNING:
-            self.on_halted()
-        self.become(IDLE)
+        """Have it interrupted while it runs; it is idle then, whatever that raises."""
+        try:
+            if self.status is RUNNING:
+                self.on_halted()
+        finally:
+            self.become(IDLE)
 
     def on_start(self) -> Answer:
         """Begin; called in the first tick."""

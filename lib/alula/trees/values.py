@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+import re
 from collections.abc import Callable
 from dataclasses import dataclass, field
 
@@ -11,6 +12,21 @@ from alula.trees.status import ANSWERS, NAMES, Skipped, Status
 LARGEST_UINT = 2**32 - 1
 LARGEST_INT = 2**31 - 1
 BOOLEANS = {"0": False, "1": True, "false": False, "true": True, "False": False, "True": True, "FALSE": False, "TRUE": True}
+
+
+_WHOLE = re.compile(r"-?[0-9]{1,18}")
+_NUMBER = re.compile(r"-?(?:[0-9]+\.?[0-9]*|\.[0-9]+)(?:[eE][-+]?[0-9]+)?")
+_LONGEST = 400
+
+
+def literal(text: str) -> object:
+    """Return what plain text is to a script: the number that it is all of, else itself."""
+    if _WHOLE.fullmatch(text):
+        return int(text)
+    if len(text) > _LONGEST or not _NUMBER.fullmatch(text):
+        return text
+    number = float(text)
+    return number if math.isfinite(number) else text
 
 
 @dataclass(frozen=True, eq=False)

@@ -9,12 +9,15 @@ import pytest
 pytest.importorskip("py_trees")
 
 from alula.common.record import DATA, TREE, read_record
+from alula.common.robots import load_robot_folder
+from alula.language.messages import Messages, fields_of, messages_of
 from alula.language.models import ModelFile, check_texts
 from alula.missions.check.findings import findings_of
 from alula.missions.director import End, Outcome
 from alula.missions.filed.part import NO_PART
 from alula.missions.filed.plan import plan_of_file
 from alula.missions.mocked import MockedMission
+from alula.model.ros_types import RosType
 from alula.runtime.mock import load_behaviour
 from alula.trees.script import parse
 from alula.trees.script.scope import Unknown
@@ -167,3 +170,84 @@ def test_the_checker_knows_data(code, said):
     found = findings_of("m.xml", text_of(f'<{tag} code="{code}"/>').encode(), skillsets())
     assert [one.code for one in found] == (["ALU615"] if said else [])
     assert all(said in one.message for one in found)
+
+
+BATTERY = """
+# What is left.
+Header header
+float64 level            # 0 to 1
+float32[4] cells
+uint8 CHARGING=1
+uint8 state 1
+string<=20 maker "none"
+bool charging
+rover_msgs/Cell first
+other_msgs/Other other
+Cell[] all
+"""
+
+
+@pytest.fixture
+def messages(tmp_path):
+    """The message of the battery as a package of the robot's workspace has it."""
+    package = tmp_path / "ros2_ws/src/rover_msgs/msg"
+    package.mkdir(parents=True)
+    (package / "Battery.msg").write_text(BATTERY, encoding="utf-8")
+    (package / "Cell.msg").write_text("float64 volts\n", encoding="utf-8")
+    (tmp_path / "skillsets").mkdir()
+    (tmp_path / "skillsets/types.yaml").write_text("Battery: rover_msgs/Battery\n", encoding="utf-8")
+    (tmp_path / "robot.yaml").write_text("name: rover\n", encoding="utf-8")
+    return messages_of(load_robot_folder(tmp_path))
+
+
+@pytest.mark.parametrize(
+    ("condition", "code", "said", "cure"),
+    [
+        ("rover.battery.level &lt; 0.2", "", "", ""),
+        ("rover.battery.first.volts &lt; 3", "", "", ""),
+        ("rover.battery.maker == 'none'", "", "", ""),
+        ("rover.battery.charging == true", "", "", ""),
+        ("rover.battery.charging", "", "", ""),
+        ("rover.battery.state == 1", "", "", ""),
+        ("rover.battery.other.anything &lt; 3", "", "", ""),  # there is no file of that message
+        ("rover.battery.lvel &lt; 0.2", "ALU615", "rover_msgs/Battery has no field `lvel`", "did you mean `level`?"),
+        ("rover.battery.CHARGING == 1", "ALU615", "has no field `CHARGING`", "did you mean `charging`?"),
+        ("rover.battery.first.amps &lt; 3", "ALU615", "rover_msgs/Cell has no field `amps`", "there is `volts`"),
+        ("rover.battery.level.value &lt; 3", "ALU615", "float64 has no fields", ""),
+        ("rover.battery.first == 3", "ALU615", "`rover.battery.first` is no single value", "name a field"),
+        ("rover.battery.all == 3", "ALU615", "`rover.battery.all` is no single value", "name a field"),
+        ("rover.battery.all.volts == 3", "ALU615", "rover_msgs/Cell[] has no fields", ""),
+        (
+            "rover.battery.level == '0.2 m'",
+            "ALU605",
+            "is a number, and is compared with '0.2 m'",
+            "in the data's unit",
+        ),
+        ("rover.battery.charging == 'yes'", "ALU605", "is true or false, and is compared with 'yes'", ""),
+        ("3 &lt; rover.battery.maker", "ALU605", "`rover.battery.maker` is a text, and is compared with 3", "a text"),
+        ("rover.battery.state == FREE", "ALU605", "is data, and `FREE` is a resource's state", "quotes"),
+        ("rover.mode == 1", "ALU605", "`rover.mode` is a text, and is compared with 1", "a text"),
+        ("rover.level == 'low'", "ALU605", "`rover.level` is a number", ""),
+    ],
+)
+def test_the_checker_knows_the_fields_of_messages(condition, code, said, cure, messages):
+    found = findings_of("m.xml", text_of(f'<ScriptCondition code="{condition}"/>').encode(), skillsets(), messages=messages)
+    assert [one.code for one in found] == ([code] if code else [])
+    for one in found:
+        assert said in one.message
+        assert cure in one.hint
+        assert one.span.line == 1
+
+
+def test_a_definition_of_a_message_is_read_as_ros_reads_it():
+    fields = fields_of(BATTERY, "rover_msgs")
+    assert fields["header"] == RosType("std_msgs", "Header")
+    assert fields["all"] == RosType("rover_msgs", "Cell", array=True)
+    assert fields["maker"] == RosType("", "string")
+    assert (fields["cells"], "CHARGING" in fields, "none" in fields) == (None, False, False)
+
+
+@pytest.mark.parametrize("garbage", ["\x00\xff", "float64", "= = =", "a/b/c d", "../etc x", "float64 x\r\n" * 3])
+def test_a_definition_that_is_none_says_nothing(garbage):
+    assert set(fields_of(garbage, "rover_msgs")) <= {"x", "d"}
+    assert Messages({}).field("Battery", ["level"]) is None

@@ -51,6 +51,28 @@ def test_values_are_results_and_names_of_scripts(folder):
     assert completed(folder, '<Sleep msec="|"/>') == {}
 
 
+def test_fields_of_data_are_offered_and_told(folder):
+    model = ROBOT.replace("skillset drone {", "type Battery\nskillset drone {\n  data battery: Battery\n  data height: float64", 1)
+    (folder / "skillsets" / "drone.rl").write_text(model)
+    (folder / "skillsets" / "types.yaml").write_text("Battery: drone_msgs/Battery\n")
+    package = folder / "ros2_ws/src/drone_msgs/msg"
+    package.mkdir(parents=True)
+    (package / "Battery.msg").write_text("float64 level\nCell first\nstring[] makers\n")
+    (package / "Cell.msg").write_text("float64 volts\n")
+    assert set(completed(folder, '<ScriptCondition code="drone.|"/>')) == {"axes", "flight", "battery", "height"}
+    offered = completed(folder, '<ScriptCondition code="drone.battery.|"/>')
+    assert offered == {"level": "float64", "first": "drone_msgs/Cell", "makers": "string[]"}
+    assert completed(folder, '<ScriptCondition code="drone.battery.first.vo|"/>') == {"volts": "float64"}
+    for nothing in ("drone.height.", "drone.battery.level.", "drone.battery.makers.", "drone.nothing."):
+        assert completed(folder, f'<ScriptCondition code="{nothing}|"/>') == {}
+    missions = Missions()
+    file = missions.checked(
+        str(folder / "missions" / "m.xml"), whole('<ScriptCondition code="drone.battery.first.volts &lt; drone.height"/>')
+    )
+    told = [missions.description(file, Place(3, file.line(3).index(word) + 1))[0] for word in ("battery", "height")]
+    assert told == ["data drone.battery.first.volts: float64", "data drone.height: float64"]
+
+
 def test_a_name_is_told_by_its_model(folder):
     missions = Missions()
     file = missions.checked(str(folder / "missions" / "m.xml"), whole('<drone.hover duration="1" _skipIf="drone.flight == IN_AIR"/>'))

@@ -69,6 +69,26 @@ def test_a_skill_ends_as_its_model_or_the_file_says_and_writes_outputs(success, 
     assert (board.get("why"), board.get("force")) == (result, 2.5)
 
 
+@pytest.mark.parametrize(("end", "outcome"), [(None, "INTERRUPTED"), ("DROPPED", "DROPPED"), ("HELD", "HELD")])
+def test_a_skill_that_is_halted_is_interrupted_unless_it_had_ended_since_the_last_tick(end, outcome):
+    arm = Arm()
+    tree = tree_of(
+        '<ReactiveSequence><arm.hand state="OPEN"/><arm.grip tries="3" outcome="{why}" force="{force}"/></ReactiveSequence>', arm
+    )
+    tree.tick()
+    ((handle, _),) = arm.started
+    if end:
+        handle.end(ExecutionState.TERMINATED, end, "", {"force": 2.5})
+    arm.resources["hand"] = "CLOSED"
+    assert tree.tick() is FAILURE
+    board = tree.root.blackboard
+    assert (board.get("why"), board.get("force")) == (outcome, 2.5 if end else None)
+    if end is None:  # what comes of it later is not told: the tree has gone on
+        handle.end(ExecutionState.TERMINATED, "HELD", "")
+        tree.tick()
+        assert board.get("why") == "INTERRUPTED"
+
+
 def test_a_resource_is_a_condition():
     arm = Arm()
     tree = tree_of('<arm.hand state="CLOSED"/>', arm)

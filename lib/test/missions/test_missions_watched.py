@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import os
 import signal
+import struct
 import subprocess
 import sys
 from pathlib import Path
@@ -19,7 +20,7 @@ from alula.common.record import TREE, read_record
 from alula.common.scenarios import scenarios_folder
 from alula.missions.director import Outcome
 from alula.missions.mocked import MockedMission
-from alula.missions.record import TREE_LOG
+from alula.missions.record import STOP_LOG, TREE_LOG
 from alula.trees.groot.address import Address, ServerError
 from alula.trees.groot.btlog import Log, read_log
 from alula.trees.groot.protocol import Status
@@ -86,6 +87,39 @@ def test_what_an_abort_halts_is_in_the_log(tmp_path: Path) -> None:
     log = read_log(tmp_path / TREE_LOG)
     map_uid = nodes(log).index("map") + 1
     assert [one.status for one in log.transitions if one.uid == map_uid] == [Status.RUNNING, Status.IDLE]
+
+
+def test_after_an_abort_viewers_and_a_log_have_what_stops_the_robot(tmp_path: Path) -> None:
+    pytest.importorskip("zmq")
+    from trees_viewer import Viewer
+
+    address = Address(port=0).looked_up()
+    flown = mission("mapping", tmp_path, groot=str(address))
+    viewer = Viewer(address)
+    numbers, xml, statuses = [], [], []
+
+    def look() -> None:
+        header, text = viewer.ask("T")
+        numbers.append(header[6:])
+        xml.append(text.decode())
+        statuses.append(dict(struct.iter_unpack("<HB", viewer.ask("S")[1])))
+
+    for at_s in (HALFWAY_S, HALFWAY_S + 1.0):
+        flown.world.clock.after(at_s, look)
+    flown.world.clock.after(HALFWAY_S + 0.5, lambda: flown.abort("told to end"))
+    assert flown.run().outcome is Outcome.ABORTED
+    viewer.socket.close()
+    assert numbers[0] != numbers[1], "another tree has another number"
+    assert ['ID="mapping"' in text for text in xml] == [True, False]
+    assert ['ID="stop_here"' in text for text in xml] == [True, True]
+    assert not statuses[0].keys() & statuses[1].keys(), "who goes on with the tree of before takes none of the new nodes for its own"
+    assert Status.RUNNING in statuses[1].values()
+    log = read_log(tmp_path / STOP_LOG)
+    assert log.xml == xml[1]
+    assert {one.uid for one in log.transitions} <= statuses[1].keys()
+    last = {one.uid: one.status for one in log.transitions}
+    assert last[min(last)] in {Status.SUCCESS, Status.IDLE}
+    assert any(one.status is Status.SUCCESS for one in log.transitions)
 
 
 def test_a_log_that_can_not_be_written_is_a_problem_of_the_record_and_no_end(tmp_path: Path) -> None:

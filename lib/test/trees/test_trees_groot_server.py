@@ -32,8 +32,8 @@ class Rig:
         self.values = {"x": 1, "height": 2.5, "third": 1 / 3, "far": 1e300, "names": ["a", None, True]}
         self.values |= {"at": {"z": 1, "y": 2}, "big": 1 << 70}
         self.states = NodeStates([1, 258], lambda: self.now_us)
-        shown = Shown("<root/>", self.states, {"Main": lambda: self.values, "Sub::4": dict})
-        self.server = Server(shown, Address(port=0))
+        self.shown = Shown("<root/>", self.states, {"Main": lambda: self.values, "Sub::4": dict})
+        self.server = Server(self.shown, Address(port=0))
 
     def change(self, uid: int, previous: Status, status: Status) -> None:
         self.states.take([(uid, previous, status)], self.now_us)
@@ -182,7 +182,7 @@ def test_ports_that_are_taken_are_named(rig):
     with pytest.raises(
         ServerError, match=rf"on 127.0.0.1, ports {address.port} and {address.port + 1}: Address already in use; choose others"
     ):
-        Server(rig.server.shown, address)
+        Server(rig.shown, address)
 
 
 def test_it_listens_on_loopback_unless_told_otherwise():
@@ -194,9 +194,19 @@ def test_it_listens_on_loopback_unless_told_otherwise():
             Address.read(text)
 
 
+def test_another_tree_is_served_by_another_number(rig, viewer):
+    before = viewer.ask("T")[0][6:]
+    rig.server.show(Shown("<other/>", NodeStates([7], lambda: 0), {}))
+    head, xml = viewer.ask("T")
+    assert xml == b"<other/>"
+    assert head[6:] != before
+    statuses = viewer.ask("S")
+    assert statuses == [statuses[0][:6] + head[6:], b"\x07\x00" + IDLE]
+
+
 def test_a_server_that_is_closed_leaves_nothing(rig):
     rig.server.close()
     rig.server.close()
     assert "groot" not in {thread.name for thread in threading.enumerate()}
-    again = Server(rig.server.shown, rig.server.address)
+    again = Server(rig.shown, rig.server.address)
     again.close()

@@ -24,6 +24,36 @@ def test_sleep_runs_for_its_time_and_anew_after_a_halt():
     assert [tree.tick(at) for at in (210, 260, 310)] == ["RUNNING", "RUNNING", "SUCCESS"]
 
 
+@pytest.mark.parametrize(
+    ("given", "condition"),
+    [
+        ("42", "x + 1 == 43"),
+        ("-3", "x + 1 == -2"),
+        ("3.14", "x &gt; 3.0 &amp;&amp; x * 2 == 6.28"),
+        ("1e3", "x / 2 == 500"),
+        (".5", "x == 0.5"),
+        ("hello", "x == 'hello'"),
+        ("1;2", "x == '1;2'"),
+        (" 1", "x == ' 1'"),
+        ("+1", "x == '+1'"),
+        ("1 m", "x == '1 m'"),
+        ("inf", "x == 'inf'"),
+        ("1e999", "x == '1e999'"),
+        ("", "x == ''"),
+    ],
+)
+def test_a_number_given_to_a_subtree_is_one_to_its_scripts(given, condition):
+    below = f'<BehaviorTree ID="below"><ScriptCondition code="{condition}"/></BehaviorTree>'
+    assert Played(f'<SubTree ID="below" x="{given}"/>', more=below).tick() == "SUCCESS"
+
+
+@pytest.mark.parametrize(("given", "port"), [("500", "msec"), ("0.5e3", "msec")])
+def test_a_number_given_to_a_subtree_is_read_by_ports_of_any_number(given, port):
+    below = f'<BehaviorTree ID="below"><Sleep {port}="{{x}}"/></BehaviorTree>'
+    tree = Played(f'<SubTree ID="below" x="{given}"/>', more=below)
+    assert [tree.tick(at) for at in (0, 499, 500)] == ["RUNNING", "RUNNING", "SUCCESS"]
+
+
 def test_delay_ticks_its_child_after_its_time():
     tree = Played('<Delay delay_msec="100"><Act name="a"/></Delay>', {"a": ["RUNNING", "SUCCESS"]})
     assert [(tree.tick(at), tree.calls) for at in (0, 99, 100, 101)] == [

@@ -8,6 +8,7 @@ from dataclasses import replace
 from pathlib import Path
 
 from alula.language.errors import Diagnostic, Severity
+from alula.language.messages import NO_MESSAGES, Messages
 from alula.language.models import ModelFile
 from alula.missions.check.mission import check_mission
 from alula.missions.filed.part import NO_PART, MissionPart
@@ -20,11 +21,16 @@ _WORD = re.compile(r"""<?[^\s=<>"'/]+""")
 
 
 def findings_of(
-    path: str, source: bytes, skillsets: Sequence[Skillset], palettes: Sequence[Path] = (), part: MissionPart = NO_PART
+    path: str,
+    source: bytes,
+    skillsets: Sequence[Skillset],
+    palettes: Sequence[Path] = (),
+    part: MissionPart = NO_PART,
+    messages: Messages = NO_MESSAGES,
 ) -> list[Diagnostic]:
     """Return what is wrong with a mission; what keeps it from being read at all is the only finding then (ALU0..)."""
     try:
-        problems = check_mission(Path(path), source, skillsets, palettes, part)
+        problems = check_mission(Path(path), source, skillsets, palettes, part, messages)
     except FileError as error:
         problem = error.problem
         code = problem.code if problem.code.startswith("ALU0") else "ALU004"

@@ -5,6 +5,8 @@ from __future__ import annotations
 from collections.abc import Sequence
 from pathlib import Path
 
+from alula.language.messages import NO_MESSAGES, Messages
+from alula.missions.check.names import NameRules
 from alula.missions.check.rules import SkillRules
 from alula.missions.check.skills import Skills, SkillTraits
 from alula.missions.filed.palette import mission_palette
@@ -18,19 +20,26 @@ from alula.trees.reading import TreeFiles, read_models, read_text
 
 
 def check_mission(
-    path: Path, source: str | bytes, skillsets: Sequence[Skillset], palettes: Sequence[Path] = (), part: MissionPart = NO_PART
+    path: Path,
+    source: str | bytes,
+    skillsets: Sequence[Skillset],
+    palettes: Sequence[Path] = (),
+    part: MissionPart = NO_PART,
+    messages: Messages = NO_MESSAGES,
 ) -> list[Problem]:
-    """Return what is wrong with a mission, each thing once; ``source`` is what its file has, or will have, ``part`` what the robot adds.
+    """Return what is wrong with a mission, each thing once.
+
+    ``source`` is what its file has, or will have, ``part`` what the robot adds, ``messages`` what is known of the fields of its data.
 
     Raises:
         FileError: the file, one that it includes, or a palette can't be read or is no XML of trees.
     """
     found: list[Problem] = []
     files = read_text(source, str(path), found.append)
-    skills = Skills(skillsets)
+    skills = Skills(skillsets, messages)
     rules = SkillRules(skills)
     known = palette_for(files, skillsets, palettes, part)
-    own = (rules.units, rules.results, rules.resources, rules.names)
+    own = (rules.units, rules.results, rules.resources, NameRules(skills).names)
     found += check(files, known, SkillTraits(skills), own, foreign=bool(palettes))
     endless = [problem for problem in found if problem.code.startswith("ALU0")]
     if endless:

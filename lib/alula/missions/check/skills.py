@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Collection, Iterable, Mapping
 from functools import cached_property
 
+from alula.language.messages import NO_MESSAGES, Messages
 from alula.missions.skill_types import SEPARATOR, SUCCESS_PORT
 from alula.model.model import ResultKind, Skill, Skillset
 from alula.trees.check.sites import Site
@@ -13,9 +14,10 @@ from alula.trees.node import pointer
 
 
 class Skills:
-    """The skills of some skillsets."""
+    """The skills of some skillsets; ``messages``: what is known of their data's fields."""
 
-    def __init__(self, skillsets: Iterable[Skillset]) -> None:
+    def __init__(self, skillsets: Iterable[Skillset], messages: Messages = NO_MESSAGES) -> None:
+        self.messages = messages
         self.skillsets = {skillset.name: skillset for skillset in skillsets}
 
     def get(self, name: str) -> Skill | None:

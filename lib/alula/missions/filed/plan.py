@@ -8,8 +8,11 @@ The model of the main tree tells its parameters (input ports with a number as th
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from pathlib import Path
+
+from py_trees.behaviour import Behaviour
+from py_trees.behaviours import Success
 
 from alula.missions.blackboard import Blackboard
 from alula.missions.conditions import Condition, condition
@@ -35,6 +38,10 @@ READY, STOP_HERE = "ready", "stop_here"
 DEGRADED, STOPPING = "degraded", "stopping"
 
 
+def ignore(_tree: Tree) -> None:
+    """Take no notice."""
+
+
 class FiledMission:
     """The tree of a file, and what its end means."""
 
@@ -42,6 +49,8 @@ class FiledMission:
         self._make = make
         self._board = make.board
         self.tree = make.tree("")
+        self.on_stop: Callable[[Tree], None] = ignore
+        """Takes the tree that is ticked from now on instead of the mission's."""
         self.root: Node = self.tree.root
         self._needs = [node for node in make.tree(READY).nodes if isinstance(node, Needs)] if READY in make.files.trees else []
 
@@ -63,13 +72,17 @@ class FiledMission:
         ]
         return answers + [Condition(node.name, node.unmet) for node in self._needs]
 
-    def stop_here(self) -> Node:
-        """Make a tree that brings the robot to rest where it is."""
-        return self.stop_tree().root
+    def stop_here(self) -> Behaviour:
+        """Make a tree that brings the robot to rest where it is; where the file has none, there is nothing to add to the halt."""
+        if STOP_HERE not in self._make.files.trees:
+            return Success(STOP_HERE)
+        tree = self.stop_tree()
+        self.on_stop(tree)
+        return tree.root
 
     def stop_tree(self) -> Tree:
-        """Make the tree `stop_here`, whole."""
-        return self._make.tree(STOP_HERE)
+        """Make the tree `stop_here`, whole; a viewer that goes on with the mission's takes none of its nodes for another."""
+        return self._make.tree(STOP_HERE, after=len(self.tree.nodes))
 
 
 class Maker:
@@ -88,11 +101,11 @@ class Maker:
             if data:
                 crew.clients[skillset].follow(data)
 
-    def tree(self, name: str) -> Tree:
-        """Make one; that of the file where no name is given."""
+    def tree(self, name: str, after: int = 0) -> Tree:
+        """Make one; that of the file where no name is given. Its nodes have the uids behind ``after``."""
         world = World(self.crew.clients, self.crew.memory, self._resources, self._data)
-        files, board = self.files, self.board
-        tree = build_tree(files, self._palette, self._clock_ns, main=name, enums=self._enums, surroundings=world, blackboard=board)
+        files, palette, board = self.files, self._palette, self.board
+        tree = build_tree(files, palette, self._clock_ns, main=name, enums=self._enums, surroundings=world, blackboard=board, after=after)
         for node in tree.nodes:
             if isinstance(node, SkillNode):
                 world.leaves.setdefault(node.wiring.type.name, []).append(node)

@@ -13,7 +13,7 @@ from alula.model.execution_state import ExecutionState
 from alula.model.model import Resource, Skill, Skillset
 from alula.trees.node import Action, Condition, Wiring
 from alula.trees.palette import NodeType, Palette
-from alula.trees.status import FAILURE, IDLE, SUCCESS, Answer
+from alula.trees.status import FAILURE, IDLE, RUNNING, SUCCESS, Answer
 
 
 @dataclass(frozen=True)
@@ -30,7 +30,8 @@ class SkillNode(Action):
     A result that the model calls a success is one, or those that ``success`` names; every other end is a failure. ``outcome`` is written
     when it has ended: the result, or the precondition or invariant that did not hold, or the state. A halt asks for the interruption and
     does not wait: until it has ended, a start in the same skillset waits, RUNNING, so nothing is left behind; with ``halt_waits``
-    a start in any skillset does.
+    a start in any skillset does. The tree goes on without the end of what it halts, so ``outcome`` is INTERRUPTED from the halt on,
+    whatever comes of it; only what had ended since the last tick has its own outcome and outputs.
     """
 
     crew: Crew
@@ -60,17 +61,24 @@ class SkillNode(Action):
         """Follow it."""
         answer: Answer = self.leaf.update()
         self.feedback_message = self.leaf.feedback_message
-        handle = self.leaf.handle
-        if handle is not None and handle.done:
-            self.put(OUTCOME_PORT, handle.result or handle.state.value)
-            for name, value in handle.outputs.items():
-                self.put(name, value)
+        if answer is not RUNNING:
+            self._tell_end()
         return answer
 
     def on_halted(self) -> None:
-        """Ask for its interruption."""
+        """Ask for its interruption, and say so; ``_onHalted`` finds it said."""
         self.leaf.terminate(IDLE)
         self.feedback_message = self.leaf.feedback_message
+        self._tell_end()
+
+    def _tell_end(self) -> None:
+        handle = self.leaf.handle
+        if handle is None or not handle.done:
+            self.put(OUTCOME_PORT, ExecutionState.INTERRUPTED.value)
+            return
+        self.put(OUTCOME_PORT, handle.result or handle.state.value)
+        for name, value in handle.outputs.items():
+            self.put(name, value)
 
     @property
     def running(self) -> bool:

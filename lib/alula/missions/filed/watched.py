@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from alula.missions.director import Mission
 from alula.missions.filed.plan import FiledMission
-from alula.missions.record import MissionRecord
+from alula.missions.record import STOP_LOG, MissionRecord
 from alula.missions.skillset import Clock
 from alula.trees.groot.address import Address, ServerError
 from alula.trees.groot.watching import Watch
@@ -12,13 +12,16 @@ from alula.trees.tree import Tree
 
 
 class WatchedTree:
-    """A tree that is logged where there is a record, and served where viewers are expected.
+    """A mission's tree that is logged where there is a record, and served where viewers are expected; after an abort what stops the robot.
 
     ``groot``: ``HOST:PORT``; empty: no viewers. Raises ServerError.
     """
 
-    def __init__(self, tree: Tree, clock_ns: Clock, record: MissionRecord | None, groot: str) -> None:
-        self._watch = Watch(tree, lambda: clock_ns() // 1000)
+    def __init__(self, mission: FiledMission, clock_ns: Clock, record: MissionRecord | None, groot: str) -> None:
+        self._clock_us = lambda: clock_ns() // 1000
+        self._record = record
+        self._problems: list[str] = []
+        self._watch = Watch(mission.tree, self._clock_us)
         self._server = None
         if groot:
             try:
@@ -28,20 +31,35 @@ class WatchedTree:
             self._server = Server(self._watch.shown, Address.read(groot).looked_up())
         if record is not None:
             record.log_tree(self._watch)
+        mission.on_stop = self._follow
 
     def commit(self) -> None:
         """Hand on what a step has changed."""
         self._watch.commit()
 
-    def close(self) -> str:
-        """End both; return what went wrong with the log."""
+    def close(self) -> list[str]:
+        """End both; return what went wrong with logs."""
         if self._server is not None:
             self._server.close()
-        return self._watch.close()
+        self._close_watch()
+        return self._problems
+
+    def _follow(self, stop: Tree) -> None:
+        self._close_watch()
+        self._watch = Watch(stop, self._clock_us)
+        if self._record is not None:
+            self._record.log_tree(self._watch, STOP_LOG)
+        if self._server is not None:
+            self._server.show(self._watch.shown)
+
+    def _close_watch(self) -> None:
+        problem = self._watch.close()
+        if problem:
+            self._problems.append(problem)
 
 
 def watched(mission: Mission, clock_ns: Clock, record: MissionRecord | None, groot: str) -> WatchedTree | None:
     """Return what shows the tree; None where nobody sees it. Raises ServerError."""
     if not isinstance(mission, FiledMission) or not (groot or record is not None):
         return None
-    return WatchedTree(mission.tree, clock_ns, record, groot)
+    return WatchedTree(mission, clock_ns, record, groot)

@@ -20,7 +20,6 @@ class Scripts:
 
     def __init__(self) -> None:
         self._programs: dict[int, Program | None] = {}
-        self._texts: dict[str, Program] = {}
         self._kept: list[Attribute] = []
         self.problems: list[Problem] = []
 
@@ -33,7 +32,7 @@ class Scripts:
 
     def _read(self, attribute: Attribute) -> Program | None:
         try:
-            program = self._texts.get(attribute.value) or self._texts.setdefault(attribute.value, parse(attribute.value))
+            program = parse(attribute.value)
         except ScriptError as error:
             code = "ALU008" if error.excess else "ALU614"
             self.problems.append(in_value(code, attribute, (error.offset, error.end), f"the script: {error.message}", error.cure))

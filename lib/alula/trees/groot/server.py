@@ -12,6 +12,7 @@ from __future__ import annotations
 import os
 import uuid
 from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass, field
 from threading import Thread
 
 import zmq
@@ -29,7 +30,15 @@ NO_HOOKS = "a mission takes no breakpoints and no results from a viewer"
 NO_HOOK = "Node ID not found"
 TWO_PARTS = "must be 2 parts message"
 
-Handler = Callable[["Server", str], list[bytes]]
+Handler = Callable[[Shown, str], list[bytes]]
+
+
+@dataclass(frozen=True)
+class _Served:
+    """What is served: a tree, and the number by which viewers tell it from another one."""
+
+    shown: Shown
+    number: bytes = field(default_factory=lambda: uuid.uuid4().bytes)
 
 
 class Server:
@@ -37,8 +46,7 @@ class Server:
 
     def __init__(self, shown: Shown, address: Address | None = None) -> None:
         """Raises ServerError when the ports can't be had."""
-        self.shown = shown
-        self._tree = uuid.uuid4().bytes
+        self._served = _Served(shown)
         self._context = zmq.Context()
         self._replies = self._socket(zmq.REP)
         self._publisher = self._socket(zmq.PUB)
@@ -47,6 +55,10 @@ class Server:
         self._closing.bind("inproc://closing")
         self._thread = Thread(target=self._serve, name="groot", daemon=True)
         self._thread.start()
+
+    def show(self, shown: Shown) -> None:
+        """Serve another tree from now on, by another number: viewers ask for it anew."""
+        self._served = _Served(shown)
 
     def close(self) -> None:
         """End; viewers that wait for a reply get none."""
@@ -92,46 +104,49 @@ class Server:
 
     def _answer(self, parts: Sequence[bytes]) -> list[bytes]:
         try:
-            header = Header.read(parts[0])
-            return [header.reply(self._tree), *self._content(header.request, parts[1:])]
+            header, served = Header.read(parts[0]), self._served
+            return [header.reply(served.number), *_content(served.shown, header.request, parts[1:])]
         except ProtocolError as error:
             return [REFUSAL, str(error).encode()]
         except Exception as error:  # noqa: BLE001 - what one viewer asks for must not end the service of the others
             return [REFUSAL, f"{type(error).__name__}: {error}".encode()]
 
-    def _content(self, request: Request, more: Sequence[bytes]) -> list[bytes]:
-        if request in WITH_MORE and len(more) != 1:
-            raise ProtocolError(TWO_PARTS)
-        return HANDLERS[request](self, more[0].decode("utf-8", "replace") if more else "")
 
-    def _values(self, names: str) -> list[bytes]:
-        wanted = {name: self.shown.values[name] for name in names.split(";") if name in self.shown.values}
-        return [pack_values({name: values() for name, values in wanted.items()})]
+def _content(shown: Shown, request: Request, more: Sequence[bytes]) -> list[bytes]:
+    if request in WITH_MORE and len(more) != 1:
+        raise ProtocolError(TWO_PARTS)
+    return HANDLERS[request](shown, more[0].decode("utf-8", "replace") if more else "")
 
-    def _record(self, command: str) -> list[bytes]:
-        if command == "start":
-            return [str(self.shown.states.start()).encode()]
-        if command == "stop":
-            self.shown.states.stop()
-        return []
+
+def _values(shown: Shown, names: str) -> list[bytes]:
+    wanted = {name: shown.values[name] for name in names.split(";") if name in shown.values}
+    return [pack_values({name: values() for name, values in wanted.items()})]
+
+
+def _record(shown: Shown, command: str) -> list[bytes]:
+    if command == "start":
+        return [str(shown.states.start()).encode()]
+    if command == "stop":
+        shown.states.stop()
+    return []
 
 
 def _refuse(sentence: str) -> Handler:
-    def refuse(_server: Server, _more: str) -> list[bytes]:
+    def refuse(_shown: Shown, _more: str) -> list[bytes]:
         raise ProtocolError(sentence)
 
     return refuse
 
 
 HANDLERS: Mapping[Request, Handler] = {
-    Request.FULL_TREE: lambda server, _: [server.shown.xml.encode()],
-    Request.STATUS: lambda server, _: [server.shown.states.codes()],
-    Request.BLACKBOARD: Server._values,  # noqa: SLF001
-    Request.TOGGLE_RECORDING: Server._record,  # noqa: SLF001
-    Request.GET_TRANSITIONS: lambda server, _: [server.shown.states.fetch()],
-    Request.HOOKS_DUMP: lambda _server, _: [b"[]"],
-    Request.REMOVE_ALL_HOOKS: lambda _server, _: [],
-    Request.DISABLE_ALL_HOOKS: lambda _server, _: [],
+    Request.FULL_TREE: lambda shown, _: [shown.xml.encode()],
+    Request.STATUS: lambda shown, _: [shown.states.codes()],
+    Request.BLACKBOARD: _values,
+    Request.TOGGLE_RECORDING: _record,
+    Request.GET_TRANSITIONS: lambda shown, _: [shown.states.fetch()],
+    Request.HOOKS_DUMP: lambda _shown, _: [b"[]"],
+    Request.REMOVE_ALL_HOOKS: lambda _shown, _: [],
+    Request.DISABLE_ALL_HOOKS: lambda _shown, _: [],
     Request.HOOK_INSERT: _refuse(NO_HOOKS),
     Request.HOOK_REMOVE: _refuse(NO_HOOK),
     Request.BREAKPOINT_UNLOCK: _refuse(NO_HOOK),

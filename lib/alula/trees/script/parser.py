@@ -7,6 +7,7 @@ from __future__ import annotations
 
 import math
 from dataclasses import dataclass, field
+from functools import lru_cache
 
 from alula.trees.script import portability
 from alula.trees.script.errors import ScriptError
@@ -37,8 +38,12 @@ LEVELS = {
 _WORDS = {"and": "&&", "or": "||", "not": "!", "xor": "^", "True": "true", "False": "false"}
 
 
+@lru_cache(maxsize=256)
 def parse(text: str) -> Program:
-    """Read a script; raise ScriptError with the place of the first thing that is wrong. An empty script is wrong, too."""
+    """Read a script; raise ScriptError with the place of the first thing that is wrong. An empty script is wrong, too.
+
+    A program keeps nothing of its runs, so equal texts share one: a subtree that is used often is read once.
+    """
     return _Parser(text).program()
 
 

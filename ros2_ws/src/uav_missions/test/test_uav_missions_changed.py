@@ -35,7 +35,7 @@ class Robot:
             assert text.count(old) == 1, old
             text = text.replace(old, new)
         self.file.write_text(text, encoding="utf-8")
-        assert check.main([str(self.file)]) == 0
+        assert check.main([str(self.file), "--time", "4"]) == 0
 
     def fly(self, *faults: str) -> tuple[dict, dict]:
         """Fly it over mocks; return summary and mission."""
@@ -58,8 +58,8 @@ def targets(summary):
 
 def test_a_third_height(robot, capsys):
     robot.change(CHANGES[0])
-    # A slow machine has not looked at all runs when the time is over; that is a note, and no finding.
-    assert re.search(r"inspection\.xml: ok(, 1 note)?\n$", capsys.readouterr().out)
+    # What the file accepts is a note, and so is that not all runs were looked at in the time.
+    assert re.search(r"inspection\.xml: ok, [12] notes?\n$", capsys.readouterr().out)
     summary, mission = robot.fly()
     assert (summary["outcome"], mission["waypoints"], mission["waypoints_reached"]) == ("accomplished", 15, 15)
     assert targets(summary) == [3.0] * 5 + [7.0] * 5 + [10.0] * 5

@@ -13,12 +13,14 @@ import time
 import pytest
 
 pytest.importorskip("rclpy")
+pytest.importorskip("btview")
 
 from std_msgs.msg import Header
 from std_srvs.srv import SetBool
 from uav_skills_rig import Rig
 
 from alula.common.record import EVENTS, OPERATOR, TREE, read_record
+from alula.trees.groot.address import Address
 
 CLOCKS_APART_S = 0.1
 """Managers under load stamp by a clock message that is some ticks old."""
@@ -47,10 +49,13 @@ class Mission:
             "--world",
             str(out / "wanted.json"),
         ]
+        self.shown_at = Address(port=0).looked_up()
         self._ticked_s, self._heard_at_s = math.inf, 0.0
         self._heartbeat = rig.caller.create_subscription(Header, "/mission/heartbeat", self._hear, 10)
         rig.followers.append(self._heard_s)
-        self.process = subprocess.Popen([*command, "--ros-args", "-p", "use_sim_time:=true"], env=dict(os.environ))
+        self.process = subprocess.Popen(
+            [*command, "--ros-args", "-p", "use_sim_time:=true", "-p", f"groot:={self.shown_at.port}"], env=dict(os.environ)
+        )
 
     def _hear(self, heartbeat: Header) -> None:
         self._ticked_s, self._heard_at_s = heartbeat.stamp.sec + heartbeat.stamp.nanosec * 1e-9, time.monotonic()
@@ -78,6 +83,16 @@ class Mission:
     def read(self, name: str) -> dict:
         return json.loads((self.out / name).read_text())
 
+    def seen(self) -> dict[int, str]:
+        """Return the status of each node by its uid, as btview sees it now."""
+        words = ["snapshot", "--uid", "--no-color", "--ascii", "--timeout", "20", "--port", str(self.shown_at.port)]
+        wide = {**os.environ, "COLUMNS": "200"}
+        snapshot = subprocess.run(
+            [sys.executable, "-m", "btview", *words], env=wide, capture_output=True, text=True, check=True, timeout=60
+        )
+        rows = [line.split("#")[1].split() for line in snapshot.stdout.splitlines() if "#" in line]
+        return {int(row[0]): row[-1] for row in rows}
+
     def last_tree(self) -> dict:
         return [dict(entry.value) for entry in read_record(self.out) if entry.topic == TREE][-1]
 
@@ -86,6 +101,11 @@ class Mission:
 
     def executions(self, since: int = 0) -> list[tuple[str, str]]:
         return [(event["skill"], event["result"] or event["state"]) for event in self.events()[since:] if event["kind"] == "EXECUTION"]
+
+
+def walk(node: dict) -> list[dict]:
+    """Return a tree's nodes, by their uids from 1."""
+    return [node, *(below for child in node["children"] for below in walk(child))]
 
 
 @pytest.fixture(scope="module")
@@ -166,6 +186,7 @@ def test_a_pause_holds_the_vehicle_on_its_way_and_the_mission_goes_on(mission):
     answer = set_paused(mission, paused=True)
     assert (answer.success, answer.message.startswith("the mission is paused: ")) == (True, True)
     mission.until(lambda: functional.names()[-1] == "hover")
+    seen = mission.seen()
     place, paused_s = list(functional.vehicle.place), functional.now_s
     mission.until(lambda: functional.now_s > paused_s + 3.0)
     assert list(functional.vehicle.place) == pytest.approx(place, abs=0.3)
@@ -176,7 +197,14 @@ def test_a_pause_holds_the_vehicle_on_its_way_and_the_mission_goes_on(mission):
     assert mission.exit_code() == 0
     record = mission.read("mission.json")
     assert (record["outcome"], record["waypoints_reached"]) == ("accomplished", 3)
-    told = [entry.value for entry in read_record(mission.out) if entry.topic == OPERATOR]
+    entries = list(read_record(mission.out))
+    told = [entry.value for entry in entries if entry.topic == OPERATOR]
+    resumed = next(place for place, entry in enumerate(entries) if entry.topic == OPERATOR and entry.value["command"] == "resume")
+    nodes = walk([entry.value for entry in entries[:resumed] if entry.topic == TREE][-1])
+    assert list(seen) == list(range(1, len(nodes) + 1))
+    assert {uid for uid, status in seen.items() if status == "RUNNING"} == {
+        uid for uid, node in enumerate(nodes, start=1) if node["status"] == "RUNNING"
+    }
     assert [(one["by"], one["command"]) for one in told] == [("mission", "pause"), ("mission", "paused"), ("mission", "resume")]
     assert "navigation.goto_straight holds" in told[1]["reason"]
     assert "perception.zed_depthmap goes on (zed_depthmap can't be paused)" in told[1]["reason"]
@@ -200,7 +228,9 @@ def test_losing_both_sensors_lands_where_it_is(mission):
 def test_a_signal_in_the_air_lands_the_vehicle_first(mission):
     functional = mission.rig.functional
     mission.until(lambda: functional.names().count("set_position") == 2 and functional.vehicle.place[0] > 2.0)
+    main = mission.seen()
     mission.process.send_signal(signal.SIGINT)
+    mission.until(lambda: not main.keys() & mission.seen().keys())  # what stops it is another tree
     assert mission.exit_code() == 1
     record = mission.read("mission.json")
     assert (record["outcome"], record["reason"]) == ("aborted", "told to end by SIGINT")

@@ -1,0 +1,125 @@
+"""What a halt leaves: an outcome for each skill, and no skill that runs, whatever breaks while the tree is left."""
+
+from __future__ import annotations
+
+import json
+from pathlib import Path
+
+import pytest
+
+pytest.importorskip("py_trees")
+
+from alula.language.models import ModelFile, check_texts
+from alula.missions.director import Outcome
+from alula.missions.filed.part import NO_PART
+from alula.missions.filed.plan import plan_of_file
+from alula.missions.mocked import MockedMission
+from alula.runtime.mock import load_behaviour
+
+MODEL = """
+skillset rover { resource wheels { state { FREE USED } initial FREE transition { FREE -> USED USED -> FREE } }
+  skill drive { success ARRIVED {} }
+  skill look { success SEEN {} }
+}
+"""
+MOCK = "skills: {rover.drive: {delay: 100}, rover.look: {delay: 1.5}}"
+ABORT_S = 5.0
+STOP = '<BehaviorTree ID="stop_here"><rover.look name="stop"/></BehaviorTree>'
+
+
+class Flown:
+    """A mission over mocks whose main tree has this body; aborted, if it is, at ABORT_S."""
+
+    def __init__(self, folder: Path, body: str, stop: str = STOP, *, abort: bool = False) -> None:
+        (file,) = check_texts([ModelFile("rover.rl", MODEL)])
+        assert [one for one in file.findings if one.severity.value == "error"] == []
+        text = f'<root BTCPP_format="4" main_tree_to_execute="m"><BehaviorTree ID="m">{body}</BehaviorTree>{stop}</root>'
+        (folder / "m.xml").write_text(text, encoding="utf-8")
+        (folder / "mock.yaml").write_text(MOCK, encoding="utf-8")
+        (folder / "run").mkdir()
+        plan = plan_of_file(folder / "m.xml", "m", file.skillsets, {}, NO_PART)
+        behaviour = load_behaviour([folder / "mock.yaml"], file.skillsets)
+        self.mission = MockedMission(file.skillsets, behaviour, plan, out=folder / "run")
+        if abort:
+            self.mission.world.clock.after(ABORT_S, lambda: self.mission.abort("told to end"))
+        self.end = self.mission.run()
+        self.written = json.loads((folder / "run/mission.json").read_text(encoding="utf-8"))
+
+    @property
+    def entries(self) -> dict[str, object]:
+        return dict(self.mission.director.blackboard.entries())
+
+    @property
+    def stopped(self) -> bool:
+        """Tell whether the tree `stop_here` was flown to its end."""
+        return any(event.skill == "look" and event.state.value == "TERMINATED" for event in self.mission.events if hasattr(event, "skill"))
+
+
+def test_a_halted_skill_is_interrupted_and_the_script_of_its_halt_knows_it(tmp_path: Path) -> None:
+    leaf = '<rover.drive outcome="{why}" _onHalted="seen := why"/>'
+    flown = Flown(tmp_path, f'<Parallel success_count="1"><Sleep msec="1500"/>{leaf}</Parallel>')
+    assert (flown.entries["why"], flown.entries["seen"]) == ("INTERRUPTED", "INTERRUPTED")
+
+
+def test_a_halted_skill_that_waits_for_its_start_has_not_the_outcome_of_before(tmp_path: Path) -> None:
+    first = '<Parallel success_count="1"><rover.drive name="first"/><AlwaysSuccess/></Parallel>'
+    waits = '<rover.drive name="waits" outcome="{why}"/>'
+    body = f'<Sequence><Script code="why := \'ARRIVED\'"/>{first}<Timeout msec="1">{waits}</Timeout></Sequence>'
+    flown = Flown(tmp_path, body)
+    assert "waits" not in {path[-1] for path in flown.mission.places.values()}
+    assert flown.entries["why"] == "INTERRUPTED"
+
+
+BROKEN = '<Script code="nothing += 1"/>'
+BREAKS_HALTED = '<Parallel failure_count="1"><rover.drive _onHalted="nothing += 1"/><rover.drive/>'
+
+
+@pytest.mark.parametrize(
+    "body",
+    [
+        # In the first tick of all: no node above the skill runs yet when its neighbour breaks.
+        f'<Parallel failure_count="1"><rover.drive/>{BROKEN}</Parallel>',
+        f'<Sequence><Sleep msec="500"/><Parallel failure_count="1"><rover.drive/>{BROKEN}</Parallel></Sequence>',
+        # A halt that breaks keeps no other from being halted.
+        f"{BREAKS_HALTED}<Sequence><Sleep msec='500'/>{BROKEN}</Sequence></Parallel>",
+        f"{BREAKS_HALTED}<Sequence><Sleep msec='500'/><AlwaysFailure/></Sequence></Parallel>",
+        '<Parallel success_count="1"><rover.drive _onHalted="why := 2 - nothing"/><Sleep msec="500"/></Parallel>',
+    ],
+)
+def test_a_tree_that_breaks_leaves_no_skill_that_runs(body: str, tmp_path: Path) -> None:
+    flown = Flown(tmp_path, body)
+    assert flown.end.outcome is Outcome.ABORTED
+    assert "the tree raised TickError" in flown.end.reason
+    assert "nothing" in flown.end.reason
+    assert flown.mission.open_executions == []
+    assert flown.stopped
+
+
+@pytest.mark.parametrize("attributes", ["", '_onHalted="nothing += 1"'])
+def test_an_abort_brings_it_to_rest_whatever_a_halt_breaks(attributes: str, tmp_path: Path) -> None:
+    flown = Flown(tmp_path, f'<Parallel failure_count="1"><rover.drive {attributes}/><rover.drive/></Parallel>', abort=True)
+    assert flown.end.outcome is Outcome.ABORTED
+    assert flown.end.reason.startswith("told to end")
+    assert ("nothing" in flown.end.reason) is bool(attributes)
+    assert flown.mission.open_executions == []
+    assert flown.stopped
+
+
+def test_a_tree_that_breaks_on_the_way_to_rest_is_left_for_stop_here(tmp_path: Path) -> None:
+    body = f'<Sequence><Script code="stopping := true"/><Parallel failure_count="1"><rover.drive/>{BROKEN}</Parallel></Sequence>'
+    flown = Flown(tmp_path, body)
+    assert (flown.end.outcome, flown.mission.open_executions, flown.stopped) == (Outcome.ABORTED, [], True)
+
+
+@pytest.mark.parametrize("stop", [f"<Parallel><rover.drive/>{BROKEN}</Parallel>", f"<Sequence><rover.look/>{BROKEN}</Sequence>"])
+def test_a_stop_that_breaks_ends_with_nothing_that_runs(stop: str, tmp_path: Path) -> None:
+    flown = Flown(tmp_path, "<rover.drive/>", f'<BehaviorTree ID="stop_here">{stop}</BehaviorTree>', abort=True)
+    assert flown.end.outcome is Outcome.ABORTED
+    assert flown.end.reason.startswith("told to end; then the tree raised TickError")
+    assert flown.mission.open_executions == []
+
+
+def test_without_a_tree_that_stops_an_abort_interrupts_what_runs(tmp_path: Path) -> None:
+    flown = Flown(tmp_path, "<rover.drive/>", "", abort=True)
+    assert (flown.end.outcome, flown.end.reason) == (Outcome.ABORTED, "told to end")
+    assert flown.mission.open_executions == []
