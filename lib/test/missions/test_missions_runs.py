@@ -220,6 +220,28 @@ def test_what_was_found_before_the_bound_is_told() -> None:
     assert [one.code for one in proved.accepted] == ["ALU701"]
 
 
+class Told(Deadline):
+    """Keeps what a long search would have said at its first ten looks at the clock."""
+
+    def check(self) -> None:
+        """Keep it."""
+        said.append(self.doing)
+        if len(said) == 10:
+            raise OutOfTimeError("enough")
+
+
+said: list[str] = []
+
+
+def test_a_long_search_says_how_far_it_is() -> None:
+    said.clear()
+    drones("mapping", Told.after(1e6))
+    numbers = [[int(one.replace(",", "")) for one in re.findall(r"(\S+) (?:situations|groups,|ticks deep)", text)] for text in said if text]
+    assert all(len(one) == 3 and one[0] > one[1] > one[2] for one in numbers)
+    assert numbers == sorted(numbers)
+    assert "groups a second" in said[-1]
+
+
 @pytest.mark.parametrize("name", ["mapping", "inspection"])
 def test_the_drones_missions_keep_the_axes_as_listing_3_does(name: str) -> None:
     proved = drones(name, Deadline.after(1e6))
