@@ -388,6 +388,12 @@ def shown(path: Path, failures: Failures) -> tuple[set[tuple[object, ...]], set[
     return seen, found
 
 
+def ticked_in(regions: Regions) -> set[str]:
+    """Return the names of the nodes that are ticked."""
+    ways = [way for region in regions.regions for _, one in region.next for way, _ in one.ways]
+    return {regions.system.nodes[number].name for way in ways for number, _ in way.touched}
+
+
 class Many(Few):
     """A larger bound of regions."""
 
@@ -438,10 +444,23 @@ def test_what_is_asked_long_afterwards_is_remembered(inside: str, tmp_path: Path
     path.write_text(whole(f"<Sequence><Script code=\"last := ''\"/>{inside}</Sequence>"))
     regions = Regions(System.read(path, robots(), PART, Failures(hooks=False, refusals=False, aborts=False)), Deadline.after(1e6))
     regions.explore()
-    nodes = regions.system.nodes
-    assert "there" in {
-        nodes[number].name for region in regions.regions for _, one in region.next for way, _ in one.ways for number, _ in way.touched
-    }
+    assert "there" in ticked_in(regions)
+
+
+def test_an_entry_that_a_subtree_reads_by_the_default_of_its_port_is_remembered(tmp_path: Path) -> None:
+    path = tmp_path / "mission.xml"
+    inner = """<BehaviorTree ID="inner">
+      <Fallback>
+        <ScriptCondition code="mine != 'x'"/>
+        <drone.hover name="there"/>
+      </Fallback>
+    </BehaviorTree>
+    <TreeNodesModel><SubTree ID="inner"><input_port name="mine" default="{last}"/></SubTree></TreeNodesModel>"""
+    outer = """<Sequence><Script code="last := 'x'"/><Sleep msec="100"/><SubTree ID="inner"/></Sequence>"""
+    path.write_text(whole(outer).replace("<root", '<root main_tree_to_execute="mission"').replace("</root>", f"{inner}</root>"))
+    regions = Regions(System.read(path, robots(), PART, Failures(hooks=False, refusals=False, aborts=False)), Deadline.after(1e6))
+    regions.explore()
+    assert "there" in ticked_in(regions)
 
 
 @pytest.mark.parametrize("seed", range(24))

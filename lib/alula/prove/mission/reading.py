@@ -13,6 +13,7 @@ from alula.prove.mission.oracle import Oracle
 from alula.prove.mission.unknown import UNKNOWN, UnknownNumber, UnknownText
 from alula.trees.document import Element
 from alula.trees.node import pointer
+from alula.trees.palette import Category
 from alula.trees.reading import POSTCONDITIONS, PRECONDITIONS, TreeFiles, is_port, type_name
 from alula.trees.script import ScriptError, parse
 from alula.trees.script.syntax import Assignment, Call, Chain, Comparison, Literal, Name, Node, walk
@@ -131,6 +132,11 @@ def what_is_read(files: TreeFiles, opaque: Iterable[str], constants: Mapping[str
             for text in _scripts(element):
                 _script(read, text, constants)
             _ports(read, element, read.unread)
+    for model in files.models.values():
+        for port in model.ports.values():
+            key = pointer(port.default or "", port.name)
+            if model.category is Category.SUBTREE and key is not None:
+                read.flows |= {(_bare(key), port.name), (port.name, _bare(key))}
     read.names |= read.sources(read.names)
     for source, target in read.flows:  # one entry under two names, or a copy of it
         for one, other in ((source, target), (target, source)):
