@@ -45,6 +45,10 @@ class Deadline:
         """Return the seconds that are left, never below zero."""
         return max(0.0, self.at_s - time.monotonic())
 
+    def a_second(self, count: int) -> float:
+        """Return how many that are in each second since the beginning."""
+        return count / max(time.monotonic() - self._begun_s, 1e-3)
+
     def check(self) -> None:
         """Raise OutOfTimeError when the moment has passed."""
         now_s = time.monotonic()

@@ -2,7 +2,9 @@
 
 from __future__ import annotations
 
+import contextlib
 import random
+import re
 from collections import deque
 from collections.abc import Iterator, Mapping
 from itertools import product
@@ -22,13 +24,19 @@ from alula.missions.check.page import whole
 from alula.missions.driver import MissionDriver
 from alula.missions.filed.part import NO_PART, MissionPart
 from alula.missions.filed.plan import plan_of_file
+from alula.missions.pending import PendingInterrupts
 from alula.missions.skillset import MissionClient
 from alula.model.model import Skillset
 from alula.prove.limits import Deadline, OutOfTimeError
+from alula.prove.mission.ahead import Ahead, Looking
+from alula.prove.mission.answers import Answers
+from alula.prove.mission.findings import findings
 from alula.prove.mission.managers import Failures
+from alula.prove.mission.oracle import UndecidedError
 from alula.prove.mission.page import NAME, ROBOT, found_in, page
-from alula.prove.mission.prover import prove_mission, prove_within
+from alula.prove.mission.prover import Proved, prove_mission, prove_within
 from alula.prove.mission.regions import Regions
+from alula.prove.mission.robot import Waits
 from alula.prove.mission.state import State
 from alula.prove.mission.system import System
 from alula.runtime.core.execution import Execution
@@ -199,12 +207,46 @@ class Few(Deadline):
             raise OutOfTimeError("enough")
 
 
-@pytest.mark.parametrize("name", ["mapping", "inspection"])
-def test_the_drones_missions_keep_the_axes_as_listing_3_does(name: str) -> None:
+def drones(name: str, deadline: Deadline) -> Proved:
     robot = find_robot(ROOT)
     path = ROOT / "missions" / f"{name}.xml"
-    proved = prove_within(Few.after(1e6), path, models_of(robot, "test"), part_of(robot, "test"), given="this test")
+    return prove_within(deadline, path, models_of(robot, "test"), part_of(robot, "test"), given="this test")
+
+
+def test_what_was_found_before_the_bound_is_told() -> None:
+    proved = drones("mapping", Few.after(1e6))
+    assert not proved.complete
     assert [one.code for one in proved.findings] == ["ALU710"]
+    assert [one.code for one in proved.accepted] == ["ALU701"]
+
+
+class Told(Deadline):
+    """Keeps what a long search would have said at its first ten looks at the clock."""
+
+    def check(self) -> None:
+        """Keep it."""
+        said.append(self.doing)
+        if len(said) == 10:
+            raise OutOfTimeError("enough")
+
+
+said: list[str] = []
+
+
+def test_a_long_search_says_how_far_it_is() -> None:
+    said.clear()
+    drones("mapping", Told.after(1e6))
+    numbers = [[int(one.replace(",", "")) for one in re.findall(r"(\S+) (?:situations|groups,|ticks deep)", text)] for text in said if text]
+    assert all(len(one) == 3 and one[0] > one[1] > one[2] for one in numbers)
+    assert numbers == sorted(numbers)
+    assert "groups a second" in said[-1]
+
+
+@pytest.mark.parametrize("name", ["mapping", "inspection"])
+def test_the_drones_missions_keep_the_axes_as_listing_3_does(name: str) -> None:
+    proved = drones(name, Deadline.after(1e6))
+    assert proved.complete
+    assert proved.findings == []
     (finding,) = proved.accepted
     assert finding.code == "ALU701"
     assert "`navigation.land`" in finding.message
@@ -294,6 +336,147 @@ def test_a_run_of_a_region_is_a_run_step_by_step(seed: int, tmp_path: Path) -> N
                 states if event.kind.value == "tick" else set()
             )
         assert any(state.memory == region.memory for state in states)
+
+
+CONDITIONS = (
+    '_skipIf="tries &gt; 1"',
+    '_while="drone.control == OURS"',
+    '_onHalted="tries += 1"',
+    '_onSuccess="last := who; @degraded := true"',
+    '_onFailure="tries := 0"',
+    """_failureIf="last == 'anna'" """,
+    '_successIf="many == 2"',
+    '_post="seen := many"',
+)
+
+
+def with_conditions(path: Path, chance: random.Random) -> Path:
+    """Give some nodes of a mission conditions before and after."""
+
+    def more(tag: re.Match[str]) -> str:
+        return f"{tag[1]} {chance.choice(CONDITIONS)}{tag[2]}" if chance.random() < 0.3 else tag[0]
+
+    begin, sleep, rest = path.read_text().partition('<Sleep msec="150"/>')
+    inside, end, after = rest.partition("</BehaviorTree>")
+    path.write_text(begin + sleep + re.sub(r"(<[A-Za-z][^>]*?)(/?>)", more, inside) + end + after)
+    return path
+
+
+def everything(looking: Looking, *_: object, **__: object) -> Ahead:
+    """Return that all nodes are ahead, and may ask for anything."""
+    none: frozenset[str] = frozenset()
+    return Ahead(looking.all, True, none, none, none, frozenset(looking.read.ends), looking.read.asks_first, none)
+
+
+def shown(path: Path, failures: Failures) -> tuple[set[tuple[object, ...]], set[str]] | None:
+    """Return what can be seen of all runs: the nodes that run, the resources, what runs, the outcome; and the findings' messages."""
+    regions = Regions(System.read(path, robots(), PART, failures), Deadline.after(1e6))
+    regions._deadline = Many.after(1e6)
+    try:
+        regions.explore()
+    except (OutOfTimeError, UndecidedError):
+        return None
+    system, seen = regions.system, set()
+    for region in regions.regions:
+        memory = system.ticker.memories[region.memory]
+        active = tuple(node.uid for node in system.active(State(region.memory, ())))
+        for place, numbers in enumerate(region.sets):
+            for managers in map(system.managers_of, numbers):
+                open_ = tuple(one for one in managers.executions if one.phase != "ended")
+                seen.add((active, memory.end, place, managers.states, open_))
+    found = {re.sub(r" \([^()]*==[^()]*\)$", "", one.message) for one in findings(regions, Answers(regions))}  # but in which states
+    return seen, found
+
+
+def ticked_in(regions: Regions) -> set[str]:
+    """Return the names of the nodes that are ticked."""
+    ways = [way for region in regions.regions for _, one in region.next for way, _ in one.ways]
+    return {regions.system.nodes[number].name for way in ways for number, _ in way.touched}
+
+
+class Many(Few):
+    """A larger bound of regions."""
+
+    left = 1500
+
+
+@pytest.mark.parametrize("seed", range(40))
+def test_what_is_forgotten_is_what_nothing_tells_apart(seed: int, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    chance = random.Random(1000 + seed)  # noqa: S311 - for tests
+    path = with_conditions(mission(chance, tmp_path, 2 + seed % 2), chance)
+    failures = Failures(hooks=chance.random() < 0.5, refusals=False, aborts=False)
+    short = shown(path, failures)
+    monkeypatch.setattr(Looking, "ahead", everything)
+    monkeypatch.setattr(Waits, "names", PendingInterrupts.names)
+    whole = shown(path, failures)
+    if whole is None:
+        pytest.skip("too many situations without what is forgotten")
+    assert short == whole
+
+
+@pytest.mark.parametrize(
+    "inside",
+    [
+        """<Sequence>
+          <ForceSuccess><drone.lift/></ForceSuccess>
+          <Sleep msec="100"/>
+          <ScriptCondition code="failed('ours')"/>
+          <drone.hover name="there"/>
+        </Sequence>""",
+        """<Parallel success_count="2" failure_count="2">
+          <Sequence _while="drone.control == OURS">
+            <Fallback>
+              <ScriptCondition code="last != 'x'"/>
+              <drone.hover name="there"/>
+            </Fallback>
+            <drone.climb/>
+          </Sequence>
+          <Sequence>
+            <Sleep msec="100"/>
+            <Script code="last := 'x'"/>
+            <WaitFor if="false"/>
+          </Sequence>
+        </Parallel>""",
+    ],
+)
+def test_what_is_asked_long_afterwards_is_remembered(inside: str, tmp_path: Path) -> None:
+    path = tmp_path / "mission.xml"
+    path.write_text(whole(f"<Sequence><Script code=\"last := ''\"/>{inside}</Sequence>"))
+    regions = Regions(System.read(path, robots(), PART, Failures(hooks=False, refusals=False, aborts=False)), Deadline.after(1e6))
+    regions.explore()
+    assert "there" in ticked_in(regions)
+
+
+def test_an_entry_that_a_subtree_reads_by_the_default_of_its_port_is_remembered(tmp_path: Path) -> None:
+    path = tmp_path / "mission.xml"
+    inner = """<BehaviorTree ID="inner">
+      <Fallback>
+        <ScriptCondition code="mine != 'x'"/>
+        <drone.hover name="there"/>
+      </Fallback>
+    </BehaviorTree>
+    <TreeNodesModel><SubTree ID="inner"><input_port name="mine" default="{last}"/></SubTree></TreeNodesModel>"""
+    outer = """<Sequence><Script code="last := 'x'"/><Sleep msec="100"/><SubTree ID="inner"/></Sequence>"""
+    path.write_text(whole(outer).replace("<root", '<root main_tree_to_execute="mission"').replace("</root>", f"{inner}</root>"))
+    regions = Regions(System.read(path, robots(), PART, Failures(hooks=False, refusals=False, aborts=False)), Deadline.after(1e6))
+    regions.explore()
+    assert "there" in ticked_in(regions)
+
+
+@pytest.mark.parametrize("seed", range(24))
+def test_what_is_ticked_was_ahead(seed: int, tmp_path: Path) -> None:
+    chance = random.Random(2000 + seed)  # noqa: S311 - for tests
+    path = with_conditions(mission(chance, tmp_path, 3), chance)
+    system = System.read(path, robots(), PART, Failures(hooks=False, aborts=False))
+    ticker, keeper = system.ticker, system.ticker._keeper
+    regions = Regions(system, Few.after(1e6))
+    with contextlib.suppress(OutOfTimeError):
+        regions.explore()
+    ahead = [keeper._looked(one.phase, one.stops, one.nodes)[1].nodes if one.end is None else frozenset() for one in ticker.memories]
+    for region in regions.regions:
+        for target, ticked in region.next:
+            assert ahead[regions.regions[target].memory] <= ahead[region.memory]
+            assert {number for outcome, _ in ticked.ways for number, _ in outcome.touched} <= ahead[region.memory]
 
 
 class Function(SkillHooks):

@@ -134,15 +134,16 @@ class RetryAfter(Decorator):
         super().__init__(wiring)
         self._script = asked(self)
         self._left = 0
-        self._again_ns = 0
+        self._again_ns: int | None = None
 
     def update(self) -> Answer:
         """Wait for the next chance, or follow the child."""
         if self.status is IDLE:
-            self._left, self._again_ns, self.feedback_message = self.number("attempts"), self.now_ns, ""
+            self._left, self._again_ns, self.feedback_message = self.number("attempts"), None, ""
         self.become(RUNNING)
-        if self.now_ns < self._again_ns:
+        if self._again_ns is not None and self.now_ns < self._again_ns:
             return RUNNING
+        self._again_ns = None
         answer = self.child.execute()
         if answer is not FAILURE:
             return answer

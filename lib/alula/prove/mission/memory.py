@@ -9,6 +9,7 @@ from typing import NamedTuple
 from alula.missions.director import Director, DirectorMemory, End, Outcome
 from alula.missions.filed.skills import SkillNode
 from alula.model.model import Skillset
+from alula.prove.mission.ahead import Ahead, Looking
 from alula.prove.mission.moments import Later, Moment, thawed
 from alula.prove.mission.oracle import UndecidedError
 from alula.prove.mission.reading import ANOTHER, Read
@@ -74,29 +75,51 @@ class Keeper:
         self._nodes = [(node, node.remembers, node.remembers_running) for node in body.nodes()]
         self.leaves = [node for node in body.nodes() if isinstance(node, SkillNode)]
         self._boards = [subtree.blackboard for tree in body.trees for subtree in tree.subtrees]
+        self._looking = Looking(body.trees, body.read)
+        self._known: dict[tuple[str, bool, tuple[Hashable, ...]], tuple[tuple[Hashable, ...], Ahead]] = {}
+        self._places: list[tuple[tuple[str, ...], int, int]] = []
+        for _, names, while_running in self._nodes:
+            start = self._places[-1][2] if self._places else 0
+            self._places.append((("status", *names, *while_running), start, start + 1 + len(names) + len(while_running)))
+        self._first = tuple(self._values())
 
     # --- out ---------------------------------------------------------------------------------------------------------
 
     def take(self) -> TreeMemory:
-        """Return the memory."""
+        """Return the memory: of one that is over how it has ended, else what anything that can still be ticked tells apart."""
         director, board = self._body.director.memory, self._body.board
-        leaves = [(number, node.leaf.interrupted) for number, node in enumerate(self.leaves) if _follows(node)]
-        ends = frozenset(one.result for one in board.failures if one.result in self._body.read.ends)
-        first = board.failures[0].skill if board.failures and self._body.read.asks_first else ""
-        waits = _frozen(director.wait_until_s) if director.phase == "_wait" else None
+        started = director.start_s is not None
+        if director.end is not None:
+            outcome = director.end.outcome
+            return TreeMemory(director.phase, outcome, started, None, director.stops, self._first, (), (), (), "", frozenset())
+        nodes, ahead = self._looked(director.phase, director.stops, tuple(self._values()))
+        first = board.failures[0].skill if board.failures and ahead.first else ""
         return TreeMemory(
             director.phase,
-            None if director.end is None else director.end.outcome,
-            director.start_s is not None,
-            waits,
+            None,
+            started,
+            _frozen(director.wait_until_s) if director.phase == "_wait" else None,
             director.stops,
-            tuple(self._values()),
-            tuple(self._entries(number) for number in range(len(self._boards))),
-            tuple(leaves),
-            tuple(sorted(one.leaf for one in board.pending.handles if isinstance(one, Handle) and not one.done)),
+            nodes,
+            tuple(self._entries(number, ahead) for number in range(len(self._boards))),
+            tuple((number, node.leaf.interrupted) for number, node in enumerate(self.leaves) if _follows(node, ahead)),
+            tuple(sorted(one.leaf for one in board.pending.handles if isinstance(one, Handle))),
             first,
-            ends,
+            ahead.ends.intersection(one.result for one in board.failures),
         )
+
+    def _looked(self, phase: str, stops: bool, values: tuple[Hashable, ...]) -> tuple[tuple[Hashable, ...], Ahead]:  # noqa: FBT001
+        """Return the values of the nodes, those of nodes that are not ticked any more as at first, and what is ahead."""
+        key = (phase, stops, values)
+        if key not in self._known:
+            by_node = [dict(zip(names, values[start:end], strict=True)) for names, start, end in self._places]
+            ahead = self._looking.ahead(phase, stops=stops, values=by_node)
+            kept = list(values)
+            for number, (_, start, end) in enumerate(self._places):
+                if number and number not in ahead.nodes and values[start] is not RUNNING:  # the root's status says how it ended
+                    kept[start:end] = self._first[start:end]
+            self._known[key] = tuple(kept), ahead
+        return self._known[key]
 
     def _values(self) -> Iterator[Hashable]:
         for node, names, while_running in self._nodes:
@@ -122,10 +145,17 @@ class Keeper:
         entry = node.entry("entry")
         return bool(getattr(node, SEEN) == (0 if entry is None else entry.sequence))
 
-    def _entries(self, number: int) -> Hashable:
-        read = self._body.read
+    def _entries(self, number: int, ahead: Ahead) -> Hashable:
         entries = self._boards[number].entries()
-        return tuple((name, entries[name].type, _frozen(read.value(name, entries[name].value))) for name in sorted(entries))
+        return tuple((name, entries[name].type, _frozen(self._needed(name, entries[name].value, ahead))) for name in sorted(entries))
+
+    def _needed(self, name: str, value: object, ahead: Ahead) -> object:
+        """Return what is kept of an entry's value: its kind where it is computed with or text is written over it, else nothing."""
+        if ahead.everything or name in ahead.kept:
+            return self._body.read.value(name, value)
+        if value is None or not (name in ahead.named or (name in ahead.written and isinstance(value, str))):
+            return None
+        return self._body.read.kind(name, value)
 
     @property
     def unknown(self) -> bool:
@@ -223,6 +253,9 @@ def _frozen(value: object) -> Hashable:
     raise UndecidedError(f"a node remembers {value!r}, which the search can't keep")
 
 
-def _follows(node: SkillNode) -> bool:
+def _follows(node: SkillNode, ahead: Ahead) -> bool:
+    """Tell whether an execution of a leaf matters: of one that was left, where a script asks whether it still runs."""
     handle = node.leaf.handle
-    return handle is not None and (node.status is RUNNING or not handle.done)
+    if handle is None or node.status is RUNNING:
+        return handle is not None
+    return (ahead.everything or node.leaf.skill_name in ahead.followed) and not handle.done

@@ -5,18 +5,38 @@ from __future__ import annotations
 import math
 from collections.abc import Iterable, Iterator, Mapping
 from dataclasses import dataclass, field
+from typing import NamedTuple
 
 from alula.missions.filed.plan import DEGRADED, STOPPING
+from alula.missions.filed.world import FUNCTIONS
 from alula.prove.mission.oracle import Oracle
 from alula.prove.mission.unknown import UNKNOWN, UnknownNumber, UnknownText
 from alula.trees.document import Element
 from alula.trees.node import pointer
+from alula.trees.palette import Category
 from alula.trees.reading import POSTCONDITIONS, PRECONDITIONS, TreeFiles, is_port, type_name
 from alula.trees.script import ScriptError, parse
 from alula.trees.script.syntax import Assignment, Call, Chain, Comparison, Literal, Name, Node, walk
 
 ANOTHER = "(another text)"
 SCRIPT_PORTS = ("code", "if", "otherwise")
+OUTCOME = frozenset({DEGRADED, STOPPING})
+"""Entries by which the director decides."""
+
+
+@dataclass(frozen=True)
+class Asks:
+    """What one node asks for: ``names`` are entries that it decides by, ``named`` all that it computes with.
+
+    ``written``: entries that its scripts write; ``ends``, ``first``: of failures; ``skills`` are those whose executions it asks for.
+    """
+
+    names: frozenset[str]
+    named: frozenset[str]
+    written: frozenset[str]
+    ends: frozenset[str]
+    first: bool
+    skills: frozenset[str]
 
 
 @dataclass
@@ -28,7 +48,7 @@ class Read:
     """
 
     oracle: Oracle
-    names: set[str] = field(default_factory=lambda: {DEGRADED, STOPPING})
+    names: set[str] = field(default_factory=lambda: set(OUTCOME))
     numbers: dict[str, set[float]] = field(default_factory=dict)
     texts: dict[str, set[str]] = field(default_factory=dict)
     counted: set[str] = field(default_factory=set)
@@ -37,14 +57,44 @@ class Read:
     """Entries that are compared with more than literals: of a text every letter counts."""
     ends: set[str] = field(default_factory=set)
     asks_first: bool = False
+    flows: set[tuple[str, str]] = field(default_factory=set)
+    """Pairs of entries: what the second has may come of the first."""
+    unread: frozenset[str] = frozenset()
+    """Types of node that decide by nothing that is known."""
+    free: frozenset[str] = frozenset()
+    """Types of node that may decide by anything."""
+
+    def sources(self, names: Iterable[str]) -> frozenset[str]:
+        """Return entries, and all that what they have may come of."""
+        found = set(names)
+        todo = list(found)
+        while todo:
+            name = todo.pop()
+            more = {source for source, target in self.flows if target == name} - found
+            found |= more
+            todo += more
+        return frozenset(found)
+
+    def asks(self, element: Element) -> Asks:
+        """Return what one node asks for."""
+        one = Read(self.oracle, names=set())
+        scripts = [_Named.of(text) for text in _scripts(element)]
+        named = {name for script in scripts for name in script.names}
+        for text in _scripts(element):
+            _script(one, text, {})
+        _ports(one, element, self.unread)
+        if type_name(element) not in self.unread:
+            named |= {_bare(pointer(value.value, name) or value.value) for name, value in element.attributes.items() if is_port(name)}
+        written = frozenset(name for script in scripts for name in script.written)
+        skills = frozenset(name for script in scripts for name in script.skills)
+        return Asks(frozenset(one.names), frozenset(named), written, frozenset(one.ends), one.asks_first, skills)
 
     def value(self, name: str, value: object) -> object:
         """Return what is kept of an entry's value."""
         if value is None:
             return None
-        if name not in self.names:  # of its kind all the same, so that scripts can go on to write it
-            number = isinstance(value, int | float)
-            return UnknownNumber(self.oracle, f"`{name}`") if number else ANOTHER if isinstance(value, str) else UNKNOWN
+        if name not in self.names:
+            return self.kind(name, value)
         if name in self.whole or (isinstance(value, str) and name in self.ordered):
             return value
         if isinstance(value, UnknownText):
@@ -54,6 +104,11 @@ class Read:
         if isinstance(value, int | float) and not isinstance(value, bool) and name in self.counted:
             return self._number(name, value)
         return value
+
+    def kind(self, name: str, value: object) -> object:
+        """Return something of the kind of a value, so that scripts can go on to compute with it."""
+        number = isinstance(value, int | float)
+        return UnknownNumber(self.oracle, f"`{name}`") if number else ANOTHER if isinstance(value, str) else UNKNOWN
 
     def _number(self, name: str, value: float) -> object:
         known = self.numbers.get(name, set())
@@ -66,22 +121,24 @@ class Read:
         return UnknownNumber(self.oracle, f"`{name}`", wide_low, wide_high)
 
 
-def what_is_read(files: TreeFiles, opaque: Iterable[str], constants: Mapping[str, float], oracle: Oracle) -> Read:
-    """Return what the trees of a mission decide by; ``opaque`` are types of node that decide by nothing that is known."""
-    read = Read(oracle)
-    unread = frozenset(opaque)
-    flows: set[tuple[str, str]] = set()
+def what_is_read(files: TreeFiles, opaque: Iterable[str], constants: Mapping[str, float], oracle: Oracle, free: Iterable[str] = ()) -> Read:
+    """Return what the trees of a mission decide by.
+
+    ``opaque`` are types of node that decide by nothing that is known, ``free`` those that may ask for more than the file shows.
+    """
+    read = Read(oracle, unread=frozenset(opaque), free=frozenset(free))
     for tree in files.trees.values():
         for element in tree.iterate():
             for text in _scripts(element):
-                _script(read, flows, text, constants)
-            _ports(read, flows, element, unread)
-    while True:
-        more = {source for source, target in flows if target in read.names} - read.names
-        if not more:
-            break
-        read.names |= more
-    for source, target in flows:  # one entry under two names, or a copy of it
+                _script(read, text, constants)
+            _ports(read, element, read.unread)
+    for model in files.models.values():
+        for port in model.ports.values():
+            key = pointer(port.default or "", port.name)
+            if model.category is Category.SUBTREE and key is not None:
+                read.flows |= {(_bare(key), port.name), (port.name, _bare(key))}
+    read.names |= read.sources(read.names)
+    for source, target in read.flows:  # one entry under two names, or a copy of it
         for one, other in ((source, target), (target, source)):
             read.numbers.setdefault(one, set()).update(read.numbers.get(other, ()))
             read.texts.setdefault(one, set()).update(read.texts.get(other, ()))
@@ -97,7 +154,7 @@ def _scripts(element: Element) -> Iterator[str]:
             yield element.get(name)
 
 
-def _script(read: Read, flows: set[tuple[str, str]], text: str, constants: Mapping[str, float]) -> None:
+def _script(read: Read, text: str, constants: Mapping[str, float]) -> None:
     try:
         program = parse(text)
     except ScriptError:
@@ -105,19 +162,19 @@ def _script(read: Read, flows: set[tuple[str, str]], text: str, constants: Mappi
     for statement in program.statements:
         targets = [one for one in walk(statement) if isinstance(one, Assignment) and isinstance(one.target, Name)]
         for one in targets:
-            _assignment(read, flows, one)
+            _assignment(read, one)
         inside = {id(part) for one in targets for part in walk(one)}
         read.names |= {_bare(one.name) for one in walk(statement) if isinstance(one, Name) and id(one) not in inside}
         for node in walk(statement):
             _look(read, node, constants)
 
 
-def _assignment(read: Read, flows: set[tuple[str, str]], node: Assignment) -> None:
+def _assignment(read: Read, node: Assignment) -> None:
     target = _bare(node.target.name) if isinstance(node.target, Name) else ""
     sources = {_bare(one.name) for one in walk(node.value) if isinstance(one, Name)}
-    flows |= {(source, target) for source in sources}
+    read.flows |= {(source, target) for source in sources}
     if node.operator not in {":=", "="}:
-        flows.add((target, target))
+        read.flows.add((target, target))
     if node.operator not in {":=", "="} or any(isinstance(one, Chain) for one in walk(node.value)):
         read.counted.add(target)
 
@@ -138,17 +195,39 @@ def _look(read: Read, node: Node, constants: Mapping[str, float]) -> None:
                 read.ordered.add(name)
 
 
-def _ports(read: Read, flows: set[tuple[str, str]], element: Element, unread: frozenset[str]) -> None:
+def _ports(read: Read, element: Element, unread: frozenset[str]) -> None:
     kind = type_name(element)
     for name, attribute in element.attributes.items():
         key = pointer(attribute.value, name) if is_port(name) else None
         if key is None:
             continue
         if element.tag == "SubTree":
-            flows |= {(_bare(key), name), (name, _bare(key))}
+            read.flows |= {(_bare(key), name), (name, _bare(key))}
         elif kind not in unread:
             read.names.add(_bare(key))
             read.whole.add(_bare(key))
+
+
+class _Named(NamedTuple):
+    """What a script names: the entries that it computes with, those that it writes, and the skills whose executions it asks for."""
+
+    names: set[str]
+    written: set[str]
+    skills: set[str]
+
+    @classmethod
+    def of(cls, text: str) -> _Named:
+        """Read a script."""
+        try:
+            program = parse(text)
+        except ScriptError:
+            return cls(set(), set(), set())
+        nodes = [node for statement in program.statements for node in walk(statement)]
+        targets = [node.target for node in nodes if isinstance(node, Assignment) and node.operator in {":=", "="}]
+        names = {_bare(node.name) for node in nodes if isinstance(node, Name) and not any(node is one for one in targets)}
+        calls = [node for node in nodes if isinstance(node, Call) and FUNCTIONS[node.function].kind == "skill"]
+        skills = {str(one.value if isinstance(one, Literal) else getattr(one, "name", "")) for call in calls for one in call.arguments}
+        return cls(names, {_bare(one.name) for one in targets if isinstance(one, Name)}, skills)
 
 
 def _bare(name: str) -> str:

@@ -7,6 +7,7 @@ and leaves a product again. So a region, a memory of the tree with one set a ski
 
 from __future__ import annotations
 
+import math
 from collections import deque
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, field
@@ -72,6 +73,8 @@ class Region:
     closures: tuple[Closure, ...]
     origin: tuple[int, Ticked] | None
     sets: Sets
+    depth: int = 0
+    """How many ticks led here at least."""
     next: list[tuple[int, Ticked]] = field(default_factory=list)
     """Each tick that leads to a region, or into one."""
 
@@ -83,6 +86,8 @@ class Regions:
         self.system = system
         self.regions: list[Region] = []
         self.complete = False
+        self.situations = 0
+        """How many situations the regions stand for; those of one memory may overlap."""
         self._deadline = deadline
         self._by_memory: dict[int, list[int]] = {}
         self._closures: dict[tuple[int, frozenset[int], bool], Closure] = {}
@@ -93,9 +98,9 @@ class Regions:
         first = self.system.initial()
         todo = deque([self._add(first.memory, tuple(frozenset({one}) for one in first.managers), None)])
         while todo:
-            self._deadline.doing = f"{len(self.regions)} regions, {len(todo)} to look at"
-            self._deadline.check()
             number = todo.popleft()
+            self._deadline.doing = self._progress(number, len(todo))
+            self._deadline.check()
             region = self.regions[number]
             for act in self._acts(region):
                 for ticked in self.ticks(region.memory, act, region.sets):
@@ -109,6 +114,14 @@ class Regions:
                         todo.append(known)
                     region.next.append((known, ticked))
         self.complete = True
+
+    def _progress(self, number: int, left: int) -> str:
+        """Return how far the search is, in words."""
+        known = len(self.regions)
+        return (
+            f"{self.situations:,} situations in {known} groups, {left} of them to look at, {self.regions[number].depth} ticks deep,"
+            f" {self._deadline.a_second(known):.3g} groups a second"
+        )
 
     def _acts(self, region: Region) -> Iterator[str]:
         if self.system.ticker.memories[region.memory].end is None:
@@ -178,7 +191,9 @@ class Regions:
     def _add(self, memory: int, roots: Sets, origin: tuple[int, Ticked] | None) -> int:
         over = self.system.ticker.memories[memory].end is not None
         closures = tuple(self.closure(place, numbers, over=over) for place, numbers in enumerate(roots))
-        self.regions.append(Region(memory, closures, origin, tuple(one.all for one in closures)))
+        sets = tuple(one.all for one in closures)
+        self.situations += math.prod(map(len, sets))
+        self.regions.append(Region(memory, closures, origin, sets, 0 if origin is None else self.regions[origin[0]].depth + 1))
         self._by_memory.setdefault(memory, []).append(len(self.regions) - 1)
         return len(self.regions) - 1
 

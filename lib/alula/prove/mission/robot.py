@@ -151,6 +151,15 @@ class Waits(PendingInterrupts):
     def __init__(self, clock_ns: Callable[[], int]) -> None:
         super().__init__(clock_ns, math.inf)
 
+    def names(self, skillset: str | None = None) -> list[str]:
+        """Return one that is waited for. Whether the others have ended is not looked at: nobody waits for them, or all wait anyway."""
+        asked = [one for one in self._pending if one.holds_all or skillset in {None, one.skillset}]
+        for one in asked:
+            if not one.handle.done:
+                return [f"{one.skillset}.{one.skill}"]
+        self._pending = [one for one in self._pending if one not in asked]
+        return []
+
 
 class Memory(Blackboard):
     """A mission's memory: of the failures, what scripts ask for."""

@@ -96,11 +96,9 @@ class System:
         stop = mission.stop_tree() if STOP_HERE in files.trees else None
         trees = (mission.tree, *([stop] if stop else []))
         director = Director(OneStop(mission, stop), board)
-        unread = [
-            *(name for name, _ in part.nodes if known is None),
-            *(f"{one.name}.{skill.name}" for one in skillsets for skill in one.skills),
-        ]
-        read = what_is_read(files, unread, plan.parameters, oracle)
+        own = [name for name, _ in part.nodes]
+        unread = [*(own if known is None else []), *(f"{one.name}.{skill.name}" for one in skillsets for skill in one.skills)]
+        read = what_is_read(files, unread, plan.parameters, oracle, own if known is not None else ())
         body = Body(robot, director, board, trees, {one.name: one for one in skillsets}, read, few)
         ticker = Ticker(body, oracle)
         for number, node in enumerate(ticker.leaves):

@@ -1,0 +1,132 @@
+"""Which nodes of a mission's trees can still be ticked, and so what of its memory anything can still tell apart.
+
+A Sequence that has passed a child ticks it no more, unless something above begins the Sequence again; what only such nodes ask for is
+forgotten. Each set holds from a memory on: what can be ticked after a tick could be ticked before it.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Hashable, Iterator, Mapping, Sequence
+from dataclasses import dataclass
+
+from alula.prove.mission.reading import OUTCOME, SCRIPT_PORTS, Read
+from alula.trees.node import Node
+from alula.trees.nodes.decorators import Delay, ForceFailure, ForceSuccess, Inverter, Precondition, RunOnce, Timeout
+from alula.trees.nodes.entries import SkipUnlessUpdated
+from alula.trees.nodes.loops import Loop
+from alula.trees.nodes.parallel import Parallel, ParallelAll
+from alula.trees.nodes.sequences import AsyncFallback, AsyncSequence, Fallback, SequenceWithMemory
+from alula.trees.nodes.sequences import Sequence as InOrder
+from alula.trees.nodes.subtree import SubTree
+from alula.trees.status import RUNNING
+from alula.trees.tree import Tree
+
+IN_TURN = frozenset({InOrder, Fallback, AsyncSequence, AsyncFallback, SequenceWithMemory})
+"""Nodes that tick no child again that they have passed."""
+AT_ONCE = frozenset({Parallel, ParallelAll})
+"""Nodes that tick no child again that has ended."""
+ONCE = frozenset({SubTree, Inverter, ForceSuccess, ForceFailure, Delay, Timeout})
+"""Nodes that end with their child. All other nodes may tick any child again."""
+
+SKIPS = (Precondition, RunOnce, Loop, SkipUnlessUpdated)
+"""Types of node that may be skipped without a condition of theirs."""
+
+
+@dataclass(frozen=True)
+class Ahead:
+    """What can still matter: ``nodes`` by their numbers; ``kept`` are entries that are asked for, ``named`` those that are computed with.
+
+    ``everything``: a node may ask for any entry. ``written``: entries that scripts write.
+
+    ``ends``, ``first``: what is asked of failures; ``followed`` are skills whose executions are asked for, interrupted ones, too.
+    """
+
+    nodes: frozenset[int]
+    everything: bool
+    kept: frozenset[str]
+    named: frozenset[str]
+    written: frozenset[str]
+    ends: frozenset[str]
+    first: bool
+    followed: frozenset[str]
+
+
+class Looking:
+    """Tells what is ahead of a mission that is somewhere in its trees."""
+
+    def __init__(self, trees: Sequence[Tree], read: Read) -> None:
+        self.read = read
+        self._nodes = [node for tree in trees for node in tree.nodes]
+        self.all = frozenset(range(len(self._nodes)))
+        self._number = {id(node): number for number, node in enumerate(self._nodes)}
+        self._roots = [tree.root for tree in trees]
+        self._below = {number: frozenset(self._all(node)) for number, node in enumerate(self._nodes)}
+        self._asks = [read.asks(node.wiring.element) for node in self._nodes]
+        self._opaque = {number for number, node in enumerate(self._nodes) if not self._plain(node)}
+        self._skips = {number for number, node in enumerate(self._nodes) if any(map(self._may_skip, self._below[number]))}
+
+    def _plain(self, node: Node) -> bool:
+        """Tell whether all that a node asks for stands in the file."""
+        texts = [node.wiring.element.get(name) for name in SCRIPT_PORTS]
+        return node.wiring.type.name not in self.read.free and not any(text.lstrip().startswith("{") for text in texts)
+
+    def _may_skip(self, number: int) -> bool:
+        node = self._nodes[number]
+        before = node.before
+        conditions = before is not None and (before.skip_if is not None or before.while_true is not None)
+        return conditions or isinstance(node, SKIPS) or number in self._opaque
+
+    def ahead(self, phase: str, *, stops: bool, values: Sequence[Mapping[str, Hashable]]) -> Ahead:
+        """Return it for a director's phase; ``values`` are the statuses and attributes of the nodes.
+
+        ``stops``: the second tree brings the robot to rest. Until then it may have to.
+        """
+        if phase == "_settle":
+            return self._asked(frozenset(), everything=False)
+        found: set[int] = set()
+        for root in self._roots[1:] if stops else self._roots:
+            found |= self._from(root, values)
+        return self._asked(frozenset(found), everything=phase == "_wait")  # what is needed to begin may ask for anything
+
+    def _from(self, node: Node, values: Sequence[Mapping[str, Hashable]]) -> frozenset[int]:
+        """Return what can be ticked below a node, and it."""
+        number = self._number[id(node)]
+        mine = values[number]
+        kind = type(node)
+        if mine["status"] is not RUNNING or kind not in IN_TURN | AT_ONCE | ONCE or number in self._skips:
+            return self._below[number]  # what is skipped may begin again
+        found = {number}
+        for place, child in enumerate(node.children):
+            below = self._number[id(child)]
+            if not self._passed(kind, mine, place):
+                found |= self._from(child, values)
+            elif values[below]["status"] is RUNNING:  # it was skipped, and is halted some time
+                found |= self._below[below]
+        return frozenset(found)
+
+    @staticmethod
+    def _passed(kind: type[Node], mine: Mapping[str, Hashable], place: int) -> bool:
+        if kind in IN_TURN:
+            index = mine["_index"]
+            return isinstance(index, int) and place < index
+        done = mine["_done"] if kind in AT_ONCE else None
+        return isinstance(done, tuple) and place in done[1]
+
+    def _asked(self, nodes: frozenset[int], *, everything: bool) -> Ahead:
+        asks = [self._asks[number] for number in sorted(nodes)]
+        kept = OUTCOME.union(*(one.names for one in asks))
+        return Ahead(
+            nodes,
+            everything or bool(nodes & self._opaque),
+            self.read.sources(kept),
+            self.read.sources(kept.union(*(one.named for one in asks))),
+            self.read.sources(one for asked in asks for one in asked.written),
+            frozenset(end for one in asks for end in one.ends),
+            any(one.first for one in asks),
+            frozenset(skill for one in asks for skill in one.skills),
+        )
+
+    def _all(self, node: Node) -> Iterator[int]:
+        yield self._number[id(node)]
+        for child in node.children:
+            yield from self._all(child)
