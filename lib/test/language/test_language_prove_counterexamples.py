@@ -26,7 +26,7 @@ from alula.model.model import (
     Skillset,
     Transition,
 )
-from alula.prove import bench, limits, prove
+from alula.prove import bench, limits, prove, sets
 
 BOTH = pytest.mark.parametrize("most", [2000, 0], ids=["one by one", "as sets"])
 GOTO = """
@@ -138,6 +138,13 @@ def test_a_sparse_skillset_is_proved_by_the_skills_around_its_property(monkeypat
     questions = itertools.count()
     monkeypatch.setattr(limits.time, "monotonic", lambda: next(questions) / 1000)
     assert prove(bench.sparse(200), most=0, timeout_s=120) == []
+
+
+def test_what_the_skills_around_a_property_do_not_bring_about_is_refuted(monkeypatch):
+    monkeypatch.setattr(sets, "MOST_NODES", 0)
+    wanted = Property("other", PropertyKind.LEADS_TO, SkillRuns("use0"), ResourceIs("part1", "Used"), fair=True)
+    (finding,) = prove(replace(bench.sparse(4), properties=(wanted,)), most=0, timeout_s=600)
+    assert (finding.code, "`other`" in finding.message) == ("ALU531", True)
 
 
 def test_the_benchmark_measures(capsys):
