@@ -66,7 +66,8 @@ def sparse(count: int) -> Skillset:
     taken = [names[i % len(names)] for i in range(count)]
     skills = tuple(_taking(f"use{i}", one, *chance.sample([n for n in names if n != one], 2)) for i, one in enumerate(taken))
     alone = Property("alone", PropertyKind.NEVER, And((SkillRuns("use0"), Not(ResourceIs(taken[0], "Used")))))
-    return Skillset("sparse", resources=tuple(map(_free_or_used, names)), skills=skills, properties=(alone,))
+    ends = Property("ends", PropertyKind.LEADS_TO, SkillRuns("use0"), ResourceIs(taken[0], "Free"), fair=True)
+    return Skillset("sparse", resources=tuple(map(_free_or_used, names)), skills=skills, properties=(alone, ends))
 
 
 def _taking(name: str, mine: str, *others: str) -> Skill:

@@ -65,11 +65,15 @@ class Bound:
 
     def narrowed(self, situations: Any) -> Any:
         """Return a set without what is known not to be, of the resources and skills that it is about."""
-        resources, skills = self._parts(situations)
-        resources |= {name for skill in skills for name in self.writes[skill]}
-        return self.within_limits(
-            situations, [*(self.blocks[name].settled for name in sorted(resources)), *(self.rest[s] for s in sorted(skills))]
-        )
+        return self.within_limits(situations, self._known(self.bdd.support(situations)))
+
+    def around(self, *several: Any) -> Any:
+        """Return what is known of the resources and skills that these sets are about: all that can be reached, and more."""
+        return self.within_limits(self.bdd.true, self._known(set().union(*map(self.bdd.support, several))))
+
+    def skills(self, situations: Any) -> set[str]:
+        """Return the skills that a set is about."""
+        return self._parts(self.bdd.support(situations))[1]
 
     def within_limits(self, situations: Any, parts: Iterable[Any]) -> Any:
         """Return what is in a set and in all parts, without parts that would make its diagram too large: it has more then."""
@@ -89,8 +93,13 @@ class Bound:
         """Return what these resources can be within a step, whatever is found broken."""
         return self.model.all_of(self.blocks[name].unmarked for name in sorted(set(resources)))
 
-    def _parts(self, situations: Any) -> tuple[set[str], set[str]]:
-        found = [self._about[name] for name in self.bdd.support(situations) if name in self._about]
+    def _known(self, variables: Iterable[str]) -> list[Any]:
+        resources, skills = self._parts(variables)
+        resources |= {name for skill in skills for name in self.writes[skill]}
+        return [*(self.blocks[name].settled for name in sorted(resources)), *(self.rest[skill] for skill in sorted(skills))]
+
+    def _parts(self, variables: Iterable[str]) -> tuple[set[str], set[str]]:
+        found = [self._about[name] for name in variables if name in self._about]
         return {name for kind, name in found if kind == "resource"}, {name for kind, name in found if kind == "skill"}
 
     # --- one block ------------------------------------------------------------------------------------------------

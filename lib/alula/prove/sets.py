@@ -155,7 +155,7 @@ class Sets:
     # --- backwards ------------------------------------------------------------------------------------------------
 
     def before(self, situations: Any, *, within: Within | None = None, ending: str = "") -> Any:
-        """Return the situations with a step to one of these, as far as they may be reached.
+        """Return the situations with a step to one of these.
 
         Those with a step in which it comes to ``within`` are meant, too. With ``ending`` only steps that end an execution of
         this skill count.
@@ -168,7 +168,7 @@ class Sets:
                 result |= self._one_before(step, goal, within, ending)
         if ending:
             result = self.bdd.let({ENDED: False}, result)
-        return result & self.reached
+        return result
 
     def staying(self, situations: Any) -> Any:
         """Return those of these situations that have a step to one of these."""
@@ -232,10 +232,10 @@ class Sets:
             situations = changed | left
         return situations
 
-    def can_come_to(self, goal: Any, *, avoiding: Any = None) -> Any:
-        """Return the reachable situations from which some run comes to the goal, all before it being none of ``avoiding``."""
-        allowed = self.reached if avoiding is None else self.reached & ~avoiding
-        found, before = goal & self.reached, self.bdd.false
+    def can_come_to(self, goal: Any, *, inside: Any = None) -> Any:
+        """Return the situations from which some run comes to the goal, all of them being reachable, or ``inside`` where that is given."""
+        allowed = self.reached if inside is None else inside
+        found, before = goal & allowed, self.bdd.false
         # What ends executions leads back: steps of this kind may be all that is needed.
         for steps in ([step for step in self.steps if step.update.ends], self.steps):
             while found != before:

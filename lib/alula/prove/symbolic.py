@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import itertools
-from collections.abc import Iterable, Iterator
+from collections.abc import Iterable, Iterator, Sequence
 from typing import Any
 
 from alula.language.counterexamples import Counterexample
@@ -158,7 +158,10 @@ class _Search:
 
     def _run(self, wanted: Property, begins: Any, goal: Any) -> Diagnostic | None:
         """Look for a run that avoids the goal for ever; a set that allows one is walked before it is believed."""
-        avoiding = self._for_ever(goal, fair=wanted.fair)
+        leads = wanted.kind is PropertyKind.LEADS_TO and wanted.fair
+        if leads and not self.sets.exact and self._kept_by_few(begins, goal):
+            return None
+        avoiding = self._for_ever(goal, [skill.name for skill in self.skillset.skills] if wanted.fair else [])
         if not self._reaches(begins & avoiding):
             return None
         condition = wanted.condition if wanted.kind is PropertyKind.EVENTUALLY else wanted.consequence or Constant(value=False)
@@ -176,20 +179,39 @@ class _Search:
             suspected &= ~self.sets.only(graph.states[number] for number in looked)
         return None
 
-    def _for_ever(self, goal: Any, *, fair: bool) -> Any:
-        """Return all from which a run may avoid the goal for ever (Emerson and Lei's greatest fixpoint), or more."""
+    def _kept_by_few(self, begins: Any, goal: Any) -> bool:
+        """Tell whether a property holds even if only the skills around it have to end, in all that their bound allows.
+
+        Fewer skills that have to end, and more situations, allow more runs: where none of these is against the property, none is.
+        """
+        around = self.sets.bound.around(begins, goal)
+        skills = sorted(self.sets.bound.skills(around))
+        avoiding, before = around & ~goal, self.sets.bdd.false
+        while avoiding != before:
+            before = avoiding
+            avoiding = self._ending(avoiding, skills)
+        return not self._reaches(begins & avoiding)
+
+    def _for_ever(self, goal: Any, ending: Sequence[str]) -> Any:
+        """Return all from which a run may avoid the goal for ever (Emerson and Lei's greatest fixpoint), or more.
+
+        No execution of the skills ``ending`` lasts for ever.
+        """
         sets = self.sets
         stuck = sets.reached & ~sets.staying(sets.reached)
         avoiding, before = sets.reached & ~goal, sets.bdd.false
         while avoiding != before:
             before = avoiding
-            avoiding = sets.staying(avoiding) | (avoiding & stuck)
-            for skill in self.skillset.skills if fair else ():
-                rests = ~self.model.runs(skill.name)
-                if avoiding & ~rests == sets.bdd.false:
-                    continue
-                good = avoiding & (rests | sets.before(avoiding, ending=skill.name))
-                avoiding = sets.can_come_to(good, avoiding=~avoiding)
+            avoiding = self._ending(sets.staying(avoiding) | (avoiding & stuck), ending)
+        return avoiding
+
+    def _ending(self, avoiding: Any, skills: Iterable[str]) -> Any:
+        """Return what a run can begin with that stays in a set and comes, for each of these skills, to where it ends or rests."""
+        for skill in skills:
+            rests = ~self.model.runs(skill)
+            if avoiding & ~rests != self.sets.bdd.false:
+                good = avoiding & (rests | self.sets.before(avoiding, ending=skill))
+                avoiding = self.sets.can_come_to(good, inside=avoiding)
         return avoiding
 
 

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import itertools
 import json
 from dataclasses import replace
 
@@ -25,7 +26,7 @@ from alula.model.model import (
     Skillset,
     Transition,
 )
-from alula.prove import bench, limits, prove
+from alula.prove import bench, limits, prove, sets
 
 BOTH = pytest.mark.parametrize("most", [2000, 0], ids=["one by one", "as sets"])
 GOTO = """
@@ -130,6 +131,20 @@ def test_a_long_search_says_what_it_is_doing(monkeypatch):
     told = []
     assert prove(bench.sparse(6), most=0, timeout_s=600, tell=told.append) == []
     assert {line.split(";")[0] for line in told} == {"each block alone", "situations one by one", "situations as sets"}
+
+
+def test_a_sparse_skillset_is_proved_by_the_skills_around_its_property(monkeypatch):
+    """Time is counted by questions for it, a millisecond each: the same on every machine."""
+    questions = itertools.count()
+    monkeypatch.setattr(limits.time, "monotonic", lambda: next(questions) / 1000)
+    assert prove(bench.sparse(200), most=0, timeout_s=120) == []
+
+
+def test_what_the_skills_around_a_property_do_not_bring_about_is_refuted(monkeypatch):
+    monkeypatch.setattr(sets, "MOST_NODES", 0)
+    wanted = Property("other", PropertyKind.LEADS_TO, SkillRuns("use0"), ResourceIs("part1", "Used"), fair=True)
+    (finding,) = prove(replace(bench.sparse(4), properties=(wanted,)), most=0, timeout_s=600)
+    assert (finding.code, "`other`" in finding.message) == ("ALU531", True)
 
 
 def test_the_benchmark_measures(capsys):
