@@ -38,7 +38,7 @@ def read_points(path: Path) -> Floats:
         CloudError: it can't be read.
     """
     try:
-        vertices = PlyData.read(str(path), mmap=False)["vertex"].data
+        vertices = PlyData.read(str(path))["vertex"].data
         points = np.column_stack([np.asarray(vertices[axis], dtype=np.float64) for axis in "xyz"])
     except OSError as error:
         raise CloudError(f"{path.name}: {error.strerror}") from error

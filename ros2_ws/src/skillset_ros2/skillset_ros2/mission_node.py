@@ -34,6 +34,7 @@ from alula.runtime.codecs import event_of
 from alula.trees.groot.address import ServerError
 from alula.trees.view import NodeView
 from skillset_ros2 import NodeExecutor, SkillsetClient
+from skillset_ros2.base import QUIET
 
 TURN_S = 0.1  # wall clock; how soon a signal is seen when nothing else happens
 LATCHED = QoSProfile(depth=1, reliability=ReliabilityPolicy.RELIABLE, durability=DurabilityPolicy.TRANSIENT_LOCAL)
@@ -65,7 +66,8 @@ class MissionNode(Node):  # type: ignore[misc]  # rclpy is not typed
         self._heartbeat: Publisher | None = None
         self._tree = self.create_publisher(String, "/mission/tree", LATCHED)
         for name in plan.skillsets:
-            self.create_subscription(Event, f"/{name}/events", lambda event: self.driver.event(event_of(event)), ALL_EVENTS)
+            hear: Callable[[Event], None] = lambda event: self.driver.event(event_of(event))  # noqa: E731
+            self.create_subscription(Event, f"/{name}/events", hear, ALL_EVENTS, event_callbacks=QUIET)
         self.create_service(Trigger, "/mission/abort", self._on_abort)
         self.create_service(SetBool, "/mission/pause", self._on_pause)
         self.create_timer(TICK_PERIOD_S, self.driver.wake)

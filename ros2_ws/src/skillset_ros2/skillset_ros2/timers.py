@@ -12,6 +12,9 @@ from rclpy.node import Node
 
 from alula.runtime.timers import Job, Timer, TimerQueue
 
+NEVER_NS = 10**18
+"""Thirty years. rcl wakes the executor at each tick of a simulated clock behind a timer's moment, also when the timer is cancelled."""
+
 
 class RclpyTimers:
     """Jobs in the order of their moments, put in from any thread.
@@ -28,7 +31,7 @@ class RclpyTimers:
         self._on_loop = on_loop
         self._lock = threading.Lock()
         self._queue = TimerQueue()
-        self._timer: Any = node.create_timer(1.0, self._ring, callback_group=group, clock=clock, autostart=False)
+        self._timer: Any = node.create_timer(NEVER_NS / 1e9, self._ring, callback_group=group, clock=clock, autostart=False)
         # A timer that is set from another thread does not wake the executor; a guard condition does.
         self._wake: Any = node.create_guard_condition(self._set, callback_group=group)
 
@@ -51,11 +54,10 @@ class RclpyTimers:
         """Set the timer for the first job."""
         with self._lock:
             due_ns = self._queue.due_ns
+        self._timer.timer_period_ns = NEVER_NS if due_ns is None else max(0, due_ns - int(self._clock.now().nanoseconds))
+        self._timer.reset()
         if due_ns is None:
             self._timer.cancel()
-        else:
-            self._timer.timer_period_ns = max(1, due_ns - int(self._clock.now().nanoseconds))
-            self._timer.reset()
 
     def _ring(self) -> None:
         """Do what is due; what a job raises goes on to the executor, after the timer was set for the others."""

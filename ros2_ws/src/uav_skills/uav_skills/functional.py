@@ -11,6 +11,7 @@ from typing import Any
 
 from geometry_msgs.msg import Point
 from rclpy.callback_groups import ReentrantCallbackGroup
+from rclpy.event_handler import SubscriptionEventCallbacks
 from rclpy.node import Node
 from rclpy.qos import DurabilityPolicy, QoSProfile
 from skillset_interfaces.msg import ResourceStates
@@ -62,7 +63,9 @@ class FunctionalPart:
         return self._node.create_client(service_type, name, callback_group=self._group)
 
     def _subscribe(self, message_type: Any, topic: str, callback: Callable[[Any], None], qos: QoSProfile = LAST_FEW) -> None:
-        self._node.create_subscription(message_type, topic, callback, qos, callback_group=self._group)
+        # The data manager, which has most of these topics, too, gets rclpy's warnings; each is an entity that every turn gathers.
+        events = SubscriptionEventCallbacks(use_default_callbacks=False)
+        self._node.create_subscription(message_type, topic, callback, qos, callback_group=self._group, event_callbacks=events)
 
 
 class GuidanceApi(FunctionalPart):

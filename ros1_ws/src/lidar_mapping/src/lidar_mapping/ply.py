@@ -33,7 +33,7 @@ def write_ply(path: Path, points: NDArray[np.float64]) -> None:
 def read_ply(path: Path) -> NDArray[np.float64]:
     """Return the vertices (N, 3) of a file; raise ValueError when it is no cloud of x, y and z, or is cut off."""
     try:
-        vertices = PlyData.read(str(path), mmap=False)["vertex"].data
+        vertices = PlyData.read(str(path))["vertex"].data
         return np.column_stack([np.asarray(vertices[axis], dtype=np.float64) for axis in "xyz"])
     except (PlyParseError, KeyError, ValueError) as error:
         raise ValueError(f"{path} is no map: {error}") from error

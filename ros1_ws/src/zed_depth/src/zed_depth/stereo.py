@@ -143,7 +143,9 @@ class StereoMatcher:
         difference = np.zeros_like(image)
         cv2.absdiff(image[:, 2:], image[:, :-2], dst=difference[:, 1:-1])
         mean = cv2.boxFilter(difference, cv2.CV_32F, (TEXTURE_PX, 1))
-        return np.asarray(cv2.compare(mean, 2.0 * max(least, 0.1), cv2.CMP_GE), dtype=np.uint8)
+        # By numpy: OpenCV takes thirty times as long to compare an image with a number.
+        textured: Gray = (np.asarray(mean) >= np.float32(2.0 * max(least, 0.1))).view(np.uint8) * np.uint8(255)
+        return textured
 
 
 def _padded(matcher: cv2.StereoSGBM, columns: int, left: Gray, right: Gray) -> NDArray[np.int16]:
