@@ -112,6 +112,8 @@ CODES: Mapping[str, str] = {
     "ALU710": "runs that were not looked at in the time given",
     "ALU711": "a mission whose runs can't be looked at",
     "ALU712": "an acceptance without a reason, or of nothing",
+    "ALU713": "a property of a mission that can't be read",
+    "ALU714": "a property of a mission that does not hold",
 }
 
 PROOF_CODES: Mapping[str, str] = {code: meaning for code, meaning in CODES.items() if code.startswith("ALU5")}

@@ -9,7 +9,7 @@ from alula.model import semantics
 from alula.model.span import Span
 from alula.prove.mission.answers import GOOD, Answers, Row
 from alula.prove.mission.regions import Regions
-from alula.prove.mission.run import MissionFinding, MissionRun
+from alula.prove.mission.run import MissionFinding, MissionRun, run_of
 from alula.prove.mission.state import Managers
 from alula.prove.mission.system import FAILED
 from alula.prove.mission.words import told
@@ -92,17 +92,7 @@ def _unanswered(regions: Regions, answers: Answers) -> Iterator[Diagnostic]:
 
 
 def _until_its_end(regions: Regions, row: Row) -> MissionRun:
-    events, state = regions.run_on(row.region, *row.way)
-    system = regions.system
-    outcome = system.outcome(state)
-    states = [
-        one
-        for skillset, number in zip(system.skillsets, state.managers, strict=True)
-        for one in _named(
-            skillset.name, dict(zip((one.name for one in skillset.resources), system.managers_of(number).states, strict=False))
-        )
-    ]
-    return MissionRun(tuple(events), outcome.value if outcome else "running", tuple(states), system.skillsets)
+    return run_of(regions.system, *regions.run_on(row.region, *row.way))
 
 
 def _named(skillset: str, states: Mapping[str, str]) -> tuple[tuple[str, str], ...]:
