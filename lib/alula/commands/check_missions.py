@@ -41,7 +41,7 @@ def prove_missions(files: Sequence[ModelFile], timeout_s: float) -> None:
     from alula.prove.mission.prover import prove_mission  # which brings its solvers along
 
     skillsets, part = _robot()
-    faults = _faults(skillsets) if skillsets else {}
+    faults = faults_of(skillsets) if skillsets else {}
     for file in sound if skillsets else []:
         tell = partial(_tell, file.path)
         proved = prove_mission(Path(file.path), skillsets, part, faults=faults, timeout_s=timeout_s, tell=tell)
@@ -67,7 +67,7 @@ def _robot() -> tuple[tuple[Skillset, ...], MissionPart]:
     return models_of(robot, COMMAND), part_of(robot, COMMAND)
 
 
-def _faults(skillsets: Sequence[Skillset]) -> Mapping[str, frozenset[str]]:
+def faults_of(skillsets: Sequence[Skillset]) -> Mapping[str, frozenset[str]]:
     """Return the states in which the robot's faults show, those that have any."""
     path = find_robot().file(FAULTS)
     if path is None:

@@ -13,6 +13,7 @@ import pytest
 pytest.importorskip("z3")
 pytest.importorskip("py_trees")
 
+from alula.commands.check_missions import faults_of
 from alula.commands.mission_robot import models_of, part_of
 from alula.common.robots import find_robot
 from alula.language.codes import RUN_CODES
@@ -195,15 +196,16 @@ class Few(Deadline):
     def check(self) -> None:
         """Raise OutOfTimeError after so many."""
         self.left -= 1
-        if not self.left:
+        if self.left <= 0:
             raise OutOfTimeError("enough")
 
 
 @pytest.mark.parametrize("name", ["mapping", "inspection"])
 def test_the_drones_missions_keep_the_axes_as_listing_3_does(name: str) -> None:
     robot = find_robot(ROOT)
+    models = models_of(robot, "test")
     path = ROOT / "missions" / f"{name}.xml"
-    proved = prove_within(Few.after(1e6), path, models_of(robot, "test"), part_of(robot, "test"), given="this test")
+    proved = prove_within(Few.after(1e6), path, models, part_of(robot, "test"), faults=faults_of(models), given="this test")
     assert [one.code for one in proved.findings] == ["ALU710"]
     (finding,) = proved.accepted
     assert finding.code == "ALU701"

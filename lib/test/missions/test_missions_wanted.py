@@ -31,6 +31,7 @@ from alula.prove.mission.regions import Regions
 from alula.prove.mission.run import MissionFinding
 from alula.prove.mission.state import State
 from alula.prove.mission.system import System
+from alula.prove.mission.waits import Waits
 
 TREE = "<Sequence><drone.lift/><drone.hover/></Sequence><drone.land/>"
 WAITS = '<Sequence name="up"><drone.lift/><WaitFor name="ours" if="drone.control == OURS"/></Sequence><drone.land/>'
@@ -236,3 +237,51 @@ def waits_at_an_end(system: System, chance: random.Random, one: Property) -> boo
         waits = waits or (system.started(state) and true_in(system, one.condition, state, shown))
         waits = waits and not true_in(system, one.consequence, state)
     return False
+
+
+# --- what must come at the least: the end -----------------------------------------------------------------------------
+
+ROUNDS = (
+    ('<Sequence><drone.lift/><WaitFor name="ours" if="drone.control == OURS"/></Sequence><drone.land/>', "waits in 'ours' for ever"),
+    ('<KeepRunningUntilFailure name="again"><drone.hover/></KeepRunningUntilFailure>', "goes round 'again' without end"),
+    (
+        '<RetryUntilSuccessful num_attempts="-1"><Sequence><drone.lift/><ScriptCondition code="drone.control == OURS"/></Sequence>'
+        "</RetryUntilSuccessful>",
+        "goes round 'drone.lift' without end",
+    ),
+)
+ENDING = (
+    TREE,
+    '<Timeout msec="9000"><WaitFor if="drone.control == THEIRS"/></Timeout>',
+    '<RetryUntilSuccessful num_attempts="3"><Inverter><drone.hover/></Inverter></RetryUntilSuccessful><drone.land/>',
+    '<WaitFor if="progress(drone.hover) &gt;= 1 || drone.control == OURS || drone.control == THEIRS"/>',
+)
+
+
+@pytest.mark.parametrize(("tree", "words"), ROUNDS)
+def test_a_mission_that_never_ends_is_found_and_plays(tree: str, words: str, tmp_path: Path) -> None:
+    (finding,) = (one for one in proved(tmp_path, "", tree).findings if one.code == "ALU704")
+    assert words in finding.message
+    assert isinstance(finding, MissionFinding)
+    assert finding.run is not None
+    assert play(tmp_path / "mission.xml", finding.run, NO_PART).left == ""
+
+
+@pytest.mark.parametrize("tree", ENDING)
+def test_a_mission_that_ends_does_not_wait(tree: str, tmp_path: Path) -> None:
+    assert "ALU704" not in {one.code for one in proved(tmp_path, "", tree).findings}
+
+
+@pytest.mark.parametrize("seed", range(12))
+def test_waits_are_those_of_the_search_one_situation_after_another(seed: int, tmp_path: Path) -> None:
+    """Two ways to the same answer: at rest, from tick to tick, and by what the mission must come to."""
+    chance = random.Random(seed)  # noqa: S311 - for tests
+    trees = [chance.choice((*TREES, *ENDING, *(tree for tree, _ in ROUNDS)))]
+    path = written(tmp_path, "", "".join(trees))
+    system = System.read(path, skillsets(), NO_PART, LOOKED_AT)
+    regions = Regions(system, Deadline.after(100.0))
+    regions.explore()
+    ends = " or ".join(f"outcome {one}" for one in ("accomplished", "degraded", "given_up", "aborted"))
+    comes = held(regions, read(f"p: eventually {ends} assuming termination"), FAULTS, Deadline.after(100.0))
+    assert comes.complete
+    assert any(Waits(regions).found(Deadline.after(100.0))) == (comes.finding is not None)

@@ -35,7 +35,7 @@ def calm_of(system: System, *, terminating: bool) -> Callable[[Event], bool]:
 
 
 def reaching(goals: Iterable[Situation], before: Mapping[Situation, Iterable[Situation]]) -> set[Situation]:
-    """Return the goals and all from which they are reached, by what can come before each situation."""
+    """Return the goals and all from which they are reached, by what can come before each situation (or the other way round)."""
     found = set(goals)
     todo = list(found)
     while todo:

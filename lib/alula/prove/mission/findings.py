@@ -7,12 +7,14 @@ from collections.abc import Iterator, Mapping
 from alula.language.errors import Diagnostic, Severity
 from alula.model import semantics
 from alula.model.span import Span
+from alula.prove.limits import Deadline
 from alula.prove.mission.answers import GOOD, Answers, Row
 from alula.prove.mission.regions import Regions
 from alula.prove.mission.run import MissionFinding, MissionRun, run_of
 from alula.prove.mission.state import Managers
 from alula.prove.mission.system import FAILED
-from alula.prove.mission.words import told
+from alula.prove.mission.waits import Waits
+from alula.prove.mission.words import situation, told
 from alula.trees.node import Node
 
 
@@ -107,6 +109,16 @@ def _never_ticked(regions: Regions) -> Iterator[Diagnostic]:
     for node in nodes:
         if id(node) in never and id(node.parent) not in never:
             yield _finding("ALU703", f"'{node.name}' is never ticked", node, "take it away, or put it where it is reached")
+
+
+def waits(regions: Regions, deadline: Deadline) -> Iterator[Diagnostic]:
+    """Yield ALU704 for situations after which the mission never ends, with a run to each; raises OutOfTimeError."""
+    system = regions.system
+    for node, events, state, stays in Waits(regions).found(deadline):
+        how = f"waits in '{node.name}' for ever" if stays else f"goes round '{node.name}' without end"
+        message = f"the mission {how}, though nothing fails any more: {situation(system, state)}"
+        cure = "wait with Timeout, Awaits or `within`, try again a number of times, or leave the loop"
+        yield _finding("ALU704", message, node, cure, told(system, events), run_of(system, events, state))
 
 
 def _finding(code: str, message: str, node: Node, cure: str, lines: tuple[str, ...] = (), run: MissionRun | None = None) -> Diagnostic:

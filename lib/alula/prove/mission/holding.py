@@ -22,7 +22,7 @@ from alula.prove.mission.regions import Regions
 from alula.prove.mission.run import MissionFinding, run_of
 from alula.prove.mission.state import Event, Kind, State
 from alula.prove.mission.system import System
-from alula.prove.mission.words import told
+from alula.prove.mission.words import situation, told
 
 CODE = "ALU714"
 SINGLE = frozenset({PropertyKind.NEVER, PropertyKind.ALWAYS})
@@ -63,21 +63,6 @@ def held(regions: Regions, one: Property, faults: Faults, deadline: Deadline) ->
     message = f"the property {said} does not hold"
     cure = "mend the mission or the model, or the property where it asks for too much"
     return Held(MissionFinding(CODE, message, one.span, Severity.ERROR, cure, example=lines, run=run_of(system, events, state)), complete)
-
-
-def situation(system: System, state: State) -> str:
-    """Return a situation in words: what is not as at power-up, what runs, and where the tree is."""
-    first = system.initial()
-    names = [f"{one.name}.{resource.name}" for one in system.skillsets for resource in one.resources]
-    words = [f"{name} == {system.resource(state, name)}" for name in names if system.resource(state, name) != system.resource(first, name)]
-    words += [f"running({_skill(system, leaf)})" for leaf, one in system.open(state) if one.phase == "running"]
-    end = system.outcome(state)
-    words.append(f"outcome {end.value}" if end else ", ".join(f"active('{node.name}')" for node in system.active(state)[-1:]))
-    return ", ".join(word for word in words if word)
-
-
-def _skill(system: System, leaf: int) -> str:
-    return f"{system.leaves[leaf].skillset}.{system.leaves[leaf].model.name}"
 
 
 # --- single situations --------------------------------------------------------------------------------------------------

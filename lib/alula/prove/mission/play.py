@@ -238,7 +238,7 @@ class _Player:
 
     def finish(self, left: str) -> Played:
         """End the record."""
-        end = self._driver.end or End(Outcome.ABORTED, f"it left the counterexample {left}")
+        end = self._driver.end or End(Outcome.ABORTED, f"it left the counterexample {left}" if left else "the counterexample ends here")
         self._driver.finish(end)
         return Played(end, left, self.world.now_s)
 

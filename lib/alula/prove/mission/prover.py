@@ -15,7 +15,7 @@ from alula.prove.limits import Deadline, OutOfTimeError
 from alula.prove.mission.accepted import acceptances, divided
 from alula.prove.mission.answers import Answers, Row
 from alula.prove.mission.conditions import NO_FAULTS, Faults
-from alula.prove.mission.findings import findings
+from alula.prove.mission.findings import findings, waits
 from alula.prove.mission.holding import SINGLE, held
 from alula.prove.mission.managers import Failures
 from alula.prove.mission.oracle import UndecidedError
@@ -84,9 +84,10 @@ def prove_within(
         return Proved([_bound(path, 0, given)], [], complete=False)
     answers = Answers(regions)
     known = acceptances(regions.system.nodes)
-    found, accepted = divided(findings(regions, answers), known, str(path), complete=regions.complete)
+    seen_waiting, undecided = _waits(regions, deadline)
+    complete = regions.complete and not undecided
+    found, accepted = divided([*findings(regions, answers), *seen_waiting], known, str(path), complete=complete)
     found += wrong
-    undecided = []
     for one in properties if not wrong else ():
         seen = held(regions, one, faults, deadline)
         found += [seen.finding] if seen.finding else []
@@ -95,6 +96,14 @@ def prove_within(
     if not complete:
         found.append(_bound(path, len(regions.regions), given, undecided))
     return Proved(found, answers.rows, complete, accepted)
+
+
+def _waits(regions: Regions, deadline: Deadline) -> tuple[list[Diagnostic], list[str]]:
+    """Return the findings about waits, and what could not be looked at."""
+    try:
+        return list(waits(regions, deadline)), []
+    except (OutOfTimeError, KeyboardInterrupt):
+        return [], ["ALU704"]
 
 
 def _explore(regions: Regions) -> None:
