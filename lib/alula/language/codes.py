@@ -110,6 +110,7 @@ CODES: Mapping[str, str] = {
     "ALU702": "a failure that nothing answers",
     "ALU703": "a node that no run ticks",
     "ALU704": "a mission that waits for ever, or goes round without end",
+    "ALU705": "a request that can be refused, and nothing answers",
     "ALU710": "runs that were not looked at in the time given",
     "ALU711": "a mission whose runs can't be looked at",
     "ALU712": "an acceptance without a reason, or of nothing",

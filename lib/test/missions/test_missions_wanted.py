@@ -285,3 +285,31 @@ def test_waits_are_those_of_the_search_one_situation_after_another(seed: int, tm
     comes = held(regions, read(f"p: eventually {ends} assuming termination"), FAULTS, Deadline.after(100.0))
     assert comes.complete
     assert any(Waits(regions).found(Deadline.after(100.0))) == (comes.finding is not None)
+
+
+# --- refusals ---------------------------------------------------------------------------------------------------------
+
+EYES = """
+skillset eyes {
+  resource lens { state { CLEAR DIRTY } initial CLEAR transition { extern CLEAR -> DIRTY  extern DIRTY -> CLEAR } }
+  skill look { precondition clear: lens == CLEAR success SEEN }
+}
+"""
+
+
+def test_a_race_between_a_condition_and_a_request_is_told_and_plays(tmp_path: Path) -> None:
+    (robot,) = check_texts([ModelFile("eyes.rl", EYES)])
+    path = written(tmp_path, "", '<Sequence><ScriptCondition code="eyes.lens == CLEAR"/><eyes.look/></Sequence>')
+    (finding,) = prove_mission(path, robot.skillsets, NO_PART).findings
+    assert finding.code == "ALU705"
+    assert "NOT_READY (clear), because after the tree has asked eyes.lens CLEAR -> DIRTY" in finding.message
+    assert isinstance(finding, MissionFinding)
+    assert finding.run is not None
+    played = play(path, finding.run, NO_PART)
+    assert (played.left, played.end.outcome.value) == ("", "given_up")
+
+
+def test_a_request_that_fails_in_both_ways_has_both_findings(tmp_path: Path) -> None:
+    found = proved(tmp_path, "", "<Sequence><ForceSuccess><drone.climb/></ForceSuccess><drone.hover/></Sequence>")
+    assert {"ALU702", "ALU705"} <= {one.code for one in found.findings}
+    assert all("is refused" not in "".join(one.example[-1:]) for one in found.findings if one.code == "ALU702")
