@@ -285,6 +285,19 @@ def test_regions_are_exactly_what_is_reached_step_by_step(seed: int, tmp_path: P
 
 
 @pytest.mark.parametrize("seed", range(12))
+def test_a_mission_does_not_end_while_a_skill_runs(seed: int, tmp_path: Path) -> None:
+    """So no finding is about that: the engine waits for what it has interrupted."""
+    system = System.read(mission(random.Random(seed), tmp_path, 1), robots(), PART, Failures(hooks=False, aborts=False))  # noqa: S311 - for tests
+    regions = Regions(system, Deadline.after(100.0))
+    regions.explore()
+    ends = [one for one in regions.regions if system.ticker.memories[one.memory].end is not None]
+    assert ends
+    for region in ends:
+        for closure in region.closures:
+            assert all(execution.phase == "ended" for one in closure.all for execution in system.managers_of(one).executions)
+
+
+@pytest.mark.parametrize("seed", range(12))
 def test_a_run_of_a_region_is_a_run_step_by_step(seed: int, tmp_path: Path) -> None:
     system = System.read(mission(random.Random(seed), tmp_path, 1), robots(), PART, Failures(hooks=False, aborts=False))  # noqa: S311 - for tests
     regions = Regions(system, Deadline.after(100.0))

@@ -12,7 +12,7 @@ import pytest
 pytest.importorskip("z3")
 pytest.importorskip("py_trees")
 
-from alula.language.errors import Diagnostic
+from alula.language.errors import Diagnostic, has_errors
 from alula.language.lexer import Source
 from alula.language.models import ModelFile, check_texts
 from alula.language.syntax.cursor import Cursor
@@ -313,3 +313,26 @@ def test_a_request_that_fails_in_both_ways_has_both_findings(tmp_path: Path) -> 
     found = proved(tmp_path, "", "<Sequence><ForceSuccess><drone.climb/></ForceSuccess><drone.hover/></Sequence>")
     assert {"ALU702", "ALU705"} <= {one.code for one in found.findings}
     assert all("is refused" not in "".join(one.example[-1:]) for one in found.findings if one.code == "ALU702")
+
+
+DRIVING = """
+skillset rover {
+  resource wheels { state { FREE USED } initial FREE transition { FREE -> USED USED -> FREE } }
+  skill look { progress { period 0.5 } }
+  skill drive { start wheels -> USED interrupt { effect wheels -> FREE } success DONE { effect wheels -> FREE } }
+}
+"""
+
+
+def test_progress_that_a_script_waits_for_is_played(tmp_path: Path) -> None:
+    (robot,) = check_texts([ModelFile("rover.rl", DRIVING)])
+    assert not has_errors(robot.findings)
+    tree = '<Sequence><WaitFor if="progress(rover.look) &gt;= 0.7"/><rover.drive/></Sequence>'
+    path = written(tmp_path, "property still: never running(rover.drive)", PARALLEL.format(f"<rover.look/>{tree}"))
+    (finding,) = (one for one in prove_mission(path, robot.skillsets, NO_PART).findings if one.code == "ALU714")
+    assert isinstance(finding, MissionFinding)
+    assert finding.run is not None
+    assert play(path, finding.run, NO_PART).left == ""
+
+
+PARALLEL = '<Parallel success_count="1" failure_count="1">{}</Parallel>'
