@@ -20,7 +20,7 @@ from alula.language.syntax.properties import read_mission_property
 from alula.missions.check.page import whole
 from alula.missions.filed.part import NO_PART
 from alula.model.model import Property, Skillset
-from alula.prove.limits import Deadline
+from alula.prove.limits import Deadline, OutOfTimeError
 from alula.prove.mission.conditions import Faults, faults_shown, true_in
 from alula.prove.mission.holding import held
 from alula.prove.mission.managers import Failures
@@ -285,6 +285,37 @@ def test_waits_are_those_of_the_search_one_situation_after_another(seed: int, tm
     comes = held(regions, read(f"p: eventually {ends} assuming termination"), FAULTS, Deadline.after(100.0))
     assert comes.complete
     assert any(Waits(regions).found(Deadline.after(100.0))) == (comes.finding is not None)
+
+
+class Steps(Deadline):
+    """A bound of steps in the place of one of time."""
+
+    left = 0
+
+    def check(self) -> None:
+        """Raise OutOfTimeError after so many."""
+        self.left -= 1
+        if self.left < 0:
+            raise OutOfTimeError
+
+
+def test_waits_that_are_told_when_the_time_is_over_are_waits(tmp_path: Path) -> None:
+    path = written(tmp_path, "", "".join(tree for tree, _ in ROUNDS[:1]))
+    regions = Regions(System.read(path, skillsets(), NO_PART, LOOKED_AT), Deadline.after(100.0))
+    regions.explore()
+    whole_time = [node.name for node, *_ in Waits(regions).found(Deadline.after(100.0))]
+    assert whole_time == ["ours"]
+    told = []
+    for most in range(60):
+        deadline = Steps.after(1e6)
+        deadline.left = most
+        found: list[str] = []
+        try:
+            found.extend(node.name for node, *_ in Waits(regions).found(deadline))
+        except OutOfTimeError:
+            told.append(found)
+    assert [] in told
+    assert all(name in whole_time for found in told for name in found)
 
 
 # --- refusals ---------------------------------------------------------------------------------------------------------

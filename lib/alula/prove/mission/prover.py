@@ -84,26 +84,28 @@ def prove_within(
         return Proved([_bound(path, 0, given)], [], complete=False)
     answers = Answers(regions)
     known = acceptances(regions.system.nodes)
-    seen_waiting, undecided = _waits(regions, deadline)
-    complete = regions.complete and not undecided
+    seen_waiting, complete = _waits(regions, deadline.half(deadline.doing) if several else deadline)
     found, accepted = divided([*findings(regions, answers), *seen_waiting], known, str(path), complete=complete)
     found += wrong
+    undecided = []
     for one in properties if not wrong else ():
         seen = held(regions, one, faults, deadline)
         found += [seen.finding] if seen.finding else []
         undecided += [one.name] if not seen.finding and not seen.complete else []
-    complete = regions.complete and not undecided
+    complete = complete and not undecided
     if not complete:
         found.append(_bound(path, len(regions.regions), given, undecided))
     return Proved(found, answers.rows, complete, accepted)
 
 
-def _waits(regions: Regions, deadline: Deadline) -> tuple[list[Diagnostic], list[str]]:
-    """Return the findings about waits, and what could not be looked at."""
+def _waits(regions: Regions, deadline: Deadline) -> tuple[list[Diagnostic], bool]:
+    """Return the findings about waits, and whether all situations were looked at for them."""
+    found: list[Diagnostic] = []
     try:
-        return list(waits(regions, deadline)), []
+        found.extend(waits(regions, deadline))
     except (OutOfTimeError, KeyboardInterrupt):
-        return [], ["ALU704"]
+        return found, False
+    return found, regions.complete
 
 
 def _explore(regions: Regions) -> None:

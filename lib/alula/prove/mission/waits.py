@@ -10,7 +10,7 @@ from collections import deque
 from collections.abc import Callable, Iterator
 from itertools import product
 
-from alula.prove.limits import Deadline
+from alula.prove.limits import Deadline, OutOfTimeError
 from alula.prove.mission.calm import calm_of, reaching
 from alula.prove.mission.regions import Regions
 from alula.prove.mission.state import Event, State
@@ -29,22 +29,28 @@ class Waits:
         self._after: dict[State, list[State]] = {}
         self._ends: set[State] = set()
         self._asking: set[State] = set()
+        self._open: set[State] = set()
+        """Those that were not looked at any further: they may lead anywhere."""
 
     def found(self, deadline: Deadline) -> Iterator[tuple[Node, list[Event], State, bool]]:
         """Yield each node that it stays in for ever, with a run to there, the situation, and whether all stays as it is.
 
-        Raises OutOfTimeError.
+        When the time is over, it yields those of what was looked at by then, and raises OutOfTimeError.
         """
-        first = self._situations(deadline)
-        self._explore(list(first), deadline)
-        good: set[State] = reaching(self._ends, self._before)
+        first: dict[State, int] = {}
+        over: OutOfTimeError | None = None
+        try:
+            self._situations(first, deadline)
+            self._explore(list(first), deadline)
+        except OutOfTimeError as error:
+            over = error
+        good: set[State] = reaching(self._ends | self._open, self._before)
         never = set(self._after) - good
         known: set[State] = set()
         told: set[tuple[int, bool]] = set()
         for begin in (state for state in first if state in never):
             if begin in known:
                 continue
-            deadline.check()
             rounds = self._last(begin)
             explained: set[State] = reaching(rounds, self._before)
             known |= explained
@@ -54,6 +60,8 @@ class Waits:
             if active and (id(active[-1]), stays) not in told:
                 told.add((id(active[-1]), stays))
                 yield active[-1], self._regions.run(first[state], dict(enumerate(state.managers))), state, stays
+        if over is not None:
+            raise over
 
     def _last(self, state: State) -> set[State]:
         """Return situations that are come to from there, each of which leads to all others of them and to nothing else."""
@@ -65,9 +73,8 @@ class Waits:
                 return after
             state = min(left)
 
-    def _situations(self, deadline: Deadline) -> dict[State, int]:
-        """Return those of all regions, each with the first region that has it."""
-        found: dict[State, int] = {}
+    def _situations(self, found: dict[State, int], deadline: Deadline) -> None:
+        """Add those of all regions, each with the first region that has it."""
         for number, region in enumerate(self._regions.regions):
             if not self._system.ticker.memories[region.memory].started or self._over(region.memory):
                 continue
@@ -78,10 +85,10 @@ class Waits:
             for managers in product(*resting):
                 found.setdefault(State(region.memory, managers), number)
                 deadline.check()
-        return found
 
     def _explore(self, todo: list[State], deadline: Deadline) -> None:
         seen, waiting = set(todo), deque(todo)
+        self._open = seen.copy()
         while waiting:
             deadline.doing = f"waits: {len(waiting)} situations to look at"
             deadline.check()
@@ -93,7 +100,9 @@ class Waits:
                     self._ends.add(after)
                 elif after not in seen:
                     seen.add(after)
+                    self._open.add(after)
                     waiting.append(after)
+            self._open.discard(state)
 
     def _next(self, state: State) -> Iterator[State]:
         """Yield the situations at rest after a tick."""
