@@ -15,6 +15,7 @@ from alula.common.robots import RobotError, find_robot
 from alula.console.page import write_report
 from alula.language.errors import has_errors
 from alula.live.spec import RequestError
+from alula.missions.director import Outcome
 from alula.missions.filed.part import NO_PART
 from alula.prove.mission.run import MissionFinding
 
@@ -63,9 +64,9 @@ def _flown(path: Path, finding: MissionFinding, folder: Path, *, as_json: bool) 
         }
         sys.stdout.write(json.dumps(told, indent=2) + "\n")
     else:
-        how = (
-            f"it left the counterexample {played.left}" if played.left else f"the mission comes to the same end: {played.end.outcome.value}"
-        )
+        goes_on = finding.run.outcome == Outcome.RUNNING.value
+        same = "situation" if goes_on else f"end: {played.end.outcome.value}"
+        how = f"it left the counterexample {played.left}" if played.left else f"the mission comes to the same {same}"
         sys.stdout.write("\n".join([title, *(f"  {line}" for line in finding.example), how, f"report: {folder / 'report.html'}"]) + "\n")
     return 1 if played.left else 0
 

@@ -109,9 +109,13 @@ CODES: Mapping[str, str] = {
     "ALU701": "a mission that can end so that a skill can't start any more",
     "ALU702": "a failure that nothing answers",
     "ALU703": "a node that no run ticks",
+    "ALU704": "a mission that waits for ever, or goes round without end",
+    "ALU705": "a request that can be refused, and nothing answers",
     "ALU710": "runs that were not looked at in the time given",
     "ALU711": "a mission whose runs can't be looked at",
     "ALU712": "an acceptance without a reason, or of nothing",
+    "ALU713": "a property of a mission that can't be read",
+    "ALU714": "a property of a mission that does not hold",
 }
 
 PROOF_CODES: Mapping[str, str] = {code: meaning for code, meaning in CODES.items() if code.startswith("ALU5")}

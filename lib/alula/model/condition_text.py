@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from alula.model.expressions import And, Constant, DataIs, Expression, Implies, Not, Or, ResourceIs, SkillRuns
+from alula.model.expressions import And, Atom, Constant, DataIs, Expression, Implies, MissionIs, Not, Or, ResourceIs, SkillRuns
 
 IMPLIES, OR, AND, NOT = range(4)
 """How tightly an operator binds."""
@@ -24,13 +24,15 @@ def bare_text(condition: Expression, tightness: int = IMPLIES) -> str:
     return f"({text})" if level < tightness else text
 
 
-def atom_text(atom: ResourceIs | DataIs | SkillRuns | Constant) -> str:
+def atom_text(atom: Atom) -> str:
     """Return a leaf of a condition."""
     match atom:
         case ResourceIs():
             return f"{atom.resource} {'!=' if atom.negated else '=='} {atom.state}"
         case SkillRuns():
             return f"{atom.skill} running"
+        case MissionIs():
+            return f"active('{atom.name}')" if atom.what == "active" else f"{atom.what} {atom.name}"
         case Constant():
             return "true" if atom.value else "false"
         case DataIs():

@@ -8,7 +8,7 @@ from collections.abc import Callable, Mapping, Sequence
 from typing import Any
 
 from alula.model.errors import DataMissingError, UnsupportedModelError
-from alula.model.expressions import And, Comparison, Constant, DataIs, Expression, Implies, Not, Or, ResourceIs, SkillRuns, atoms
+from alula.model.expressions import And, Comparison, Constant, DataIs, Expression, Implies, MissionIs, Not, Or, ResourceIs, SkillRuns, atoms
 from alula.model.units import UNIT_IN_SI
 
 States = Mapping[str, str]
@@ -42,6 +42,8 @@ def judge(condition: Expression, states: States, data: Data) -> bool | None:
             return _first(True, operands, states, data)
         case SkillRuns(skill=skill):
             raise UnsupportedModelError(f"{skill} running: that can be asked in properties only")
+        case MissionIs(what=what):
+            raise UnsupportedModelError(f"{what}: that can be asked in properties of missions only")
         case Implies(premise=premise, conclusion=conclusion):
             return _first(True, (Not(premise), conclusion), states, data)
 

@@ -63,6 +63,15 @@ class SkillRuns:
 
 
 @dataclass(frozen=True)
+class MissionIs:
+    """``active('node')``, ``outcome given_up`` or ``fault zed``: ``what`` is the word. Only properties of missions ask it."""
+
+    what: str
+    name: str
+    span: Span = field(default=NOWHERE, compare=False)
+
+
+@dataclass(frozen=True)
 class Not:
     """``not operand``."""
 
@@ -95,7 +104,7 @@ class Implies:
     span: Span = field(default=NOWHERE, compare=False)
 
 
-Atom = ResourceIs | DataIs | SkillRuns | Constant
+Atom = ResourceIs | DataIs | SkillRuns | MissionIs | Constant
 Expression = Atom | Not | And | Or | Implies
 TRUE = Constant(value=True)
 

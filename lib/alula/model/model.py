@@ -273,6 +273,7 @@ class Property:
     NEVER: no reachable state fulfils ``condition``; ALWAYS: every one does; EVENTUALLY: every run gets to one that does;
     LEADS_TO: after each state that fulfils ``condition`` the run gets to one that fulfils ``consequence`` (None for the other
     kinds). ``fair`` (written ``assuming termination``): only runs in which no execution stays RUNNING for ever are looked at.
+    ``within``: of a mission, after how many ticks of its tree at most; 0: some time.
     """
 
     name: str
@@ -280,6 +281,7 @@ class Property:
     condition: Expression
     consequence: Expression | None = None
     fair: bool = False
+    within: int = 0
     span: Span = field(default=NOWHERE, compare=False)
 
 

@@ -7,6 +7,7 @@ from pathlib import Path
 
 import pytest
 
+from alula.commands.check_missions import faults_of
 from alula.commands.mission_robot import models_of, part_of
 from alula.common.robots import find_robot
 from alula.language.examples import RUNS, examples
@@ -36,7 +37,7 @@ class Few(Deadline):
     def check(self) -> None:
         """Raise OutOfTimeError after so many."""
         self.left -= 1
-        if not self.left:
+        if self.left <= 0:
             raise OutOfTimeError("enough")
 
 
@@ -48,14 +49,16 @@ def found(folder: Path, code: str) -> tuple[Path, list[MissionFinding]]:
     return path, [one for one in findings if isinstance(one, MissionFinding) and one.run is not None]
 
 
-@pytest.mark.parametrize("code", ["ALU701", "ALU702"])
+@pytest.mark.parametrize("code", ["ALU701", "ALU702", "ALU704", "ALU714"])
 def test_the_examples_play_to_their_end(code: str, tmp_path: Path) -> None:
     path, findings = found(tmp_path, code)
     assert findings
     for finding in findings:
         assert finding.run is not None
         played = play(path, finding.run, NO_PART)
-        assert (played.left, played.end.outcome) == ("", Outcome.GIVEN_UP)
+        goes_on = code in {"ALU704", "ALU714"}
+        assert finding.run.outcome == ("running" if goes_on else "given_up")
+        assert (played.left, played.end.outcome) == ("", Outcome.ABORTED if goes_on else Outcome.GIVEN_UP)
 
 
 DATA = """
@@ -113,8 +116,8 @@ def test_a_run_that_does_not_happen_is_left_where_it_does_not(tmp_path: Path) ->
 
 def test_the_axes_that_listing_3_keeps_are_kept_in_a_flight(tmp_path: Path) -> None:
     robot, path = find_robot(ROOT), ROOT / "missions" / "mapping.xml"
-    part = part_of(robot, "test")
-    (finding,) = prove_within(Few.after(1e6), path, models_of(robot, "test"), part, given="this test").accepted
+    part, models = part_of(robot, "test"), models_of(robot, "test")
+    (finding,) = prove_within(Few.after(1e6), path, models, part, faults=faults_of(models), given="this test").accepted
     assert isinstance(finding, MissionFinding)
     assert finding.run is not None
     assert ("navigation.axes_authority", "USED") in finding.run.states

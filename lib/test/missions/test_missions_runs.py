@@ -15,6 +15,7 @@ import pytest
 pytest.importorskip("z3")
 pytest.importorskip("py_trees")
 
+from alula.commands.check_missions import faults_of
 from alula.commands.mission_robot import models_of, part_of
 from alula.common.robots import find_robot
 from alula.language.codes import RUN_CODES
@@ -203,14 +204,15 @@ class Few(Deadline):
     def check(self) -> None:
         """Raise OutOfTimeError after so many."""
         self.left -= 1
-        if not self.left:
+        if self.left <= 0:
             raise OutOfTimeError("enough")
 
 
 def drones(name: str, deadline: Deadline) -> Proved:
     robot = find_robot(ROOT)
+    models = models_of(robot, "test")
     path = ROOT / "missions" / f"{name}.xml"
-    return prove_within(deadline, path, models_of(robot, "test"), part_of(robot, "test"), given="this test")
+    return prove_within(deadline, path, models, part_of(robot, "test"), faults=faults_of(models), given="this test")
 
 
 def test_what_was_found_before_the_bound_is_told() -> None:
@@ -322,6 +324,19 @@ def test_regions_are_exactly_what_is_reached_step_by_step(seed: int, tmp_path: P
     regions.explore()
     assert regions.complete
     assert {State(one.memory, managers) for one in regions.regions for managers in product(*one.sets)} == one_by_one
+
+
+@pytest.mark.parametrize("seed", range(12))
+def test_a_mission_does_not_end_while_a_skill_runs(seed: int, tmp_path: Path) -> None:
+    """So no finding is about that: the engine waits for what it has interrupted."""
+    system = System.read(mission(random.Random(seed), tmp_path, 1), robots(), PART, Failures(hooks=False, aborts=False))  # noqa: S311 - for tests
+    regions = Regions(system, Deadline.after(100.0))
+    regions.explore()
+    ends = [one for one in regions.regions if system.ticker.memories[one.memory].end is not None]
+    assert ends
+    for region in ends:
+        for closure in region.closures:
+            assert all(execution.phase == "ended" for one in closure.all for execution in system.managers_of(one).executions)
 
 
 @pytest.mark.parametrize("seed", range(12))

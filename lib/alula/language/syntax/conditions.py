@@ -9,12 +9,13 @@ From loose to tight: `=>` (to the right), `or`, `and`, `not`, then comparisons a
 from __future__ import annotations
 
 from collections.abc import Callable
+from dataclasses import replace
 from typing import NoReturn
 
 from alula.language.lexer import Kind, Token, string_value
 from alula.language.syntax.cursor import OPERATOR_WORDS, Cursor, SyntaxFault
 from alula.language.syntax.quantities import quantity
-from alula.model.expressions import And, Comparison, Constant, DataIs, Expression, Implies, Not, Or, ResourceIs, SkillRuns
+from alula.model.expressions import And, Comparison, Constant, DataIs, Expression, Implies, MissionIs, Not, Or, ResourceIs, SkillRuns
 from alula.model.span import Span
 
 MAX_DEPTH = 40
@@ -23,6 +24,7 @@ MAX_DEPTH = 40
 Atom = Callable[[int], Expression]
 _COMPARISONS = tuple(comparison.value for comparison in Comparison)
 _EQUALITIES = ("==", "!=")
+_MISSION_HINT = "ask `skillset.resource == STATE`, `running(skillset.skill)`, `active('node')`, `outcome given_up` or `fault name`"
 _NO_EXECUTION = frozenset({*_COMPARISONS, ".", ":", "{", "->"})
 """What tells that `running` is a name of its own and does not belong to the name before it."""
 
@@ -37,8 +39,15 @@ def bare_condition(cursor: Cursor) -> Expression:
     return _Reader(cursor, bare=True).implication(0)
 
 
+def mission_condition(cursor: Cursor) -> Expression:
+    """Read a condition of a mission's property: resources and skills with their skillset, nodes, the outcome, faults; `->` is `=>`."""
+    return _MissionReader(cursor, bare=True).implication(0)
+
+
 class _Reader:
     """Reads one condition; ``atom`` changes with where we are: outside, in `resource = (...)` or in `data = (...)`."""
+
+    implies: tuple[str, ...] = ("=>",)
 
     def __init__(self, cursor: Cursor, *, bare: bool) -> None:
         self.cursor = cursor
@@ -50,7 +59,7 @@ class _Reader:
         if depth > MAX_DEPTH:
             self._too_deep()
         premise = self._disjunction(depth)
-        if not self.cursor.accept("=>"):
+        if not self.cursor.accept(*self.implies):
             return premise
         return Implies(premise, self.implication(depth + 1), span=_span(premise))
 
@@ -170,6 +179,42 @@ class _Reader:
         message = f"the condition is nested more than {MAX_DEPTH} deep"
         self.cursor.source.report("ALU105", message, self.cursor.span(self.cursor.here))
         raise SyntaxFault
+
+
+class _MissionReader(_Reader):
+    implies = ("=>", "->")
+
+    def _bare_atom(self, _depth: int) -> Expression:
+        cursor = self.cursor
+        first = cursor.here
+        if cursor.at("running", "active") and cursor.ahead().text == "(":
+            cursor.advance()
+            cursor.advance()
+            asked = self._skill() if first.text == "running" else MissionIs("active", self._node())
+            cursor.expect(")")
+            return replace(asked, span=cursor.span(first, cursor.previous))
+        if cursor.at("outcome", "fault") and cursor.ahead().kind is Kind.NAME:
+            word, name = cursor.advance(), cursor.advance()
+            return MissionIs(word.text, name.text, span=cursor.span(word, name))
+        if first.kind is not Kind.NAME or first.text in OPERATOR_WORDS:
+            raise cursor.fail("a condition", hint=_MISSION_HINT)
+        resource = self._of_skillset()
+        operator = cursor.expect(*_EQUALITIES, hint=_MISSION_HINT)
+        state = cursor.name("a state")
+        return ResourceIs(resource, state.text, operator.text == "!=", span=cursor.span(first, state))
+
+    def _skill(self) -> SkillRuns:
+        return SkillRuns(self._of_skillset())
+
+    def _node(self) -> str:
+        if self.cursor.here.kind is not Kind.STRING:
+            raise self.cursor.fail("the name of a node in quotes")
+        return string_value(self.cursor.advance())
+
+    def _of_skillset(self) -> str:
+        skillset = self.cursor.name("a skillset")
+        self.cursor.expect(".", hint=_MISSION_HINT)
+        return f"{skillset.text}.{self.cursor.name('a name of the skillset').text}"
 
 
 def _span(expression: Expression) -> Span:

@@ -17,7 +17,9 @@ from alula.trees.errors import Place
 from alula.trees.node import Node
 
 DESCRIPTION = "_description"
-_ACCEPTED = re.compile(r"\baccepted (?P<code>ALU7\d\d)(?: \((?P<words>[^)]*)\))?:(?P<reason>.*?)(?=\baccepted ALU7|\Z)", re.DOTALL)
+NEXT = r"\baccepted ALU7|\bproperty \w+:|\Z"
+"""Where what a description says for the search ends at the latest."""
+_ACCEPTED = re.compile(rf"\baccepted (?P<code>ALU7\d\d)(?: \((?P<words>[^)]*)\))?:(?P<reason>.*?)(?={NEXT})", re.DOTALL)
 
 
 @dataclass(frozen=True)

@@ -7,13 +7,18 @@ from collections.abc import Iterator, Mapping
 from alula.language.errors import Diagnostic, Severity
 from alula.model import semantics
 from alula.model.span import Span
+from alula.prove.limits import Deadline
 from alula.prove.mission.answers import GOOD, Answers, Row
+from alula.prove.mission.refusals import Refusal, failing, refusal_of
 from alula.prove.mission.regions import Regions
-from alula.prove.mission.run import MissionFinding, MissionRun
+from alula.prove.mission.run import MissionFinding, MissionRun, run_of
 from alula.prove.mission.state import Managers
 from alula.prove.mission.system import FAILED
-from alula.prove.mission.words import told
+from alula.prove.mission.waits import Waits
+from alula.prove.mission.words import situation, told
 from alula.trees.node import Node
+
+ANSWER = "put a Fallback around it with what is to be done then, or `<AlwaysFailure/>` where giving up is meant"
 
 
 def findings(regions: Regions, answers: Answers) -> list[Diagnostic]:
@@ -78,31 +83,32 @@ def _startable(regions: Regions, place: int, number: int) -> set[str]:
 
 
 def _unanswered(regions: Regions, answers: Answers) -> Iterator[Diagnostic]:
-    """Yield ALU702 for failures after which the tree asks for nothing any more, and the mission is not accomplished."""
-    seen: set[int] = set()
+    """Yield ALU702 for failures after which the tree asks for nothing any more, and the mission is not accomplished; ALU705: refusals."""
+    seen: set[tuple[int, str]] = set()
     for row in answers.rows:
-        if row.starts or row.outcomes & GOOD or not row.loses or row.leaf in seen or not row.outcomes:
+        if row.starts or row.outcomes & GOOD or not row.loses or not row.outcomes:
             continue
-        seen.add(row.leaf)
+        refusal = refusal_of(regions, row)
+        if refusal is not None and (row.leaf, "ALU705") not in seen:
+            seen.add((row.leaf, "ALU705"))
+            yield _refused(regions, row, refusal)
+        way = failing(regions, row)
+        if way is None or (row.leaf, "ALU702") in seen:
+            continue
+        seen.add((row.leaf, "ALU702"))
         how = "fails" if row.end == FAILED else f"ends with {row.end}"
         message = f"nothing answers when `{row.skill}` {how}: the mission ends ({', '.join(sorted(row.outcomes))})"
-        cure = "put a Fallback around it with what is to be done then, or `<AlwaysFailure/>` where giving up is meant"
-        run = _until_its_end(regions, row)
-        yield _finding("ALU702", message, regions.system.leaves[row.leaf], cure, told(regions.system, run.events), run)
+        run = run_of(regions.system, *regions.run_on(row.region, *way))
+        yield _finding("ALU702", message, regions.system.leaves[row.leaf], ANSWER, told(regions.system, run.events), run)
 
 
-def _until_its_end(regions: Regions, row: Row) -> MissionRun:
-    events, state = regions.run_on(row.region, *row.way)
+def _refused(regions: Regions, row: Row, refusal: Refusal) -> Diagnostic:
     system = regions.system
-    outcome = system.outcome(state)
-    states = [
-        one
-        for skillset, number in zip(system.skillsets, state.managers, strict=True)
-        for one in _named(
-            skillset.name, dict(zip((one.name for one in skillset.resources), system.managers_of(number).states, strict=False))
-        )
-    ]
-    return MissionRun(tuple(events), outcome.value if outcome else "running", tuple(states), system.skillsets)
+    race = f", because after the tree has asked {refusal.race}" if refusal.race else ""
+    message = f"nothing answers when a request for `{row.skill}` is refused: {refusal.by}{race}: the mission ends"
+    run = run_of(system, refusal.events, refusal.state)
+    message += f" ({run.outcome})"
+    return _finding("ALU705", message, system.leaves[row.leaf], ANSWER, told(system, run.events), run)
 
 
 def _named(skillset: str, states: Mapping[str, str]) -> tuple[tuple[str, str], ...]:
@@ -117,6 +123,16 @@ def _never_ticked(regions: Regions) -> Iterator[Diagnostic]:
     for node in nodes:
         if id(node) in never and id(node.parent) not in never:
             yield _finding("ALU703", f"'{node.name}' is never ticked", node, "take it away, or put it where it is reached")
+
+
+def waits(regions: Regions, deadline: Deadline) -> Iterator[Diagnostic]:
+    """Yield ALU704 for situations after which the mission never ends, with a run to each; raises OutOfTimeError."""
+    system = regions.system
+    for node, events, state, stays in Waits(regions).found(deadline):
+        how = f"waits in '{node.name}' for ever" if stays else f"goes round '{node.name}' without end"
+        message = f"the mission {how}, though nothing fails any more: {situation(system, state)}"
+        cure = "wait with Timeout, Awaits or `within`, try again a number of times, or leave the loop"
+        yield _finding("ALU704", message, node, cure, told(system, events), run_of(system, events, state))
 
 
 def _finding(code: str, message: str, node: Node, cure: str, lines: tuple[str, ...] = (), run: MissionRun | None = None) -> Diagnostic:

@@ -6,6 +6,7 @@ those of the search: without inputs and outputs, and what data say is one resour
 
 from __future__ import annotations
 
+import operator
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
@@ -20,7 +21,7 @@ from alula.missions.skillset import MissionClient
 from alula.model.execution_state import ExecutionState
 from alula.prove.mission.oracle import Answer, Asked, Oracle, Question
 from alula.prove.mission.playable import AS_WANTED, breaks, playable, refuses
-from alula.prove.mission.robot import Robot, opaque
+from alula.prove.mission.robot import Robot, opaque, progress_of
 from alula.prove.mission.run import MissionRun
 from alula.prove.mission.state import Event, Kind
 from alula.prove.mission.unknown import UNKNOWN
@@ -32,6 +33,7 @@ from alula.runtime.local import LocalWorld
 from alula.runtime.local.middleware import Bus, VirtualLink, VirtualMiddleware
 from alula.runtime.middleware import GoalListener
 
+COMPARISONS = {"<": operator.lt, "<=": operator.le, ">": operator.gt, ">=": operator.ge, "==": operator.eq}
 STEP_S = 0.01
 """Between two ticks; times that the run says are over pass before the tick that sees it."""
 
@@ -82,11 +84,15 @@ class _Answers(Oracle):
 class _Function(SkillHooks):
     """A function that ends when the run says so, also when it was interrupted."""
 
-    def __init__(self, running: dict[str, Execution]) -> None:
+    def __init__(self, running: dict[str, Execution], told: dict[str, float]) -> None:
         self._running = running
+        self._told = told
 
     def on_dispatch(self, execution: Execution) -> None:
         self._running[execution.id] = execution
+
+    def progress(self, execution: Execution) -> float:
+        return self._told.get(execution.id, execution.progress)
 
     def on_interrupt(self, execution: Execution) -> bool | None:
         return execution.done
@@ -117,11 +123,13 @@ class _Player:
         self._run = run
         self._held: dict[str, Callable[[], None]] = {}
         self._running: dict[str, Execution] = {}
+        self._told: dict[str, float] = {}
+        """The progress that functions tell."""
         self._handles: dict[int, SkillHandle] = {}
         self._oracle = _Answers()
         playables = [playable(one) for one in run.skillsets]
         self._data = {one.skillset.name: one.data for one in playables}
-        make = lambda managers: {one.name: _Function(self._running) for one in managers.skillset.skills}  # noqa: E731
+        make = lambda managers: {one.name: _Function(self._running, self._told) for one in managers.skillset.skills}  # noqa: E731
         self.world = LocalWorld([one.skillset for one in playables], make)
         nodes = MissionPart(opaque(Robot(self._oracle), part).nodes, memory=part.memory)
         plan = plan_of_file(path, path.stem, run.skillsets, _Unknown(), nodes)
@@ -184,6 +192,8 @@ class _Player:
     def _tick(self, event: Event) -> None:
         over_ns = [float(str(one.question[1])) for one in event.choices if one.question[0] == "time" and one.answer]
         self.world.run_for(max([STEP_S, *(one / 1e9 for one in over_ns)]))
+        for one in event.choices:
+            self._progress(one)
         before = {leaf: node.leaf.handle for leaf, node in enumerate(self._leaves)}
         self._oracle.begin(lambda _: None)
         self._oracle.choices = list(event.choices)
@@ -196,6 +206,20 @@ class _Player:
                 self._handles[leaf] = node.leaf.handle
         if sorted(started) != sorted(event.started):
             raise LeftError(f"the tree asks for {self._names(started)}, and for {self._names(event.started)} in the counterexample")
+
+    def _progress(self, choice: Asked) -> None:
+        """Have a function tell progress that a script answers as the run does; what is told arrives before the tick."""
+        for leaf, handle in self._handles.items():
+            node = self._leaves[leaf]
+            if choice.question[:2] != ("compare", progress_of(node.skillset, node.model.name)) or handle.id not in self._running:
+                continue
+            period = node.model.progress
+            _, _, symbol, other = choice.question
+            compare, limit = COMPARISONS[str(symbol)], float(str(other))
+            fitting = [one for one in (handle.progress, 0.0, limit, 1.0) if 0.0 <= one <= 1.0 and compare(one, limit) == choice.answer]
+            if period is not None and fitting and fitting[0] != handle.progress:
+                self._told[handle.id] = fitting[0]
+                self.world.run_for(period.period_s)
 
     def _names(self, leaves: Sequence[int]) -> str:
         return ", ".join(f"{self._leaves[one].skillset}.{self._leaves[one].model.name}" for one in leaves) or "nothing"
@@ -238,7 +262,7 @@ class _Player:
 
     def finish(self, left: str) -> Played:
         """End the record."""
-        end = self._driver.end or End(Outcome.ABORTED, f"it left the counterexample {left}")
+        end = self._driver.end or End(Outcome.ABORTED, f"it left the counterexample {left}" if left else "the counterexample ends here")
         self._driver.finish(end)
         return Played(end, left, self.world.now_s)
 

@@ -14,11 +14,14 @@ from alula.model.span import Span
 from alula.prove.limits import Deadline, OutOfTimeError
 from alula.prove.mission.accepted import acceptances, divided
 from alula.prove.mission.answers import Answers, Row
-from alula.prove.mission.findings import findings
+from alula.prove.mission.conditions import NO_FAULTS, Faults
+from alula.prove.mission.findings import findings, waits
+from alula.prove.mission.holding import SINGLE, held
 from alula.prove.mission.managers import Failures
 from alula.prove.mission.oracle import UndecidedError
 from alula.prove.mission.regions import Regions
 from alula.prove.mission.system import System
+from alula.prove.mission.wanted import wanted
 
 LOOKED_AT = Failures(refusals=False, hooks=False, aborts=False)
 """What the models say can fail; hooks that raise or refuse, processes that die and aborts are not looked at by default."""
@@ -43,24 +46,36 @@ def prove_mission(
     part: MissionPart,
     *,
     failures: Failures = LOOKED_AT,
+    faults: Faults = NO_FAULTS,
     timeout_s: float = 30.0,
     tell: Callable[[str], None] | None = None,
 ) -> Proved:
     """Return what is wrong with the runs of a mission that ``check_mission`` finds no error in.
 
-    ``tell`` hears now and then how far a long search is. Ctrl-C ends the search as the end of the time does: what was found by then is
-    returned.
+    ``faults`` says in which states faults show, for properties that name them. ``tell`` hears now and then how far a long search is.
+    Ctrl-C ends the search as the end of the time does: what was found by then is returned.
     """
     deadline = Deadline.after(timeout_s, tell)
-    return prove_within(deadline, path, models, part, failures=failures, given=f"{timeout_s:.3g} s")
+    return prove_within(deadline, path, models, part, failures=failures, faults=faults, given=f"{timeout_s:.3g} s")
 
 
 def prove_within(
-    deadline: Deadline, path: Path, models: Sequence[Skillset], part: MissionPart, *, failures: Failures = LOOKED_AT, given: str
+    deadline: Deadline,
+    path: Path,
+    models: Sequence[Skillset],
+    part: MissionPart,
+    *,
+    failures: Failures = LOOKED_AT,
+    faults: Faults = NO_FAULTS,
+    given: str,
 ) -> Proved:
     """Return the same within a deadline; ``given`` is what messages call it."""
     try:
-        regions = Regions(System.read(path, models, part, failures, deadline), deadline)
+        system = System.read(path, models, part, failures, deadline)
+        properties, wrong = wanted(system.nodes, system.skillsets, faults)
+        # What must come is looked at one situation after another, for which it needs time of its own.
+        several = any(one.kind not in SINGLE for one in properties)
+        regions = Regions(system, deadline.half(deadline.doing) if several else deadline)
         _explore(regions)
     except (UndecidedError, InputError) as error:
         message = f"its runs can't be looked at: {error}"
@@ -69,10 +84,28 @@ def prove_within(
         return Proved([_bound(path, 0, given)], [], complete=False)
     answers = Answers(regions)
     known = acceptances(regions.system.nodes)
-    found, accepted = divided(findings(regions, answers), known, str(path), complete=regions.complete)
-    if not regions.complete:
-        found.append(_bound(path, len(regions.regions), given))
-    return Proved(found, answers.rows, regions.complete, accepted)
+    seen_waiting, complete = _waits(regions, deadline.half(deadline.doing) if several else deadline)
+    found, accepted = divided([*findings(regions, answers), *seen_waiting], known, str(path), complete=complete)
+    found += wrong
+    undecided = []
+    for one in properties if not wrong else ():
+        seen = held(regions, one, faults, deadline)
+        found += [seen.finding] if seen.finding else []
+        undecided += [one.name] if not seen.finding and not seen.complete else []
+    complete = complete and not undecided
+    if not complete:
+        found.append(_bound(path, len(regions.regions), given, undecided))
+    return Proved(found, answers.rows, complete, accepted)
+
+
+def _waits(regions: Regions, deadline: Deadline) -> tuple[list[Diagnostic], bool]:
+    """Return the findings about waits, and whether all situations were looked at for them."""
+    found: list[Diagnostic] = []
+    try:
+        found.extend(waits(regions, deadline))
+    except (OutOfTimeError, KeyboardInterrupt):
+        return found, False
+    return found, regions.complete
 
 
 def _explore(regions: Regions) -> None:
@@ -82,8 +115,10 @@ def _explore(regions: Regions) -> None:
         return
 
 
-def _bound(path: Path, regions: int, given: str) -> Diagnostic:
+def _bound(path: Path, regions: int, given: str, undecided: Sequence[str] = ()) -> Diagnostic:
     message = f"not all runs were looked at: {regions} groups of situations, those that fewest ticks lead to, in {given}"
+    if undecided:
+        message += f"; no run was found against {', '.join(f'`{one}`' for one in undecided)}, which proves nothing yet"
     return Diagnostic("ALU710", message, _whole(path), Severity.NOTE, "allow more with `--time`")
 
 

@@ -90,7 +90,7 @@ class Handle:
     @property
     def progress(self) -> float:
         """Any number that is not negative."""
-        return UnknownNumber(self._robot.oracle, f"the progress of {self.skillset}.{self.skill}", 0.0)
+        return UnknownNumber(self._robot.oracle, progress_of(self.skillset, self.skill), 0.0)
 
     def interrupt(self) -> None:
         """Ask for its end."""
@@ -143,6 +143,11 @@ class Client:
             return Handle(self._robot, leaf, self._model, skill, failed=True)
         self._robot.started.append(leaf)
         return Handle(self._robot, leaf, self._model, skill, fresh=True)
+
+
+def progress_of(skillset: str, skill: str) -> str:
+    """Return what counterexamples call the progress of a skill."""
+    return f"the progress of {skillset}.{skill}"
 
 
 class Waits(PendingInterrupts):

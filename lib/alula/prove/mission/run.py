@@ -2,11 +2,14 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass
 
 from alula.language.errors import Diagnostic
+from alula.missions.director import Outcome
 from alula.model.model import Skillset
-from alula.prove.mission.state import Event
+from alula.prove.mission.state import Event, State
+from alula.prove.mission.system import System
 
 
 @dataclass(frozen=True)
@@ -17,6 +20,14 @@ class MissionRun:
     outcome: str
     states: tuple[tuple[str, str], ...]
     skillsets: tuple[Skillset, ...]
+
+
+def run_of(system: System, events: Sequence[Event], state: State) -> MissionRun:
+    """Return a run that comes to a situation."""
+    names = [f"{one.name}.{resource.name}" for one in system.skillsets for resource in one.resources]
+    states = ((name, known) for name in names if (known := system.resource(state, name)) is not None)
+    outcome = system.outcome(state) or Outcome.RUNNING
+    return MissionRun(tuple(events), outcome.value, tuple(states), system.skillsets)
 
 
 @dataclass(frozen=True)

@@ -134,6 +134,13 @@ class System:
                 started, interrupted, choices, touched = ticked[1:]
                 yield Event(kind, started=started, interrupted=interrupted, choices=choices, touched=touched), after
 
+    def stays(self, state: State) -> Event | None:
+        """Return a tick after which all is as before, None where each changes something."""
+        for ticked in self.ticker.outcomes(state.memory, lambda question: self._observed(state, question)):
+            if State(ticked.memory, self._commanded(state, ticked), state.spent) == state:
+                return Event(Kind.TICK, started=ticked.started, choices=ticked.choices, touched=ticked.touched)
+        return None
+
     def may_abort(self, number: int) -> bool:
         """Tell whether an abort changes what the tree of this memory does."""
         memory = self.ticker.memories[number]

@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Iterator, Sequence
 
 from alula.prove.mission.oracle import Asked
-from alula.prove.mission.state import Ending, Event, Kind
+from alula.prove.mission.state import Ending, Event, Kind, State
 from alula.prove.mission.system import System
 
 
@@ -13,6 +13,18 @@ def told(system: System, events: Sequence[Event]) -> tuple[str, ...]:
     """Return numbered lines; ticks that only look are left out."""
     lines = [line for event in events for line in _lines(system, event)]
     return tuple(f"{number}. {line}" for number, line in enumerate(lines, 1))
+
+
+def situation(system: System, state: State) -> str:
+    """Return a situation in words: what is not as at power-up, what runs, and where the tree is."""
+    first = system.initial()
+    names = [f"{one.name}.{resource.name}" for one in system.skillsets for resource in one.resources]
+    words = [f"{name} == {system.resource(state, name)}" for name in names if system.resource(state, name) != system.resource(first, name)]
+    skills = ((f"{system.leaves[leaf].skillset}.{system.leaves[leaf].model.name}", one) for leaf, one in system.open(state))
+    words += [f"running({skill})" for skill, one in skills if one.phase == "running"]
+    end = system.outcome(state)
+    words.append(f"outcome {end.value}" if end else ", ".join(f"active('{node.name}')" for node in system.active(state)[-1:]))
+    return ", ".join(word for word in words if word)
 
 
 def _lines(system: System, event: Event) -> Iterator[str]:

@@ -1,0 +1,46 @@
+"""What must come when the world is calm: nothing fails any more, and the functional layer changes nothing by itself.
+
+What was asked for arrives, interruptions are done, times pass, and what nobody knows is not against the mission for ever. Failures may
+have happened before, any number of them. So something never comes after a situation where no calm step, one after another, leads to it.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Hashable, Iterable, Mapping
+from typing import TypeVar
+
+from alula.model.model import ResultKind
+from alula.prove.mission.state import Event, Kind
+from alula.prove.mission.system import System
+
+CALM = frozenset({Kind.TICK, Kind.START, Kind.INTERRUPT})
+Situation = TypeVar("Situation", bound=Hashable)
+
+
+def calm_of(system: System, *, terminating: bool) -> Callable[[Event], bool]:
+    """Return what tells whether a step is calm; executions end well some time where they are ``terminating``."""
+    good = {
+        f"{skillset.name}.{skill.name}": {result.name for result in skill.results if skill.kind_of(result.name) is ResultKind.SUCCESS}
+        or {result.name for result in skill.results}
+        for skillset in system.skillsets
+        for skill in skillset.skills
+    }
+
+    def calm(event: Event) -> bool:
+        if event.kind is Kind.REFUSE:
+            return not event.failure
+        return event.kind in CALM or (terminating and event.kind is Kind.RESULT and event.result in good[event.skill])
+
+    return calm
+
+
+def reaching(goals: Iterable[Situation], before: Mapping[Situation, Iterable[Situation]]) -> set[Situation]:
+    """Return the goals and all from which they are reached, by what can come before each situation (or the other way round)."""
+    found = set(goals)
+    todo = list(found)
+    while todo:
+        for one in before.get(todo.pop(), ()):
+            if one not in found:
+                found.add(one)
+                todo.append(one)
+    return found

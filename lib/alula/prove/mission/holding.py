@@ -1,0 +1,200 @@
+"""Whether the properties of a mission's file hold in all its runs.
+
+NEVER and ALWAYS speak of single situations: the regions have them. EVENTUALLY and LEADS_TO speak of what must come once the mission has
+begun: the situations are looked at one after another, each with what is still to come. It never comes where no calm step leads to it
+(``calm``). With ``within N ticks`` it has not come after so many ticks, whatever happens.
+"""
+
+from __future__ import annotations
+
+from collections import deque
+from collections.abc import Iterator, Mapping
+from dataclasses import dataclass
+from itertools import product
+
+from alula.language.errors import Severity
+from alula.model.expressions import Constant, Not, ResourceIs, SkillRuns, atoms
+from alula.model.model import Property, PropertyKind
+from alula.prove.limits import Deadline, OutOfTimeError
+from alula.prove.mission.calm import calm_of, reaching
+from alula.prove.mission.conditions import Faults, faults_shown, true_in
+from alula.prove.mission.regions import Regions
+from alula.prove.mission.run import MissionFinding, run_of
+from alula.prove.mission.state import Event, Kind, State
+from alula.prove.mission.system import System
+from alula.prove.mission.words import situation, told
+
+CODE = "ALU714"
+SINGLE = frozenset({PropertyKind.NEVER, PropertyKind.ALWAYS})
+Awaiting = tuple[State, int]
+"""A situation, and in how many ticks at most something is to come: 0 where nothing is."""
+
+
+@dataclass(frozen=True)
+class Held:
+    """What is known of a property: a run against it, None where there is none in what was looked at; ``complete``: that is all."""
+
+    finding: MissionFinding | None
+    complete: bool
+
+
+def held(regions: Regions, one: Property, faults: Faults, deadline: Deadline) -> Held:
+    """Look whether a property holds."""
+    system = regions.system
+    if one.kind in SINGLE:
+        run = _somewhere(regions, one)
+        complete, what = regions.complete, "it can come to this"
+    else:
+        search = _Search(system, one, faults)
+        try:
+            deadline.doing = f"the property `{one.name}`"
+            search.explore(deadline)
+            complete = True
+        except (OutOfTimeError, KeyboardInterrupt):
+            complete = False
+        run = search.against()
+        what = f"it has not come after {one.within} ticks" if one.within else "it never comes, unless something else changes"
+    if run is None:
+        return Held(None, complete)
+    events, state = run
+    said = f"`{one.name}` ({one.kind.value}{f' within {one.within} ticks' if one.within else ''}"
+    said += f"{', assuming termination' if one.fair else ''})"
+    lines = (*told(system, events), f"=> {what}: {situation(system, state)}")
+    message = f"the property {said} does not hold"
+    cure = "mend the mission or the model, or the property where it asks for too much"
+    return Held(MissionFinding(CODE, message, one.span, Severity.ERROR, cure, example=lines, run=run_of(system, events, state)), complete)
+
+
+# --- single situations --------------------------------------------------------------------------------------------------
+
+
+def _somewhere(regions: Regions, one: Property) -> tuple[list[Event], State] | None:
+    """Return a run to a situation that the property excludes, by as few ticks as any."""
+    bad = one.condition if one.kind is PropertyKind.NEVER else Not(one.condition)
+    system = regions.system
+    kinds: dict[tuple[int, int], tuple[bool, ...]] = {}
+    asked = [[atom for atom in atoms(bad) if _place(system, atom) == place] for place in range(len(system.skillsets))]
+    first = system.initial()
+
+    def kind(place: int, number: int) -> tuple[bool, ...]:
+        if (place, number) not in kinds:
+            state = State(first.memory, (*first.managers[:place], number, *first.managers[place + 1 :]))
+            kinds[place, number] = tuple(true_in(system, atom, state) for atom in asked[place])
+        return kinds[place, number]
+
+    for number, region in enumerate(regions.regions):
+        choices = []
+        for place, closure in enumerate(region.closures):
+            soonest: dict[tuple[bool, ...], int] = {}
+            for managers in sorted(closure.all, key=closure.depth.__getitem__):
+                soonest.setdefault(kind(place, managers), managers)
+            choices.append(tuple(soonest.values()))
+        for combined in product(*choices):
+            state = State(region.memory, combined)
+            if true_in(system, bad, state):
+                return regions.run(number, dict(enumerate(combined))), state
+    return None
+
+
+def _place(system: System, atom: object) -> int | None:
+    match atom:
+        case ResourceIs(resource=name) | SkillRuns(skill=name):
+            return next(place for place, one in enumerate(system.skillsets) if one.name == name.partition(".")[0])
+    return None
+
+
+# --- what must come -----------------------------------------------------------------------------------------------------
+
+
+class _Search:
+    """All situations, each with what is still to come there, and the calm steps between those where something is."""
+
+    def __init__(self, system: System, one: Property, faults: Faults) -> None:
+        self._system = system
+        self._one = one
+        self._faults = faults
+        eventually = one.kind is PropertyKind.EVENTUALLY
+        self._begins = Constant(value=True) if eventually else one.condition
+        self._goal = one.condition if eventually else one.consequence or Constant(value=False)
+        self._before: dict[Awaiting, tuple[Awaiting, Event] | None] = {}
+        self._calm_before: dict[Awaiting, list[Awaiting]] = {}
+        self._calm_after: dict[Awaiting, list[tuple[Event, Awaiting]]] = {}
+        self._open: set[Awaiting] = set()
+        self._late: Awaiting | None = None
+
+    def explore(self, deadline: Deadline) -> None:
+        """Look at all of them; raises OutOfTimeError."""
+        calm = calm_of(self._system, terminating=self._one.fair)
+        state = self._system.initial()
+        first = (state, self._awaits(state, 0, None))
+        self._before[first] = None
+        todo = deque([first])
+        self._open.add(first)
+        while todo and self._late is None:
+            deadline.check()
+            here = todo.popleft()
+            for event, after in self._steps(here):
+                there = (after, self._awaits(after, here[1], event))
+                if here[1] and calm(event):
+                    self._calm_before.setdefault(there, []).append(here)
+                    self._calm_after.setdefault(here, []).append((event, there))
+                if there not in self._before:
+                    self._before[there] = (here, event)
+                    self._open.add(there)
+                    todo.append(there)
+                if there[1] < 0:
+                    self._late = there
+                    break
+            self._open.discard(here)
+
+    def _steps(self, here: Awaiting) -> Iterator[tuple[Event, State]]:
+        state, awaits = here
+        yield from self._system.steps(state)
+        if self._one.within and awaits and self._system.outcome(state) is None:
+            idle = self._system.stays(state)
+            if idle is not None:
+                yield idle, state
+
+    def _awaits(self, state: State, before: int, event: Event | None) -> int:
+        """Return in how many ticks it is to come, -1 where that is over."""
+        if true_in(self._system, self._goal, state):
+            return 0
+        if before:
+            ticked = bool(self._one.within) and event is not None and event.kind is Kind.TICK
+            return (before - 1 or -1) if ticked else before
+        shown = frozenset() if event is None else faults_shown(event, self._faults)
+        begins = self._system.started(state) and true_in(self._system, self._begins, state, shown)
+        return (self._one.within or 1) if begins else 0
+
+    def against(self) -> tuple[list[Event], State] | None:
+        """Return a run after which it never comes, or comes too late."""
+        if self._one.within:
+            found = self._late
+        else:
+            # What was not looked at any further may lead anywhere.
+            good = reaching({one for one in self._before if not one[1]} | self._open, self._calm_before)
+            found = next((one for one in self._before if one not in good), None)
+        return None if found is None else self._at_rest(found)
+
+    def _at_rest(self, found: Awaiting) -> tuple[list[Event], State]:
+        """Return a run that goes on until nothing calm happens any more, where that is possible: one sees best there what is waited for."""
+        ways: dict[Awaiting, tuple[Awaiting, Event] | None] = {found: None}
+        todo = deque([found] if not self._one.within else [])
+        while todo:
+            here = todo.popleft()
+            after = self._calm_after.get(here, ())
+            if not after:
+                return _way(self._before, found) + _way(ways, here), here[0]
+            for event, there in after:
+                if there not in ways:
+                    ways[there] = (here, event)
+                    todo.append(there)
+        return _way(self._before, found), found[0]
+
+
+def _way(before: Mapping[Awaiting, tuple[Awaiting, Event] | None], there: Awaiting) -> list[Event]:
+    events: list[Event] = []
+    while (step := before[there]) is not None:
+        there, event = step
+        events.append(event)
+    return events[::-1]

@@ -1,0 +1,56 @@
+"""Requests that can be refused, where the tree has no answer to it, and what changed after the tree had asked."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from dataclasses import dataclass
+
+from alula.prove.mission.answers import Row, Way
+from alula.prove.mission.regions import Closure, Regions
+from alula.prove.mission.state import Event, Kind, State
+
+
+@dataclass(frozen=True)
+class Refusal:
+    """A refused request that ends the mission; ``race``: what changed between the request and its arrival, empty where nothing did."""
+
+    events: tuple[Event, ...]
+    state: State
+    by: str
+    race: str
+
+
+def refusal_of(regions: Regions, row: Row) -> Refusal | None:
+    """Return a refusal of the request of a row that nothing answers, None where it fails in other ways only."""
+    place = regions.system.place_of(("execution", row.leaf))
+    outcome, sets = row.way
+    closure = regions.regions[row.region].closures[place]
+    refused = [one for one in sets[place] if _is_refused(closure, one, row.leaf)]
+    if not refused:
+        return None
+    number = min(refused, key=closure.depth.__getitem__)
+    before = len(regions.run(row.region, {place: number}))
+    events, state = regions.run_on(row.region, outcome, (*sets[:place], frozenset({number}), *sets[place + 1 :]))
+    at = max(at for at, event in enumerate(events[:before]) if event.kind is Kind.REFUSE and event.leaf == row.leaf)
+    by = " ".join(filter(None, (events[at].state, events[at].result and f"({events[at].result})")))
+    asked = max((one for one, event in enumerate(events[:at]) if row.leaf in event.started), default=0)
+    return Refusal(tuple(events), state, by, ", ".join(_changes(events[asked:at], events[at].skillset)))
+
+
+def failing(regions: Regions, row: Row) -> Way | None:
+    """Return how a row fails otherwise than by a refusal, None where it does not."""
+    place = regions.system.place_of(("execution", row.leaf))
+    outcome, sets = row.way
+    closure = regions.regions[row.region].closures[place]
+    others = frozenset(one for one in sets[place] if not _is_refused(closure, one, row.leaf))
+    return (outcome, (*sets[:place], others, *sets[place + 1 :])) if others else None
+
+
+def _is_refused(closure: Closure, number: int, leaf: int) -> bool:
+    return any(event.kind is Kind.REFUSE and event.leaf == leaf for event in closure.way(number)[1])
+
+
+def _changes(events: list[Event], skillset: str) -> Iterator[str]:
+    for event in events:
+        if event.skillset == skillset:
+            yield from (f"{skillset}.{name} {source} -> {target}" for name, source, target in event.changes)

@@ -1,0 +1,137 @@
+"""Situations in which a mission waits for ever, or goes round without end, though the world is calm and every execution ends.
+
+From each situation calm steps come to one at rest: all that was asked for has arrived, and all that ends has ended. So it is enough to look
+at situations at rest, from one tick to the next: the mission never ends after one that no such way leads to its end from.
+"""
+
+from __future__ import annotations
+
+from collections import deque
+from collections.abc import Callable, Iterator
+from itertools import product
+
+from alula.prove.limits import Deadline, OutOfTimeError
+from alula.prove.mission.calm import calm_of, reaching
+from alula.prove.mission.regions import Regions
+from alula.prove.mission.state import Event, State
+from alula.trees.node import Node
+
+
+class Waits:
+    """The situations at rest in which a mission can be, and those after which it never ends."""
+
+    def __init__(self, regions: Regions) -> None:
+        self._regions = regions
+        self._system = regions.system
+        self._calm = calm_of(regions.system, terminating=True)
+        self._at_rest: dict[tuple[int, int], tuple[int, ...]] = {}
+        self._before: dict[State, list[State]] = {}
+        self._after: dict[State, list[State]] = {}
+        self._ends: set[State] = set()
+        self._asking: set[State] = set()
+        self._open: set[State] = set()
+        """Those that were not looked at any further: they may lead anywhere."""
+
+    def found(self, deadline: Deadline) -> Iterator[tuple[Node, list[Event], State, bool]]:
+        """Yield each node that it stays in for ever, with a run to there, the situation, and whether all stays as it is.
+
+        When the time is over, it yields those of what was looked at by then, and raises OutOfTimeError.
+        """
+        first: dict[State, int] = {}
+        over: OutOfTimeError | None = None
+        try:
+            self._situations(first, deadline)
+            self._explore(list(first), deadline)
+        except OutOfTimeError as error:
+            over = error
+        good: set[State] = reaching(self._ends | self._open, self._before)
+        never = set(self._after) - good
+        known: set[State] = set()
+        told: set[tuple[int, bool]] = set()
+        for begin in (state for state in first if state in never):
+            if begin in known:
+                continue
+            rounds = self._last(begin)
+            explained: set[State] = reaching(rounds, self._before)
+            known |= explained
+            state = next((one for one in first if one in rounds), begin)
+            active = [node for node in self._system.active(state) if all(node in self._system.active(one) for one in rounds)]
+            stays = len(rounds) == 1 and state not in self._asking
+            if active and (id(active[-1]), stays) not in told:
+                told.add((id(active[-1]), stays))
+                yield active[-1], self._regions.run(first[state], dict(enumerate(state.managers))), state, stays
+        if over is not None:
+            raise over
+
+    def _last(self, state: State) -> set[State]:
+        """Return situations that are come to from there, each of which leads to all others of them and to nothing else."""
+        while True:
+            after: set[State] = reaching([state], self._after)
+            before: set[State] = reaching([state], self._before)
+            left = after - before
+            if not left:
+                return after
+            state = min(left)
+
+    def _situations(self, found: dict[State, int], deadline: Deadline) -> None:
+        """Add those of all regions, each with the first region that has it."""
+        for number, region in enumerate(self._regions.regions):
+            if not self._system.ticker.memories[region.memory].started or self._over(region.memory):
+                continue
+            resting = [
+                sorted((one for one in closure.all if self._rests(place, one)), key=closure.depth.__getitem__)
+                for place, closure in enumerate(region.closures)
+            ]
+            for managers in product(*resting):
+                found.setdefault(State(region.memory, managers), number)
+                deadline.check()
+
+    def _explore(self, todo: list[State], deadline: Deadline) -> None:
+        seen, waiting = set(todo), deque(todo)
+        self._open = seen.copy()
+        while waiting:
+            deadline.doing = f"waits: {len(waiting)} situations to look at"
+            deadline.check()
+            state = waiting.popleft()
+            for after in self._next(state):
+                self._before.setdefault(after, []).append(state)
+                self._after.setdefault(state, []).append(after)
+                if self._over(after.memory):
+                    self._ends.add(after)
+                elif after not in seen:
+                    seen.add(after)
+                    self._open.add(after)
+                    waiting.append(after)
+            self._open.discard(state)
+
+    def _next(self, state: State) -> Iterator[State]:
+        """Yield the situations at rest after a tick."""
+        system, regions = self._system, self._regions
+        view: Callable[[tuple[object, ...]], object] = lambda question: system.answer(  # noqa: E731
+            state.managers[system.place_of(question)], question
+        )
+        for ticked in system.ticker.outcomes(state.memory, view):
+            if ticked.started:
+                self._asking.add(state)
+            after = [self._resting(place, regions.after(place, one, ticked)) for place, one in enumerate(state.managers)]
+            for managers in product(*after):
+                yield State(ticked.memory, managers)
+
+    def _over(self, memory: int) -> bool:
+        return self._system.ticker.memories[memory].end is not None
+
+    def _rests(self, place: int, number: int) -> bool:
+        return not any(self._calm(event) for event, _ in self._system.moves_of(place, number))
+
+    def _resting(self, place: int, number: int) -> tuple[int, ...]:
+        """Return managers at rest that calm steps lead to."""
+        key = (place, number)
+        if key not in self._at_rest:
+            seen, todo = {number}, [number]
+            while todo:
+                for event, after in self._system.moves_of(place, todo.pop()):
+                    if self._calm(event) and after not in seen:
+                        seen.add(after)
+                        todo.append(after)
+            self._at_rest[key] = tuple(one for one in sorted(seen) if self._rests(place, one))
+        return self._at_rest[key]

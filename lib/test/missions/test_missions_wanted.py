@@ -1,0 +1,369 @@
+"""Properties that a mission's file wants to hold: read, looked at in all runs, and their counterexamples played."""
+
+from __future__ import annotations
+
+import random
+from collections import deque
+from html import escape
+from pathlib import Path
+
+import pytest
+
+pytest.importorskip("z3")
+pytest.importorskip("py_trees")
+
+from alula.language.errors import Diagnostic, has_errors
+from alula.language.lexer import Source
+from alula.language.models import ModelFile, check_texts
+from alula.language.syntax.cursor import Cursor
+from alula.language.syntax.properties import read_mission_property
+from alula.missions.check.page import whole
+from alula.missions.filed.part import NO_PART
+from alula.model.model import Property, Skillset
+from alula.prove.limits import Deadline, OutOfTimeError
+from alula.prove.mission.conditions import Faults, faults_shown, true_in
+from alula.prove.mission.holding import held
+from alula.prove.mission.managers import Failures
+from alula.prove.mission.page import ROBOT
+from alula.prove.mission.play import play
+from alula.prove.mission.prover import LOOKED_AT, Proved, prove_mission
+from alula.prove.mission.regions import Regions
+from alula.prove.mission.run import MissionFinding
+from alula.prove.mission.state import State
+from alula.prove.mission.system import System
+from alula.prove.mission.waits import Waits
+
+TREE = "<Sequence><drone.lift/><drone.hover/></Sequence><drone.land/>"
+WAITS = '<Sequence name="up"><drone.lift/><WaitFor name="ours" if="drone.control == OURS"/></Sequence><drone.land/>'
+FAULTS: Faults = {"pilot": frozenset({"drone.control THEIRS"})}
+
+
+def skillsets() -> tuple[Skillset, ...]:
+    (robot,) = check_texts([ModelFile("robot.rl", ROBOT)])
+    return tuple(robot.skillsets)
+
+
+def written(folder: Path, wanted: str, tree: str) -> Path:
+    path = folder / "mission.xml"
+    path.write_text(whole(f'<Fallback name="mission" _description="{escape(wanted)}">{tree}</Fallback>'))
+    return path
+
+
+def proved(folder: Path, wanted: str, tree: str = TREE, time_s: float = 60.0) -> Proved:
+    return prove_mission(written(folder, wanted, tree), skillsets(), NO_PART, faults=FAULTS, timeout_s=time_s)
+
+
+def about(found: Proved) -> list[Diagnostic]:
+    return [one for one in found.findings if one.code in {"ALU713", "ALU714"}]
+
+
+@pytest.mark.parametrize(
+    ("wanted", "tree"),
+    [
+        ("property a: always running(drone.hover) -> drone.axes == USED", TREE),
+        ("property a: never running(drone.lift) and running(drone.hover)", TREE),
+        ("About it; property a: never drone.axes == FREE and running(drone.land); accepted ALU702: so be it", TREE),
+        ("property a: eventually outcome accomplished or outcome given_up assuming termination", TREE),
+        ("property a: fault pilot leads to outcome accomplished or outcome given_up assuming termination", TREE),
+        ("property a: running(drone.lift) leads to running(drone.hover) or active('drone.land') assuming termination", TREE),
+        ("property a: fault pilot leads to active('up') or active('drone.land') or outcome accomplished within 1 ticks", WAITS),
+    ],
+)
+def test_what_holds_is_no_finding(wanted: str, tree: str, tmp_path: Path) -> None:
+    found = proved(tmp_path, wanted, tree)
+    assert about(found) == []
+    assert found.complete
+
+
+@pytest.mark.parametrize(
+    ("wanted", "tree", "words"),
+    [
+        ("property a: always drone.control == OURS", TREE, "drone.control == THEIRS"),
+        ("property a: never running(drone.hover) and drone.control == THEIRS", TREE, "running(drone.hover)"),
+        ("property a: never active('drone.land')", TREE, "active('drone.land')"),
+        ("property a: always not outcome accomplished", TREE, "outcome accomplished"),
+        ("property a: eventually outcome accomplished or outcome given_up", TREE, "running(drone."),
+        ("property a: eventually running(drone.hover) assuming termination", TREE, "outcome accomplished"),
+        ("property a: fault pilot leads to outcome accomplished assuming termination", WAITS, "active('ours')"),
+        ("property a: fault pilot leads to running(drone.land) or outcome accomplished assuming termination", WAITS, "THEIRS"),
+        ("property a: fault pilot leads to active('drone.land') or outcome given_up within 3 ticks", WAITS, "THEIRS"),
+    ],
+)
+def test_what_does_not_hold_has_a_run_that_plays(wanted: str, tree: str, words: str, tmp_path: Path) -> None:
+    found = about(proved(tmp_path, wanted, tree))
+    assert [one.code for one in found] == ["ALU714"]
+    (finding,) = found
+    assert isinstance(finding, MissionFinding)
+    assert finding.run is not None
+    assert finding.example[-1].startswith("=> ")
+    assert words in finding.example[-1]
+    played = play(tmp_path / "mission.xml", finding.run, NO_PART)
+    assert played.left == ""
+
+
+@pytest.mark.parametrize(
+    ("wanted", "at", "message"),
+    [
+        ("property a: allways drone.control == OURS", "drone", "expected `.`, found `drone`"),
+        ("property a: always drone.control == MINE", "drone.control", "there is no state `MINE` of `drone.control`"),
+        ("property a: always drone.legs == MINE", "drone.legs", "there is no resource `legs`"),
+        ("property a: always running(drone.fly)", "running", "there is no skill `fly`"),
+        ("property a: always running(boat.fly)", "running", "there is no skillset `boat`"),
+        ("property a: always outcome happy", "outcome", "there is no outcome `happy`"),
+        ("property a: always active('nobody')", "active", "there is no node `nobody`"),
+        ("property a: always active(nobody)", "nobody", "expected the name of a node in quotes"),
+        ("property a: fault engine leads to outcome given_up", "fault", "there is no fault that shows in a state `engine`"),
+        ("property a: never fault pilot", "fault", "`fault` is something that happens"),
+        ("property a: always control == OURS", "==", "expected `.`, found `==`"),
+        ("property a: drone.control == OURS leads to outcome given_up within 0 ticks", "0", "a number of ticks from 1 to 1000"),
+        ("property a: always drone.control == OURS or", "a: always", "found the end"),
+        ("property a: always true; property a: never false", "a: always", "there are two properties `a`"),
+    ],
+)
+def test_a_bad_property_is_one_error_with_place_and_cure(wanted: str, at: str, message: str, tmp_path: Path) -> None:
+    found = about(proved(tmp_path, wanted))
+    assert found
+    assert {one.code for one in found} == {"ALU713"}
+    assert message in found[0].message
+    assert found[0].hint
+    line = (tmp_path / "mission.xml").read_text().splitlines()[found[0].span.line - 1]
+    assert found[0].span.column == 1 + line.index(escape(wanted)) + len(escape(wanted[: wanted.index(at)])) or "found the end" in message
+
+
+def test_a_bound_of_a_property_is_never_silent(tmp_path: Path) -> None:
+    found = proved(tmp_path, "property a: eventually outcome accomplished or outcome given_up assuming termination", time_s=0.0)
+    assert not found.complete
+    assert [one.code for one in found.findings] == ["ALU710"]
+
+
+# --- held against one situation after another -------------------------------------------------------------------------
+
+ATOMS = (
+    "drone.control == OURS",
+    "drone.axes != FREE",
+    "running(drone.hover)",
+    "running(drone.lift)",
+    "active('drone.land')",
+    "active('some')",
+    "outcome given_up",
+    "outcome accomplished",
+)
+TREES = (
+    TREE,
+    WAITS,
+    '<Parallel name="some" success_count="1" failure_count="1"><drone.lift/><Sleep msec="200"/></Parallel><drone.land/>',
+    '<RetryUntilSuccessful num_attempts="2"><drone.hover/></RetryUntilSuccessful><Inverter><drone.lift/></Inverter>',
+    '<Timeout msec="300"><drone.lift/></Timeout>'
+    '<ReactiveFallback><ScriptCondition code="drone.axes == USED"/><drone.land/></ReactiveFallback>',
+)
+
+
+def condition(chance: random.Random, depth: int = 2) -> str:
+    if not depth or chance.random() < 0.2:
+        return chance.choice(ATOMS)
+    kind = chance.choice(("and", "or", "=>", "not"))
+    if kind == "not":
+        return f"not ({condition(chance, depth - 1)})"
+    return f"(({condition(chance, depth - 1)}) {kind} ({condition(chance, depth - 1)}))"
+
+
+def read(text: str) -> Property:
+    source = Source("", text.replace("'", '"'))
+    one = read_mission_property(Cursor(source))
+    assert not source.diagnostics
+    return one
+
+
+@pytest.mark.parametrize("seed", range(10))
+def test_single_situations_are_those_that_are_reached_one_after_another(seed: int, tmp_path: Path) -> None:
+    chance = random.Random(seed)  # noqa: S311 - for tests
+    path = written(tmp_path, "", '<AlwaysFailure name="some"/>' + TREES[seed % len(TREES)])
+    system = System.read(path, skillsets(), NO_PART, Failures(refusals=False, hooks=seed % 2 == 0, aborts=False))
+    regions = Regions(system, Deadline.after(100.0))
+    regions.explore()
+    states = reached(system)
+    for _ in range(30):
+        one = read(f"p: {chance.choice(('never', 'always'))} {condition(chance)}")
+        wrong = [state for state in states if true_in(system, one.condition, state) == (one.kind.value == "never")]
+        seen = held(regions, one, FAULTS, Deadline.after(100.0))
+        assert seen.complete
+        assert (seen.finding is None) == (not wrong)
+
+
+def reached(system: System) -> set[State]:
+    first = system.initial()
+    seen, todo = {first}, deque([first])
+    while todo:
+        for _, after in system.steps(todo.popleft()):
+            if after not in seen:
+                seen.add(after)
+                todo.append(after)
+    return seen
+
+
+@pytest.mark.parametrize("seed", range(10))
+def test_a_run_against_what_must_come_never_sees_it(seed: int, tmp_path: Path) -> None:
+    """And where there is none, no random run comes to rest without it."""
+    chance = random.Random(seed)  # noqa: S311 - for tests
+    path = written(tmp_path, "", '<AlwaysFailure name="some"/>' + TREES[seed % len(TREES)])
+    system = System.read(path, skillsets(), NO_PART, LOOKED_AT)
+    regions = Regions(system, Deadline.after(100.0))
+    regions.explore()
+    for _ in range(20):
+        one = read(f"p: {condition(chance)} leads to {condition(chance)} assuming termination")
+        seen = held(regions, one, FAULTS, Deadline.after(100.0))
+        assert seen.complete
+        assert one.consequence is not None
+        if seen.finding is not None:
+            assert seen.finding.run is not None
+            left = play(path, seen.finding.run, NO_PART).left
+            assert left == "" or left.endswith("which no play can bring about")
+            continue
+        for _ in range(20):
+            assert not waits_at_an_end(system, chance, one)
+
+
+def waits_at_an_end(system: System, chance: random.Random, one: Property) -> bool:
+    """Tell whether a random run that goes on until the mission is over leaves something to come."""
+    assert one.consequence is not None
+    state, waits = system.initial(), False
+    for _ in range(400):
+        shown: frozenset[str] = frozenset()
+        steps = list(system.steps(state))
+        if not steps:
+            return waits
+        event, state = chance.choice(steps)
+        shown = faults_shown(event, FAULTS)
+        waits = waits or (system.started(state) and true_in(system, one.condition, state, shown))
+        waits = waits and not true_in(system, one.consequence, state)
+    return False
+
+
+# --- what must come at the least: the end -----------------------------------------------------------------------------
+
+ROUNDS = (
+    ('<Sequence><drone.lift/><WaitFor name="ours" if="drone.control == OURS"/></Sequence><drone.land/>', "waits in 'ours' for ever"),
+    ('<KeepRunningUntilFailure name="again"><drone.hover/></KeepRunningUntilFailure>', "goes round 'again' without end"),
+    (
+        '<RetryUntilSuccessful num_attempts="-1"><Sequence><drone.lift/><ScriptCondition code="drone.control == OURS"/></Sequence>'
+        "</RetryUntilSuccessful>",
+        "goes round 'drone.lift' without end",
+    ),
+)
+ENDING = (
+    TREE,
+    '<Timeout msec="9000"><WaitFor if="drone.control == THEIRS"/></Timeout>',
+    '<RetryUntilSuccessful num_attempts="3"><Inverter><drone.hover/></Inverter></RetryUntilSuccessful><drone.land/>',
+    '<WaitFor if="progress(drone.hover) &gt;= 1 || drone.control == OURS || drone.control == THEIRS"/>',
+)
+
+
+@pytest.mark.parametrize(("tree", "words"), ROUNDS)
+def test_a_mission_that_never_ends_is_found_and_plays(tree: str, words: str, tmp_path: Path) -> None:
+    (finding,) = (one for one in proved(tmp_path, "", tree).findings if one.code == "ALU704")
+    assert words in finding.message
+    assert isinstance(finding, MissionFinding)
+    assert finding.run is not None
+    assert play(tmp_path / "mission.xml", finding.run, NO_PART).left == ""
+
+
+@pytest.mark.parametrize("tree", ENDING)
+def test_a_mission_that_ends_does_not_wait(tree: str, tmp_path: Path) -> None:
+    assert "ALU704" not in {one.code for one in proved(tmp_path, "", tree).findings}
+
+
+@pytest.mark.parametrize("seed", range(12))
+def test_waits_are_those_of_the_search_one_situation_after_another(seed: int, tmp_path: Path) -> None:
+    """Two ways to the same answer: at rest, from tick to tick, and by what the mission must come to."""
+    chance = random.Random(seed)  # noqa: S311 - for tests
+    trees = [chance.choice((*TREES, *ENDING, *(tree for tree, _ in ROUNDS)))]
+    path = written(tmp_path, "", "".join(trees))
+    system = System.read(path, skillsets(), NO_PART, LOOKED_AT)
+    regions = Regions(system, Deadline.after(100.0))
+    regions.explore()
+    ends = " or ".join(f"outcome {one}" for one in ("accomplished", "degraded", "given_up", "aborted"))
+    comes = held(regions, read(f"p: eventually {ends} assuming termination"), FAULTS, Deadline.after(100.0))
+    assert comes.complete
+    assert any(Waits(regions).found(Deadline.after(100.0))) == (comes.finding is not None)
+
+
+class Steps(Deadline):
+    """A bound of steps in the place of one of time."""
+
+    left = 0
+
+    def check(self) -> None:
+        """Raise OutOfTimeError after so many."""
+        self.left -= 1
+        if self.left < 0:
+            raise OutOfTimeError
+
+
+def test_waits_that_are_told_when_the_time_is_over_are_waits(tmp_path: Path) -> None:
+    path = written(tmp_path, "", "".join(tree for tree, _ in ROUNDS[:1]))
+    regions = Regions(System.read(path, skillsets(), NO_PART, LOOKED_AT), Deadline.after(100.0))
+    regions.explore()
+    whole_time = [node.name for node, *_ in Waits(regions).found(Deadline.after(100.0))]
+    assert whole_time == ["ours"]
+    told = []
+    for most in range(60):
+        deadline = Steps.after(1e6)
+        deadline.left = most
+        found: list[str] = []
+        try:
+            found.extend(node.name for node, *_ in Waits(regions).found(deadline))
+        except OutOfTimeError:
+            told.append(found)
+    assert [] in told
+    assert all(name in whole_time for found in told for name in found)
+
+
+# --- refusals ---------------------------------------------------------------------------------------------------------
+
+EYES = """
+skillset eyes {
+  resource lens { state { CLEAR DIRTY } initial CLEAR transition { extern CLEAR -> DIRTY  extern DIRTY -> CLEAR } }
+  skill look { precondition clear: lens == CLEAR success SEEN }
+}
+"""
+
+
+def test_a_race_between_a_condition_and_a_request_is_told_and_plays(tmp_path: Path) -> None:
+    (robot,) = check_texts([ModelFile("eyes.rl", EYES)])
+    path = written(tmp_path, "", '<Sequence><ScriptCondition code="eyes.lens == CLEAR"/><eyes.look/></Sequence>')
+    (finding,) = prove_mission(path, robot.skillsets, NO_PART).findings
+    assert finding.code == "ALU705"
+    assert "NOT_READY (clear), because after the tree has asked eyes.lens CLEAR -> DIRTY" in finding.message
+    assert isinstance(finding, MissionFinding)
+    assert finding.run is not None
+    played = play(path, finding.run, NO_PART)
+    assert (played.left, played.end.outcome.value) == ("", "given_up")
+
+
+def test_a_request_that_fails_in_both_ways_has_both_findings(tmp_path: Path) -> None:
+    found = proved(tmp_path, "", "<Sequence><ForceSuccess><drone.climb/></ForceSuccess><drone.hover/></Sequence>")
+    assert {"ALU702", "ALU705"} <= {one.code for one in found.findings}
+    assert all("is refused" not in "".join(one.example[-1:]) for one in found.findings if one.code == "ALU702")
+
+
+DRIVING = """
+skillset rover {
+  resource wheels { state { FREE USED } initial FREE transition { FREE -> USED USED -> FREE } }
+  skill look { progress { period 0.5 } }
+  skill drive { start wheels -> USED interrupt { effect wheels -> FREE } success DONE { effect wheels -> FREE } }
+}
+"""
+
+
+def test_progress_that_a_script_waits_for_is_played(tmp_path: Path) -> None:
+    (robot,) = check_texts([ModelFile("rover.rl", DRIVING)])
+    assert not has_errors(robot.findings)
+    tree = '<Sequence><WaitFor if="progress(rover.look) &gt;= 0.7"/><rover.drive/></Sequence>'
+    path = written(tmp_path, "property still: never running(rover.drive)", PARALLEL.format(f"<rover.look/>{tree}"))
+    (finding,) = (one for one in prove_mission(path, robot.skillsets, NO_PART).findings if one.code == "ALU714")
+    assert isinstance(finding, MissionFinding)
+    assert finding.run is not None
+    assert play(path, finding.run, NO_PART).left == ""
+
+
+PARALLEL = '<Parallel success_count="1" failure_count="1">{}</Parallel>'
