@@ -228,7 +228,7 @@ class Told(Deadline):
     def check(self) -> None:
         """Keep it."""
         said.append(self.doing)
-        if len(said) == 10:
+        if len(said) >= 10:
             raise OutOfTimeError("enough")
 
 
@@ -238,10 +238,11 @@ said: list[str] = []
 def test_a_long_search_says_how_far_it_is() -> None:
     said.clear()
     drones("mapping", Told.after(1e6))
-    numbers = [[int(one.replace(",", "")) for one in re.findall(r"(\S+) (?:situations|groups,|ticks deep)", text)] for text in said if text]
+    counts = re.compile(r"(\S+) (?:situations|groups,|ticks deep)")
+    numbers = [[int(one.replace(",", "")) for one in counts.findall(text)] for text in said[:10] if text]
     assert all(len(one) == 3 and one[0] > one[1] > one[2] for one in numbers)
     assert numbers == sorted(numbers)
-    assert "groups a second" in said[-1]
+    assert "groups a second" in said[9]
 
 
 @pytest.mark.parametrize("name", ["mapping", "inspection"])

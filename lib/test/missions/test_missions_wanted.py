@@ -254,7 +254,8 @@ ENDING = (
     TREE,
     '<Timeout msec="9000"><WaitFor if="drone.control == THEIRS"/></Timeout>',
     '<RetryUntilSuccessful num_attempts="3"><Inverter><drone.hover/></Inverter></RetryUntilSuccessful><drone.land/>',
-    '<WaitFor if="progress(drone.hover) &gt;= 1 || drone.control == OURS || drone.control == THEIRS"/>',
+    '<Parallel success_count="1" failure_count="1"><drone.hover/>'
+    '<WaitFor if="progress(drone.hover) &gt;= 1 || drone.control == OURS || drone.control == THEIRS"/></Parallel>',
 )
 
 
@@ -269,7 +270,9 @@ def test_a_mission_that_never_ends_is_found_and_plays(tree: str, words: str, tmp
 
 @pytest.mark.parametrize("tree", ENDING)
 def test_a_mission_that_ends_does_not_wait(tree: str, tmp_path: Path) -> None:
-    assert "ALU704" not in {one.code for one in proved(tmp_path, "", tree).findings}
+    found = proved(tmp_path, "", tree)
+    assert found.complete
+    assert "ALU704" not in {one.code for one in found.findings}
 
 
 @pytest.mark.parametrize("seed", range(12))
@@ -285,6 +288,34 @@ def test_waits_are_those_of_the_search_one_situation_after_another(seed: int, tm
     comes = held(regions, read(f"p: eventually {ends} assuming termination"), FAULTS, Deadline.after(100.0))
     assert comes.complete
     assert any(Waits(regions).found(Deadline.after(100.0))) == (comes.finding is not None)
+
+
+COMES = ("outcome accomplished or outcome degraded or outcome given_up", "outcome given_up", "drone.axes == FREE", "running(drone.land)")
+
+
+@pytest.mark.parametrize("tree", [*TREES, *ENDING, *(tree for tree, _ in ROUNDS)])
+@pytest.mark.parametrize("comes", COMES)
+def test_what_is_the_case_at_each_end_comes_where_each_run_ends(tree: str, comes: str, tmp_path: Path) -> None:
+    """Two ways to the same answer: by the ends, where they decide it, and one situation after another."""
+    system = System.read(written(tmp_path, "", tree), skillsets(), NO_PART, LOOKED_AT)
+    regions = Regions(system, Deadline.after(100.0))
+    regions.explore()
+    looked = Waits(regions)
+    waits = any(looked.found(Deadline.after(100.0)))
+    assert looked.always_ends != waits
+    wanted = read(f"p: fault pilot leads to {comes} assuming termination")
+    by_steps, by_ends = (held(regions, wanted, FAULTS, Deadline.after(100.0), always_ends=one) for one in (False, looked.always_ends))
+    assert by_steps.complete
+    assert (by_ends.finding is None) == (by_steps.finding is None)
+
+
+def test_what_every_end_brings_needs_no_search(tmp_path: Path) -> None:
+    regions = Regions(System.read(written(tmp_path, "", TREE), skillsets(), NO_PART, LOOKED_AT), Deadline.after(100.0))
+    regions.explore()
+    ends = " or ".join(f"outcome {one}" for one in ("accomplished", "degraded", "given_up"))
+    wanted = read(f"p: fault pilot leads to {ends} assuming termination")
+    assert held(regions, wanted, FAULTS, Steps.after(1e6), always_ends=True).complete
+    assert not held(regions, wanted, FAULTS, Steps.after(1e6)).complete
 
 
 class Steps(Deadline):

@@ -13,7 +13,7 @@ from alula.prove.mission.refusals import Refusal, failing, refusal_of
 from alula.prove.mission.regions import Regions
 from alula.prove.mission.run import MissionFinding, MissionRun, run_of
 from alula.prove.mission.state import Managers
-from alula.prove.mission.system import FAILED
+from alula.prove.mission.system import FAILED, System
 from alula.prove.mission.waits import Waits
 from alula.prove.mission.words import situation, told
 from alula.trees.node import Node
@@ -125,10 +125,9 @@ def _never_ticked(regions: Regions) -> Iterator[Diagnostic]:
             yield _finding("ALU703", f"'{node.name}' is never ticked", node, "take it away, or put it where it is reached")
 
 
-def waits(regions: Regions, deadline: Deadline) -> Iterator[Diagnostic]:
+def waits(looked: Waits, system: System, deadline: Deadline) -> Iterator[Diagnostic]:
     """Yield ALU704 for situations after which the mission never ends, with a run to each; raises OutOfTimeError."""
-    system = regions.system
-    for node, events, state, stays in Waits(regions).found(deadline):
+    for node, events, state, stays in looked.found(deadline):
         how = f"waits in '{node.name}' for ever" if stays else f"goes round '{node.name}' without end"
         message = f"the mission {how}, though nothing fails any more: {situation(system, state)}"
         cure = "wait with Timeout, Awaits or `within`, try again a number of times, or leave the loop"

@@ -1,8 +1,9 @@
 """Whether the properties of a mission's file hold in all its runs.
 
 NEVER and ALWAYS speak of single situations: the regions have them. EVENTUALLY and LEADS_TO speak of what must come once the mission has
-begun: the situations are looked at one after another, each with what is still to come. It never comes where no calm step leads to it
-(``calm``). With ``within N ticks`` it has not come after so many ticks, whatever happens.
+begun. It never comes where no calm step leads to it (``calm``). So a mission that can come to its end from everywhere comes to whatever is
+the case at each of its ends. Otherwise the situations are looked at one after another, each with what is still to come. With
+``within N ticks`` it has not come after so many ticks, whatever happens.
 """
 
 from __future__ import annotations
@@ -13,7 +14,7 @@ from dataclasses import dataclass
 from itertools import product
 
 from alula.language.errors import Severity
-from alula.model.expressions import Constant, Not, ResourceIs, SkillRuns, atoms
+from alula.model.expressions import Constant, Expression, Not, ResourceIs, SkillRuns, atoms
 from alula.model.model import Property, PropertyKind
 from alula.prove.limits import Deadline, OutOfTimeError
 from alula.prove.mission.calm import calm_of, reaching
@@ -38,11 +39,13 @@ class Held:
     complete: bool
 
 
-def held(regions: Regions, one: Property, faults: Faults, deadline: Deadline) -> Held:
-    """Look whether a property holds."""
+def held(regions: Regions, one: Property, faults: Faults, deadline: Deadline, *, always_ends: bool = False) -> Held:
+    """Look whether a property holds; ``always_ends``: calm steps lead to an end of the mission from everywhere (``Waits``)."""
     system = regions.system
+    if always_ends and one.fair and not one.within and _somewhere(regions, Not(_goal(one)), at_ends=True) is None:
+        return Held(None, complete=True)
     if one.kind in SINGLE:
-        run = _somewhere(regions, one)
+        run = _somewhere(regions, one.condition if one.kind is PropertyKind.NEVER else Not(one.condition))
         complete, what = regions.complete, "it can come to this"
     else:
         search = _Search(system, one, faults)
@@ -68,9 +71,13 @@ def held(regions: Regions, one: Property, faults: Faults, deadline: Deadline) ->
 # --- single situations --------------------------------------------------------------------------------------------------
 
 
-def _somewhere(regions: Regions, one: Property) -> tuple[list[Event], State] | None:
-    """Return a run to a situation that the property excludes, by as few ticks as any."""
-    bad = one.condition if one.kind is PropertyKind.NEVER else Not(one.condition)
+def _goal(one: Property) -> Expression:
+    """Return what a property says must come."""
+    return one.condition if one.kind is PropertyKind.EVENTUALLY else one.consequence or Constant(value=False)
+
+
+def _somewhere(regions: Regions, bad: Expression, *, at_ends: bool = False) -> tuple[list[Event], State] | None:
+    """Return a run to a situation in which this is true, by as few ticks as any; ``at_ends``: in which the mission has begun and ended."""
     system = regions.system
     kinds: dict[tuple[int, int], tuple[bool, ...]] = {}
     asked = [[atom for atom in atoms(bad) if _place(system, atom) == place] for place in range(len(system.skillsets))]
@@ -83,6 +90,9 @@ def _somewhere(regions: Regions, one: Property) -> tuple[list[Event], State] | N
         return kinds[place, number]
 
     for number, region in enumerate(regions.regions):
+        memory = system.ticker.memories[region.memory]
+        if at_ends and not (memory.started and memory.end is not None):
+            continue
         choices = []
         for place, closure in enumerate(region.closures):
             soonest: dict[tuple[bool, ...], int] = {}
@@ -113,9 +123,8 @@ class _Search:
         self._system = system
         self._one = one
         self._faults = faults
-        eventually = one.kind is PropertyKind.EVENTUALLY
-        self._begins = Constant(value=True) if eventually else one.condition
-        self._goal = one.condition if eventually else one.consequence or Constant(value=False)
+        self._begins = Constant(value=True) if one.kind is PropertyKind.EVENTUALLY else one.condition
+        self._goal = _goal(one)
         self._before: dict[Awaiting, tuple[Awaiting, Event] | None] = {}
         self._calm_before: dict[Awaiting, list[Awaiting]] = {}
         self._calm_after: dict[Awaiting, list[tuple[Event, Awaiting]]] = {}

@@ -21,6 +21,7 @@ from alula.prove.mission.managers import Failures
 from alula.prove.mission.oracle import UndecidedError
 from alula.prove.mission.regions import Regions
 from alula.prove.mission.system import System
+from alula.prove.mission.waits import Waits
 from alula.prove.mission.wanted import wanted
 
 LOOKED_AT = Failures(refusals=False, hooks=False, aborts=False)
@@ -84,12 +85,13 @@ def prove_within(
         return Proved([_bound(path, 0, given)], [], complete=False)
     answers = Answers(regions)
     known = acceptances(regions.system.nodes)
-    seen_waiting, complete = _waits(regions, deadline.half(deadline.doing) if several else deadline)
+    looked = Waits(regions)
+    seen_waiting, complete = _waits(looked, regions, deadline.half(deadline.doing) if several else deadline)
     found, accepted = divided([*findings(regions, answers), *seen_waiting], known, str(path), complete=complete)
     found += wrong
     undecided = []
     for one in properties if not wrong else ():
-        seen = held(regions, one, faults, deadline)
+        seen = held(regions, one, faults, deadline, always_ends=looked.always_ends)
         found += [seen.finding] if seen.finding else []
         undecided += [one.name] if not seen.finding and not seen.complete else []
     complete = complete and not undecided
@@ -98,11 +100,11 @@ def prove_within(
     return Proved(found, answers.rows, complete, accepted)
 
 
-def _waits(regions: Regions, deadline: Deadline) -> tuple[list[Diagnostic], bool]:
+def _waits(looked: Waits, regions: Regions, deadline: Deadline) -> tuple[list[Diagnostic], bool]:
     """Return the findings about waits, and whether all situations were looked at for them."""
     found: list[Diagnostic] = []
     try:
-        found.extend(waits(regions, deadline))
+        found.extend(waits(looked, regions.system, deadline))
     except (OutOfTimeError, KeyboardInterrupt):
         return found, False
     return found, regions.complete

@@ -31,6 +31,8 @@ class Waits:
         self._asking: set[State] = set()
         self._open: set[State] = set()
         """Those that were not looked at any further: they may lead anywhere."""
+        self.always_ends = False
+        """Whether all were looked at, and the mission can come to an end from each: known once ``found`` is through."""
 
     def found(self, deadline: Deadline) -> Iterator[tuple[Node, list[Event], State, bool]]:
         """Yield each node that it stays in for ever, with a run to there, the situation, and whether all stays as it is.
@@ -46,6 +48,7 @@ class Waits:
             over = error
         good: set[State] = reaching(self._ends | self._open, self._before)
         never = set(self._after) - good
+        self.always_ends = not never and over is None and self._regions.complete
         known: set[State] = set()
         told: set[tuple[int, bool]] = set()
         for begin in (state for state in first if state in never):
