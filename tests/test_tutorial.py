@@ -1,17 +1,23 @@
-"""The tutorial, done as it says, command by command, and a skill more by hand; Alula's folder can't be written to all the while."""
+"""The tutorial, done as it says, command by command, and a skill more by hand; Alula's folder can't be written to all the while.
+
+Its live run is made while the drone flies.
+"""
 
 from __future__ import annotations
 
 import json
 import os
 import re
+import signal
 import subprocess
 import textwrap
+from collections.abc import Iterator
 from pathlib import Path
 
 import pytest
 
 from alula_testing.cover import read_only
+from alula_testing.flights import Flight, start_flight
 
 ALULA_ROOT = Path(__file__).resolve().parents[1]
 SECTION = (ALULA_ROOT / "docs" / "tutorial.md").read_text(encoding="utf-8")
@@ -59,8 +65,28 @@ def passed(output: str) -> int:
     return sum(int(number) for number in re.findall(r"^(\d+) passed", output, re.MULTILINE))
 
 
+@pytest.fixture
+def drone(tmp_path: Path) -> Iterator[Flight]:
+    """A flight of the checkout's robot, which is in the air."""
+    flight = start_flight(tmp_path / "flight", "--rate", "0")
+    try:
+        flight.wait_in_air()
+        yield flight
+    finally:
+        flight.give_up()
+
+
+def land(drone: Flight) -> None:
+    """Have it land, and hold that nothing has disturbed it."""
+    if drone.process.poll() is None:
+        drone.process.send_signal(signal.SIGINT)
+    drone.end()
+    assert (drone.summary["landed"], drone.summary["collisions"], drone.summary["died"]) == (True, 0, [])
+    assert {one["skillset"] for one in drone.summary["skills"]} == {"navigation", "perception", "mapping"}
+
+
 @pytest.mark.timeout(0)  # builds a robot's interfaces: as long as the machine needs
-def test_the_tutorial_works(tmp_path):
+def test_the_tutorial_works(tmp_path, request):
     home = Home(tmp_path)
     new, check, test, run, live, check_again, test_again, check_mission, run_again = COMMANDS
     assert "skillsets/mock.yaml" in home.run(new)
@@ -69,7 +95,9 @@ def test_the_tutorial_works(tmp_path):
     assert untouched >= 8
     assert "mission accomplished" in home.run(run)
     assert len(list(home.robot.glob("runs/*-patrol/report.html"))) == 1
+    drone = request.getfixturevalue("drone")  # two robots at once, each in a graph of its own
     assert "mission accomplished in degraded mode: rover.drive: RESOURCE_INVARIANT_VIOLATED way_stays_clear" in home.run(live)
+    land(drone)
     flown = max(home.robot.glob("runs/*-patrol"), key=lambda run: (run / "report.html").stat().st_mtime)
     summary = json.loads((flown / "summary.json").read_text(encoding="utf-8"))
     assert (summary["mock"], summary["problems"], summary["died"]) == (None, [], [])
