@@ -13,6 +13,7 @@ from rover_navigation.health import BumperMonitor, LaserMonitor, PoseMonitor, Wh
 from rover_navigation.jobs import Ended, Situation
 from rover_navigation.matching import match
 from rover_navigation.planning import RADIUS_M, Surroundings
+from rover_simulator.person import Person
 from rover_simulator.simulation import Simulation
 from rover_simulator.world import load_world
 
@@ -36,6 +37,13 @@ class Rig:
     @property
     def pose(self):
         return compose(self._T_map_odom, self.simulation.wheels.odometry)
+
+    def stand(self, pose, *, person):
+        """Put the rover and the person somewhere: the rover knows where it is, the person stays."""
+        self.simulation.floor.carry(pose)
+        self.simulation.floor.put_person(person)
+        self.simulation.person = Person((person, person), person)
+        self._T_map_odom = compose(pose, inverse(self.simulation.wheels.odometry))
 
     def step(self, job=None):
         """Step the simulation and a job; return how the job ended, or None."""
