@@ -52,13 +52,14 @@ def skillsets():
     return file.skillsets
 
 
-def text_of(body: str) -> str:
+def text_of(body: str, ready: str = "<AlwaysSuccess/>") -> str:
     ports = '<TreeNodesModel><SubTree ID="m"><output_port name="seen" default="0"/></SubTree></TreeNodesModel>'
-    return f'<root BTCPP_format="4" main_tree_to_execute="m"><BehaviorTree ID="m">{body}</BehaviorTree>{ports}</root>'
+    trees = f'<BehaviorTree ID="m">{body}</BehaviorTree><BehaviorTree ID="ready">{ready}</BehaviorTree>'
+    return f'<root BTCPP_format="4" main_tree_to_execute="m">{trees}{ports}</root>'
 
 
-def flown(body: str, folder: Path, *, recorded: bool = True) -> End:
-    (folder / "m.xml").write_text(text_of(body), encoding="utf-8")
+def flown(body: str, folder: Path, *, recorded: bool = True, ready: str = "<AlwaysSuccess/>") -> End:
+    (folder / "m.xml").write_text(text_of(body, ready), encoding="utf-8")
     (folder / "mock.yaml").write_text(MOCK, encoding="utf-8")
     (folder / "run").mkdir()
     models = skillsets()
@@ -110,6 +111,11 @@ def test_a_wait_for_data_ends_with_the_value_and_every_value_is_recorded(tmp_pat
     values = [one["value"]["level"] for one in data if one["data"] == "battery"]
     assert values[-1] == 0.1
     assert 0.8 in values
+
+
+def test_a_mission_begins_when_the_data_that_it_needs_are_told(tmp_path):
+    needs = '<Needs name="told" if="fresh(rover.battery)" otherwise="\'nothing is told\'"/>'  # asked before the managers were heard of, too
+    assert flown('<ScriptCondition code="fresh(rover.battery)"/>', tmp_path, ready=needs).outcome is Outcome.ACCOMPLISHED
 
 
 def test_data_end_a_skill_by_an_attribute(tmp_path):
