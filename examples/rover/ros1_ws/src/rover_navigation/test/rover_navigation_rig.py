@@ -76,6 +76,8 @@ class Rig:
 
     def _scan(self, sweep, odom, now_s):
         self.laser.scan(sweep.ranges_m, now_s)
+        if self.laser.repeats:
+            return
         outside = np.where(sweep.ranges_m < RADIUS_M, np.inf, sweep.ranges_m)
         self._points, self._scan_s = points_of(outside, sweep.angle_min_rad, sweep.angle_step_rad), now_s
         found = match(self.grid, self.pose, self._points)

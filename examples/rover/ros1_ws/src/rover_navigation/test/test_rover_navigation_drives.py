@@ -63,6 +63,15 @@ def test_without_the_laser_it_refuses_to_drive_but_creeps_and_stops_at_what_it_t
     assert rig.run(Creep(rig.around, KITCHEN)) == Ended(arrived=False, text="touched something 3 times")
 
 
+def test_by_a_frozen_scan_nothing_is_driven_nor_located():
+    rig = Rig("laser:frozen@3")
+    assert rig.run(Drive(rig.around, OFFICE)).text.startswith("no scan")
+    assert rig.run(Creep(rig.around, (5.0, 5.4, 0.0))) == ARRIVED
+    assert "FROZEN" in rig.heard
+    assert off_m(rig) < 0.3
+    assert rig.simulation.truth.collisions == 0
+
+
 def test_a_person_who_stays_in_the_door_is_given_up_with_a_reason():
     rig = Rig("person:stays")
     ended = rig.run(Drive(rig.around, WORKSHOP))
