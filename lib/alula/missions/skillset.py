@@ -105,7 +105,9 @@ class MissionClient:
         self._followed = data
 
     def value(self, data: str) -> object | None:
-        """Return the last value of a data, None where there is none, or it is stale."""
+        """Return the last value of a data, None where there is none, it is stale, or the skillset was not heard of yet."""
+        if not (self._follows_data or self.ready):
+            return None
         feed = self.client.data_feed(data)
         return None if feed.sample is None or feed.stale else feed.sample.value
 

@@ -18,6 +18,7 @@ from alula.missions.filed.part import NO_PART
 from alula.missions.filed.plan import plan_of_file
 from alula.missions.mocked import MockedMission
 from alula.model.ros_types import RosType
+from alula.prove.mission.prover import prove_mission
 from alula.runtime.mock import load_behaviour
 from alula.trees.script import parse
 from alula.trees.script.scope import Unknown
@@ -52,13 +53,14 @@ def skillsets():
     return file.skillsets
 
 
-def text_of(body: str) -> str:
+def text_of(body: str, ready: str = "<AlwaysSuccess/>") -> str:
     ports = '<TreeNodesModel><SubTree ID="m"><output_port name="seen" default="0"/></SubTree></TreeNodesModel>'
-    return f'<root BTCPP_format="4" main_tree_to_execute="m"><BehaviorTree ID="m">{body}</BehaviorTree>{ports}</root>'
+    trees = f'<BehaviorTree ID="m">{body}</BehaviorTree><BehaviorTree ID="ready">{ready}</BehaviorTree>'
+    return f'<root BTCPP_format="4" main_tree_to_execute="m">{trees}{ports}</root>'
 
 
-def flown(body: str, folder: Path, *, recorded: bool = True) -> End:
-    (folder / "m.xml").write_text(text_of(body), encoding="utf-8")
+def flown(body: str, folder: Path, *, recorded: bool = True, ready: str = "<AlwaysSuccess/>") -> End:
+    (folder / "m.xml").write_text(text_of(body, ready), encoding="utf-8")
     (folder / "mock.yaml").write_text(MOCK, encoding="utf-8")
     (folder / "run").mkdir()
     models = skillsets()
@@ -110,6 +112,19 @@ def test_a_wait_for_data_ends_with_the_value_and_every_value_is_recorded(tmp_pat
     values = [one["value"]["level"] for one in data if one["data"] == "battery"]
     assert values[-1] == 0.1
     assert 0.8 in values
+
+
+def test_a_mission_begins_when_the_data_that_it_needs_are_told(tmp_path):
+    needs = '<Needs name="told" if="fresh(rover.battery)" otherwise="\'nothing is told\'"/>'  # asked before the managers were heard of, too
+    assert flown('<ScriptCondition code="fresh(rover.battery)"/>', tmp_path, ready=needs).outcome is Outcome.ACCOMPLISHED
+
+
+def test_runs_of_a_mission_that_asks_for_data_are_not_looked_at_and_that_is_told(tmp_path):
+    (tmp_path / "m.xml").write_text(
+        text_of('<Sequence><rover.drive/><ScriptCondition code="fresh(rover.battery)"/></Sequence>'), encoding="utf-8"
+    )
+    (finding,) = prove_mission(tmp_path / "m.xml", skillsets(), NO_PART).findings
+    assert (finding.code, finding.message) == ("ALU711", "its runs can't be looked at: the data rover.battery")
 
 
 def test_data_end_a_skill_by_an_attribute(tmp_path):

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Iterator, Mapping
+from collections.abc import Callable, Collection, Iterator, Mapping
 from dataclasses import dataclass, field
 
 from alula.missions.blackboard import Blackboard, Failure
@@ -13,7 +13,7 @@ from alula.missions.skill_types import type_of
 from alula.model.execution_state import ExecutionState
 from alula.model.model import Skillset
 from alula.prove.mission.moments import Moment
-from alula.prove.mission.oracle import Oracle
+from alula.prove.mission.oracle import Oracle, UndecidedError
 from alula.prove.mission.unknown import UnknownNumber, unknown
 from alula.trees.node import Node, pointer
 from alula.trees.palette import Direction
@@ -135,6 +135,13 @@ class Client:
     def ready(self) -> bool:
         """Tell whether the managers are there."""
         return bool(self._robot.oracle.look(("alive", self.skillset)))
+
+    def follow(self, data: Collection[str]) -> None:
+        """No data come to a search."""
+
+    def value(self, data: str) -> object | None:
+        """Refuse: the models say nothing of what is measured, and one value that never changes would show too little."""
+        raise UndecidedError(f"the data {self.skillset}.{data}")
 
     def start(self, skill: str, **_inputs: object) -> Handle:
         """Ask for an execution; one that nobody can be asked for has FAILED."""

@@ -13,6 +13,7 @@ from rover_navigation.health import BumperMonitor, LaserMonitor, PoseMonitor, Wh
 from rover_navigation.jobs import Ended, Situation
 from rover_navigation.matching import match
 from rover_navigation.planning import RADIUS_M, Surroundings
+from rover_simulator.person import Person
 from rover_simulator.simulation import Simulation
 from rover_simulator.world import load_world
 
@@ -36,6 +37,13 @@ class Rig:
     @property
     def pose(self):
         return compose(self._T_map_odom, self.simulation.wheels.odometry)
+
+    def stand(self, pose, *, person):
+        """Put the rover and the person somewhere: the rover knows where it is, the person stays."""
+        self.simulation.floor.carry(pose)
+        self.simulation.floor.put_person(person)
+        self.simulation.person = Person((person, person), person)
+        self._T_map_odom = compose(pose, inverse(self.simulation.wheels.odometry))
 
     def step(self, job=None):
         """Step the simulation and a job; return how the job ended, or None."""
@@ -68,6 +76,8 @@ class Rig:
 
     def _scan(self, sweep, odom, now_s):
         self.laser.scan(sweep.ranges_m, now_s)
+        if self.laser.repeats:
+            return
         outside = np.where(sweep.ranges_m < RADIUS_M, np.inf, sweep.ranges_m)
         self._points, self._scan_s = points_of(outside, sweep.angle_min_rad, sweep.angle_step_rad), now_s
         found = match(self.grid, self.pose, self._points)

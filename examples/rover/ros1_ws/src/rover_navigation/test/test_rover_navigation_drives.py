@@ -63,11 +63,29 @@ def test_without_the_laser_it_refuses_to_drive_but_creeps_and_stops_at_what_it_t
     assert rig.run(Creep(rig.around, KITCHEN)) == Ended(arrived=False, text="touched something 3 times")
 
 
+def test_by_a_frozen_scan_nothing_is_driven_nor_located():
+    rig = Rig("laser:frozen@3")
+    assert rig.run(Drive(rig.around, OFFICE)).text.startswith("no scan")
+    assert rig.run(Creep(rig.around, (5.0, 5.4, 0.0))) == ARRIVED
+    assert "FROZEN" in rig.heard
+    assert off_m(rig) < 0.3
+    assert rig.simulation.truth.collisions == 0
+
+
 def test_a_person_who_stays_in_the_door_is_given_up_with_a_reason():
     rig = Rig("person:stays")
     ended = rig.run(Drive(rig.around, WORKSHOP))
     assert not ended.arrived
     assert "way" in ended.text
+    assert rig.simulation.truth.collisions == 0
+
+
+@pytest.mark.parametrize("bearing", np.arange(0.0, 2.0 * math.pi, math.pi / 6.0).tolist())
+def test_it_gets_away_from_who_stands_next_to_it(bearing):
+    rig = Rig()
+    here, goal = (13.0, 2.2, 2.75), (11.0, 2.2, math.pi)
+    rig.stand(here, person=(here[0] + 0.58 * math.cos(bearing), here[1] + 0.58 * math.sin(bearing)))
+    assert rig.run(Drive(rig.around, goal)) == ARRIVED
     assert rig.simulation.truth.collisions == 0
 
 
@@ -111,7 +129,7 @@ def test_plans_keep_away_from_walls_and_say_why_there_is_none():
 def test_what_was_not_seen_for_longest_is_forgotten_where_it_leaves_no_way():
     rig = Rig()
     now_s, rows = rig.simulation.now_s, np.linspace(4.4, 6.4, 40)
-    old, new, fresh = (rig.grid.cells(np.column_stack((np.full(40, x), rows))) for x in (2.0, 4.0, 6.0))
+    old, new, fresh = (rig.grid.cells(np.column_stack((np.full(40, x), rows))) for x in (2.0, 4.0, 3.0))  # the third before all doors
     rig.around.seen_s[old], rig.around.seen_s[new] = now_s - 30.0, now_s - 10.0
     nearer = (3.0, 5.4, 0.0)
     assert len(plan_anew(rig.around, rig.pose, nearer, now_s))

@@ -12,6 +12,7 @@ from rover_simulator.drawing import draw
 from rover_simulator.errors import WorldError
 from rover_simulator.faults import FAULTS
 from rover_simulator.lockstep import Lockstep
+from rover_simulator.person import Person
 from rover_simulator.simulation import Simulation
 from rover_simulator.world import load_world
 
@@ -88,6 +89,17 @@ def test_a_person_answers_after_a_while_unless_silent():
         assert simulation.person.answer(2.0, silent=silent) == ""
         assert simulation.person.answer(6.0, silent=silent) == ("" if silent else "done load parcel")
         assert simulation.person.answer(7.0, silent=silent) == ""
+
+
+def test_a_person_who_waits_before_the_rover_goes_back_when_asked():
+    person, here, rover = Person([(0.0, 0.0), (5.0, 0.0)], (9.0, 9.0)), (2.0, 0.0), (2.6, 0.2, 0.0)
+    assert person.velocity(here, rover, stays=False) == (0.0, 0.0)
+    person.ask("let me pass", 1.0)
+    assert person.answer(5.0, silent=False) == "done let me pass"
+    assert person.velocity(here, rover, stays=False)[0] < 0.0
+    person.ask("load parcel", 6.0)  # nobody is in anybody's way now
+    assert person.answer(10.0, silent=False)
+    assert person.velocity(here, rover, stays=False)[0] < 0.0
 
 
 def test_what_can_not_be_read_is_refused(tmp_path):

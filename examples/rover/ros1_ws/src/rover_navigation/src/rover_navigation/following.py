@@ -8,7 +8,7 @@ import numpy as np
 
 from rover_navigation.geometry import Points, Pose, inverse, transformed
 
-AHEAD_M = 0.45  # the point of the way that is steered for
+AHEAD_M = (0.45, 0.3, 0.15)  # the points of the way that are steered for, the next one where there is no getting to the one before
 TURN_FIRST_RAD = 0.7  # with more to turn it turns where it stands
 TURN_RAD_S, TURN_GAIN = 1.0, 2.0
 BODY_M = 0.29  # radius, with a margin for what the laser measures and for the step until the next command
@@ -19,14 +19,13 @@ Twist = tuple[float, float]
 STAND: Twist = (0.0, 0.0)
 
 
-def carrot(way: Points, pose: Pose) -> Points:
-    """Return the point of the way to steer for, (2,) in base_link."""
+def carrots(way: Points, pose: Pose) -> Points:
+    """Return the points of the way to steer for, (N, 2) in base_link, the best one first."""
     local = transformed(inverse(pose), way)
     far = np.linalg.norm(local, axis=1)
     nearest = int(np.argmin(far))
-    beyond = np.nonzero(far[nearest:] > AHEAD_M)[0]
-    point: Points = local[nearest + int(beyond[0])] if len(beyond) else local[-1]
-    return point
+    beyond = [np.nonzero(far[nearest:] > ahead)[0] for ahead in AHEAD_M]
+    return np.array([local[nearest + int(some[0])] if len(some) else local[-1] for some in beyond], dtype=np.float64)
 
 
 def towards(point: Points, speed_m_s: float) -> Twist:
@@ -64,4 +63,20 @@ def careful(twist: Twist, points: Points) -> Twist:
         slower = (part * twist[0], part * twist[1])
         if free_m(slower, points) > slower[0] ** 2 / (2.0 * BRAKE_M_S2) + 0.02:
             return slower if twist[0] else twist
+    return STAND
+
+
+def steer(goals: Points, speed_m_s: float, points: Points) -> Twist:
+    """Return the twist to the first of the goals (in base_link) that there is a way to: on an arc, or straight after a turn to it.
+
+    Turning it touches nothing, for it is round. So where the arc leads into something, as next to a person who has come near, it is not
+    held by what it need not drive into.
+    """
+    for goal in goals:
+        twist = careful(towards(goal, speed_m_s), points)
+        if twist != STAND:
+            return twist
+        bearing = math.atan2(goal[1], goal[0])
+        if careful((speed_m_s, 0.0), transformed((0.0, 0.0, -bearing), points)) != STAND:
+            return turn(bearing)
     return STAND

@@ -46,6 +46,11 @@ class LaserMonitor:
             same = (ranges_m < NEAR_M) & (np.abs(ranges_m - last) < NEAR_CHANGE_M)
         self._near_scans = np.where(same, 1 if self._near_scans is None else self._near_scans + 1, 0)
 
+    @property
+    def repeats(self) -> bool:
+        """Tell whether the last scan is the one before once more: it says nothing of where the rover is now."""
+        return self._repeated > 0
+
     def verdict(self, now_s: float) -> str:
         """Return what there is to say."""
         if self._last is None:

@@ -8,7 +8,7 @@ from typing import Protocol
 
 import numpy as np
 
-from rover_navigation.following import STAND, Twist, careful, carrot, towards, turn
+from rover_navigation.following import STAND, Twist, carrots, steer, towards, turn
 from rover_navigation.geometry import Points, Pose, inverse, transformed, wrapped
 from rover_navigation.planning import NoWayError, Surroundings, plan, plan_anew
 
@@ -94,8 +94,8 @@ class Drive:
             return Ended(arrived=False, text=self.no_way or f"something stays in the way, {distance:.1f} m before the goal")
         if self.way is None:
             return STAND
-        twist = towards(carrot(self.way, now.pose), self.speed_m_s)
-        return careful(twist, now.points) if self.laser else twist
+        goals = carrots(self.way, now.pose)
+        return steer(goals, self.speed_m_s, now.points) if self.laser else towards(goals[0], self.speed_m_s)
 
     def _plan(self, now: Situation) -> None:
         self.planned_s = now.now_s
@@ -135,7 +135,7 @@ class Corridor:
         bearing = math.atan2(to_go[1], to_go[0])
         if abs(bearing) > 0.7:
             return turn(bearing)
-        return careful(towards(np.array([1.0, self._middle_m(now.points, bearing)]), SPEED_M_S), now.points)
+        return steer(np.array([[1.0, self._middle_m(now.points, bearing)]]), SPEED_M_S, now.points)
 
     @staticmethod
     def _middle_m(points: Points, bearing: float) -> float:

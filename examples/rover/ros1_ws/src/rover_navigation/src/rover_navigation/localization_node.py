@@ -5,6 +5,7 @@ from __future__ import annotations
 import math
 import threading
 
+import numpy as np
 import rospy
 import tf2_ros
 from geometry_msgs.msg import PoseWithCovarianceStamped, Twist
@@ -15,6 +16,7 @@ from std_msgs.msg import Float32
 from std_srvs.srv import Trigger, TriggerRequest, TriggerResponse
 
 from rover_navigation.geometry import Points, Pose, compose, inverse, wrapped
+from rover_navigation.health import LaserMonitor
 from rover_navigation.matching import match, search
 from rover_navigation.ros import Done, points_of_scan, pose_message, pose_of, transform, wait_for_map
 
@@ -36,6 +38,7 @@ class LocalizationNode:
         self._odom: Pose = (0.0, 0.0, 0.0)
         self._points: Points | None = None  # of a scan that is not dealt with yet
         self._quality = 0.0
+        self._laser = LaserMonitor()
         self._turned_rad: float | None = None  # since a search began; None: none runs
         self._kept: list[tuple[Pose, Points]] = []
         self._found = threading.Event()
@@ -49,7 +52,9 @@ class LocalizationNode:
         rospy.Subscriber("/odom", Odometry, self._on_odometry, queue_size=20, tcp_nodelay=True)
 
     def _on_scan(self, scan: LaserScan) -> None:
-        self._points = points_of_scan(scan)
+        self._laser.scan(np.asarray(scan.ranges, dtype=np.float64), scan.header.stamp.to_sec())
+        if not self._laser.repeats:
+            self._points = points_of_scan(scan)
 
     def _on_odometry(self, message: Odometry) -> None:
         before, self._odom = self._odom, pose_of(message.pose.pose)

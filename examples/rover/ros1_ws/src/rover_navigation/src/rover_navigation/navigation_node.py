@@ -16,6 +16,7 @@ from sensor_msgs.msg import BatteryState, LaserScan
 from std_msgs.msg import Bool, Header
 
 from rover_navigation.geometry import Points, Pose, compose, inverse
+from rover_navigation.health import LaserMonitor
 from rover_navigation.jobs import Corridor, Creep, Dock, Drive, Ended, Job, Situation
 from rover_navigation.planning import Surroundings
 from rover_navigation.ros import Done, free_of_scan, points_of_scan, pose_message, pose_of, wait_for_map
@@ -47,6 +48,7 @@ class NavigationNode:
         self._odoms: dict[int, Pose] = {}  # by their stamps, in nanoseconds
         self._points: Points = np.zeros((0, 2))
         self._scan_s = np.inf  # until the first odometry
+        self._laser = LaserMonitor()
         self._bumped = self._charging = False
         self._commands = rospy.Publisher("/cmd_vel", Twist, queue_size=5)
         self._way = rospy.Publisher("/move_base/plan", Path, queue_size=2, latch=True)
@@ -109,6 +111,9 @@ class NavigationNode:
 
     def _on_scan(self, scan: LaserScan) -> None:
         with self._lock:
+            self._laser.scan(np.asarray(scan.ranges, dtype=np.float64), scan.header.stamp.to_sec())
+            if self._laser.repeats:
+                return
             self._points, self._scan_s = points_of_scan(scan), scan.header.stamp.to_sec()
             if self._pose is not None:
                 self._around.look(self._pose, self._points, free_of_scan(scan), self._scan_s)

@@ -73,6 +73,10 @@ class Floor:
         """Put the rover somewhere else."""
         self._rover.set_state(list(pose))
 
+    def put_person(self, place: tuple[float, float]) -> None:
+        """Put the person somewhere else."""
+        self._person.set_state([*place, 0.0])
+
     def open_door(self, name: str, *, wide: bool) -> None:
         """Open or shut a door at once."""
         self.doors[name].unobstructed = wide

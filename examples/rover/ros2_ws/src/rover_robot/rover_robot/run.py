@@ -1,0 +1,30 @@
+"""The rover's part of a live run: how fast it goes."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING, Any
+
+from alula.live.part import RunPart
+from alula.live.spec import RequestError
+
+if TYPE_CHECKING:
+    from argparse import ArgumentParser, Namespace
+    from collections.abc import Mapping
+
+    from alula.common.scenarios import Scenario
+
+MAX_RATE = 1000.0
+
+
+class RoverRun(RunPart):
+    """Adds ``--rate``, which the launch file takes by that name."""
+
+    def add_options(self, parser: ArgumentParser) -> None:
+        """Add it."""
+        parser.add_argument("--rate", type=float, default=1.0, help="simulated seconds per second at most, 0: no limit (default 1)")
+
+    def read(self, given: Namespace, scenario: Scenario) -> Mapping[str, Any]:
+        """Return it; raises RequestError."""
+        if not 0.0 <= given.rate <= MAX_RATE:  # also refuses nan
+            raise RequestError(f"--rate {given.rate:g}: must be 0 (no limit) or a positive factor up to {MAX_RATE:g}")
+        return {"rate": given.rate}
