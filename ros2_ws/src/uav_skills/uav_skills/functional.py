@@ -11,7 +11,6 @@ from typing import Any
 
 from geometry_msgs.msg import Point
 from rclpy.callback_groups import ReentrantCallbackGroup
-from rclpy.event_handler import SubscriptionEventCallbacks
 from rclpy.node import Node
 from rclpy.qos import DurabilityPolicy, QoSProfile
 from skillset_interfaces.msg import ResourceStates
@@ -19,6 +18,7 @@ from std_srvs.srv import SetBool, Trigger
 from uav_msgs.msg import GuidanceState, MappingState, Obstacle, VideoState
 from uav_msgs.srv import Command, SetHeadingReference, SetPositionReference, Stream, Takeoff
 
+from skillset_ros2.base import QUIET
 from uav_skills.calls import CallQueue, Reply, ignore_response
 
 WATCH_PERIOD_S = 0.1
@@ -64,8 +64,7 @@ class FunctionalPart:
 
     def _subscribe(self, message_type: Any, topic: str, callback: Callable[[Any], None], qos: QoSProfile = LAST_FEW) -> None:
         # The data manager, which has most of these topics, too, gets rclpy's warnings; each is an entity that every turn gathers.
-        events = SubscriptionEventCallbacks(use_default_callbacks=False)
-        self._node.create_subscription(message_type, topic, callback, qos, callback_group=self._group, event_callbacks=events)
+        self._node.create_subscription(message_type, topic, callback, qos, callback_group=self._group, event_callbacks=QUIET)
 
 
 class GuidanceApi(FunctionalPart):
