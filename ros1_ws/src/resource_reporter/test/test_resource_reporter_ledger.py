@@ -49,6 +49,37 @@ def test_a_skillset_that_restarts_is_told_again():
     assert ledger.next_call(10.0) == Call("a", "BROKEN")
 
 
+def test_it_is_settled_once_the_skillset_knows_whatever_it_says():
+    ledger = Ledger()
+    assert ledger.settled, "nothing was reported"
+    ledger.want("a", "OK")
+    assert not ledger.settled, "the skillset has not shown its states"
+    ledger.observe({"a": "UNKNOWN"})
+    assert not ledger.settled
+    ledger.refused(Call("a", "OK"), "no answer", 0.0, answered=False)
+    assert not ledger.settled, "it may know nothing of it"
+    ledger.reached(Call("a", "OK"), 0.1)
+    assert ledger.settled, "it has answered"
+    ledger.observe({"a": "OK"})
+    ledger.want("a", "UNKNOWN")
+    ledger.refused(Call("a", "UNKNOWN"), "no arrow", 0.2)
+    assert ledger.settled, "it will have none of it, but it knows"
+    ledger.want("a", "BROKEN")
+    assert not ledger.settled, "an answer counts for the state that it answered"
+    ledger.want("a", "OK", "why", insist=True)
+    assert ledger.settled, "a reason alone holds nothing up"
+    ledger.observe({"a": "UNKNOWN"})
+    assert not ledger.settled, "a skillset that restarts knows nothing"
+
+
+def test_a_resource_that_the_skillset_lacks_or_that_is_not_insisted_on_holds_nothing_up():
+    ledger = Ledger()
+    ledger.observe({"a": "OK"})
+    ledger.want("b", "OK")
+    ledger.want("a", "BROKEN", "why", insist=False)
+    assert ledger.settled
+
+
 def test_a_new_state_is_asked_for_at_once_though_the_last_one_was_refused():
     ledger = Ledger()
     ledger.observe({"a": "OK"})

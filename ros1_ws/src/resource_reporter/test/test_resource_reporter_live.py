@@ -144,3 +144,41 @@ def test_reasons_travel_with_the_states_and_follow_when_they_change(skillset, re
     reporter.report("zed_status", "OK")
     becomes(skillset, "OK")
     assert (len(skillset.calls), skillset.reason) == (told + 1, "")
+
+
+def test_what_waits_for_the_skillset_is_done_when_it_has_answered(skillset, reporter):
+    done: list[str] = []
+    skillset.hangs = threading.Event()
+    skillset.serve()
+    wait_until(lambda: connected(reporter), timeout_s=5.0, what="the states are shown")
+    reporter.report("zed_status", "OK")
+    reporter.when_settled(lambda: done.append(skillset.state))
+    wait_until(lambda: len(skillset.calls) == 1, timeout_s=5.0, what="it is asked for")
+    assert done == [], "the skillset does not know yet"
+    skillset.hangs.set()
+    wait_until(lambda: done != [], timeout_s=5.0, what="it is done")
+    assert done == ["OK"]
+    reporter.when_settled(lambda: done.append("at once"))
+    assert done == ["OK", "at once"]
+
+
+def test_nothing_waits_for_a_skillset_that_is_not_there(reporter):
+    done: list[str] = []
+    reporter.report("zed_status", "OK")
+    reporter.when_settled(lambda: done.append("done"))
+    assert done == ["done"]
+
+
+def test_what_waits_for_a_skillset_that_has_gone_is_done(skillset, reporter):
+    done: list[str] = []
+    wait_until(lambda: connected(reporter), timeout_s=5.0, what="the states are shown")
+    reporter.report("zed_status", "OK")  # nobody serves it
+    reporter.when_settled(lambda: done.append("done"))
+    assert done == []
+    skillset.close()
+    wait_until(lambda: done == ["done"], timeout_s=5.0, what="it is done")
+
+
+def connected(reporter: ResourceReporter) -> bool:
+    """Tell whether the reporter hears the skillset: from then on it waits for it."""
+    return bool(reporter._subscriber.get_num_connections())

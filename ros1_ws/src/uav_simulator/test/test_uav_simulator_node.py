@@ -231,8 +231,8 @@ def test_a_client_takes_off_and_a_broken_zed_falls_silent(start_simulator, colle
 
 
 def test_time_begins_when_all_that_work_for_it_are_there(start_simulator, collect):
-    others = f"{PACE_TOPIC}_of_another"
-    start_simulator("_rate:=0", f"_pace_topics:=[{PACE_TOPIC},{others}]", "_start_timeout_s:=60", "_pace_timeout_s:=4")
+    others, states = f"{PACE_TOPIC}_of_another", f"{PACE_TOPIC}_of_a_skillset"
+    start_simulator("_rate:=0", f"_pace_topics:=[{PACE_TOPIC},{others},{states}=inf]", "_start_timeout_s:=60", "_pace_timeout_s:=4")
     seen = collect(clock=("/clock", Clock), imu=("/imu/data", Imu))
     first = rospy.Publisher(PACE_TOPIC, Header, queue_size=1)
     wait_until(lambda: first.get_num_connections() > 0, timeout_s=TIMEOUT_S, what="the simulator listens")
@@ -240,6 +240,10 @@ def test_time_begins_when_all_that_work_for_it_are_there(start_simulator, collec
     assert {m.clock.to_nsec() for m in seen.messages["clock"]} == {20_000_000}
     assert not seen.count("imu")
     second = rospy.Publisher(others, Header, queue_size=1)
+    wait_until(lambda: second.get_num_connections() > 0, timeout_s=TIMEOUT_S, what="the simulator listens")
+    seen.wait("clock", seen.count("clock") + 3)
+    assert not seen.count("imu")
+    third = rospy.Publisher(states, Header, queue_size=1)  # never says anything
     seen.wait("imu")
     assert seen.messages["imu"][0].header.stamp.to_sec() < 0.05, "the first measurements are heard"
     first.publish(Header(stamp=rospy.Time(100)))
@@ -249,6 +253,7 @@ def test_time_begins_when_all_that_work_for_it_are_there(start_simulator, collec
     assert time.monotonic() - held_from > 1.0, "the other node has not said anything yet, and is waited for"
     first.unregister()
     second.unregister()
+    third.unregister()
 
 
 def test_subscribers_that_are_there_first_miss_no_first_measurement(start_simulator, collect):

@@ -33,7 +33,7 @@ def test_time_waits_for_a_laggard_and_goes_on_when_it_has_caught_up():
     assert p.may_advance(10.32, 1.5)
 
 
-def test_from_its_beginning_time_waits_for_all_that_are_held_against_the_clock():
+def test_from_its_beginning_time_waits_for_all():
     p = Pacer(["/a", "/b=0.06", "/c=zed"], limit_s=LIMIT_S, timeout_s=TIMEOUT_S)
     assert p.may_advance(50.0, 0.0), "time has not begun"
     p.heard("/a", 10.04)
@@ -43,6 +43,17 @@ def test_from_its_beginning_time_waits_for_all_that_are_held_against_the_clock()
     p.heard("/b", 10.34)
     assert p.may_advance(10.34, 0.1), "/c has no measurement to deal with"
     assert not p.may_advance(10.36, 0.1), "/a spoke before time began, and no more"
+    p.heard("/a", 10.36)
+    p.heard("/b", 10.36)
+    p.measured("zed", 10.3, 10.3)
+    assert p.may_advance(10.36, 0.2)
+    assert not p.may_advance(10.38, 0.2), "/c has never spoken, and has its first measurement to deal with"
+
+
+def test_what_is_waited_for_only_at_the_start_holds_nothing_up_once_time_has_begun():
+    p = Pacer(["/states=inf"], limit_s=LIMIT_S, timeout_s=TIMEOUT_S)
+    p.begin(10.0)
+    assert p.may_advance(1e6, 0.0)
 
 
 def test_time_lets_go_after_its_timeout_until_the_topic_speaks_again():

@@ -12,7 +12,8 @@ from typing import Generic, TypeVar
 
 import rospy
 from rosgraph_msgs.msg import Clock
-from std_msgs.msg import Header
+
+from resource_reporter import DoneReporter, ResourceReporter
 
 NS = 1_000_000_000
 LOOPBACK = "127.0.0.1"
@@ -37,7 +38,7 @@ class MissionLoop(Generic[Item]):
     """Calls ``on_datagram(which socket, data)``, ``on_item(item)`` and ``on_tick()``, one at a time, until ROS shuts down.
 
     ``now_ns`` is the mission clock: simulated where there is one, else the ROS clock at 50 Hz. After each tick ``~done`` tells its
-    time, so that a simulator can wait for this loop.
+    time, so that a simulator can wait for this loop and what the reporters tell.
     """
 
     def __init__(
@@ -47,6 +48,7 @@ class MissionLoop(Generic[Item]):
         on_tick: Callable[[], None],
         on_datagram: OnDatagram | None = None,
         on_item: Callable[[Item], None] | None = None,
+        reporters: Sequence[ResourceReporter] = (),
     ) -> None:
         self.sockets = [udp_socket(port) for port in ports]
         self._on_tick, self._on_datagram, self._on_item = on_tick, on_datagram, on_item
@@ -54,7 +56,7 @@ class MissionLoop(Generic[Item]):
         self._now_ns = self._ticked_ns = 0
         self._wake = os.eventfd(0, os.EFD_NONBLOCK)
         self._lock = threading.Lock()
-        self._done = rospy.Publisher("~done", Header, queue_size=20, tcp_nodelay=True)
+        self._reporters = reporters
         if rospy.get_param("/use_sim_time", False):
             self._source = rospy.Subscriber("/clock", Clock, self._on_clock, queue_size=100, tcp_nodelay=True)
         else:
@@ -80,6 +82,7 @@ class MissionLoop(Generic[Item]):
 
     def run(self) -> None:
         """Handle packets, orders and ticks of the clock, one after another, until ROS shuts down."""
+        self._done = DoneReporter(*self._reporters)
         while not rospy.is_shutdown():
             waiting: list[socket.socket | int] = [*self.sockets, self._wake]
             readable, _, _ = select.select(waiting, [], [], WAIT_S)
@@ -115,7 +118,7 @@ class MissionLoop(Generic[Item]):
             return
         self._ticked_ns = now_ns
         self._on_tick()
-        self._done.publish(Header(stamp=rospy.Time(*divmod(now_ns, NS))))
+        self._done.done(now_ns)
 
     def _on_clock(self, message: Clock) -> None:
         self._now_ns = max(self._now_ns, message.clock.to_nsec())

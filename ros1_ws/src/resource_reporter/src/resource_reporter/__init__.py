@@ -1,10 +1,11 @@
 """Extern transitions: the functional layer says which state a resource has, this package sees to it that the skillset knows.
 
-Also: what the functional layer is told by services, as messages (``ToldService``).
+Also: what the functional layer is told by services, as messages (``ToldService``), and how far a node has come (``DoneReporter``).
 """
 
 from resource_reporter.calls import ToldService
+from resource_reporter.done import DoneReporter
 from resource_reporter.ledger import Call, Ledger
 from resource_reporter.reporter import ResourceReporter
 
-__all__ = ["Call", "Ledger", "ResourceReporter", "ToldService"]
+__all__ = ["Call", "DoneReporter", "Ledger", "ResourceReporter", "ToldService"]

@@ -27,6 +27,8 @@ class _Entry:
     insist: bool = True
     not_before_s: float = 0.0
     retry_s: float = FIRST_RETRY_S
+    answered: bool = False
+    """The skillset has accepted or refused this state: it knows."""
 
     def put_off(self, now_s: float) -> None:
         """Ask again later: 25 ms after the first attempt, then twice as long each time, at most 0.2 s."""
@@ -65,6 +67,8 @@ class Ledger:
             before, after = self._actual.get(resource), states.get(resource)
             if before not in {after, entry.state}:
                 entry.not_before_s = 0.0
+            if before == entry.state != after:  # restarted, for instance: what it knew is gone
+                entry.answered = False
         self._actual, self._reasons = dict(states), dict(reasons or {})
 
     def next_call(self, now_s: float) -> Call | None:
@@ -80,16 +84,30 @@ class Ledger:
         times = [entry.not_before_s for name, entry in self._wanted.items() if self._differs(name)]
         return max(0.0, min(times) - now_s) if times else None
 
+    @property
+    def settled(self) -> bool:
+        """Return whether the skillset knows of every state that was reported: it shows it, or has accepted or refused it."""
+        return all(self._known(name, entry) for name, entry in self._wanted.items())
+
     def reached(self, call: Call, now_s: float) -> None:
         """Note an answer by which the resource has the state asked for; the skillset gets the longest wait to show it."""
         entry = self._asked_for(call)
         if entry is not None:
+            entry.answered = True
             entry.not_before_s = now_s + LONGEST_RETRY_S
 
-    def refused(self, call: Call, reason: str, now_s: float) -> bool:
-        """Note a refusal or a failed call, to be tried again; return whether this (call, reason) is told for the first time."""
+    def refused(self, call: Call, reason: str, now_s: float, *, answered: bool = True) -> bool:
+        """Note a refusal, to be tried again; return whether this (call, reason) is told for the first time.
+
+        Args:
+            call: what was asked for.
+            reason: why it was refused, in words.
+            now_s: when.
+            answered: False where the call failed, so that the skillset may know nothing of it.
+        """
         entry = self._asked_for(call)
         if entry is not None:
+            entry.answered |= answered
             entry.put_off(now_s)
         first = (call, reason) not in self._told
         self._told.add((call, reason))
@@ -103,6 +121,11 @@ class Ledger:
         """Return what a call was for, if that is still wanted."""
         entry = self._wanted.get(call.resource)
         return entry if entry is not None and entry.state == call.to else None
+
+    def _known(self, resource: str, entry: _Entry) -> bool:
+        if not self._actual:
+            return False
+        return entry.answered or not entry.insist or self._actual.get(resource, entry.state) == entry.state
 
     def _differs(self, resource: str) -> bool:
         """Tell whether the skillset shows another state than the hardware has, or another reason than is known."""

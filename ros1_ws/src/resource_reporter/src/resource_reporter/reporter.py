@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import threading
 import time
+from collections.abc import Callable
 
 import rospy
 from skillset_interfaces.msg import ResourceStates
@@ -15,6 +16,8 @@ from resource_reporter.ledger import Call, Ledger
 
 # A latched topic may have been missed only while its publisher was away: nothing has to be polled. This bounds one wait.
 LONGEST_WAIT_S = 1.0
+# What waits for the skillset to know waits no longer than this (wall clock): a skillset that hangs must stop nothing.
+SETTLE_LIMIT_S = 10.0
 
 
 class ResourceReporter:
@@ -29,6 +32,8 @@ class ResourceReporter:
         self._ledger = Ledger()
         self._changed = threading.Condition()
         self._ended = False
+        self._when_settled: list[Callable[[], None]] = []
+        self._unsettled_since_s: float | None = None
         self._told_unknown: set[str] = set()
         self._caller = TransitionCaller(skillset)
         self._worker = threading.Thread(target=self._work, name=f"report_{skillset}", daemon=True)
@@ -43,6 +48,19 @@ class ResourceReporter:
         with self._changed:
             if self._ledger.want(resource, state, reason, insist=insist):
                 self._changed.notify()
+
+    def when_settled(self, job: Callable[[], None]) -> None:
+        """Do a job once the skillset knows of all states reported so far: at once if it does, else in the reporter's thread.
+
+        It knows what it shows, has accepted or has refused. A job waits for 10 s (wall clock) at most, and not at all where nothing shows
+        the skillset's states. Jobs are done in the order given.
+        """
+        with self._changed:
+            if self._when_settled or not self._settled():
+                self._when_settled.append(job)
+                self._changed.notify()
+                return
+        job()
 
     def close(self) -> None:
         """End the worker and drop the connections."""
@@ -65,11 +83,29 @@ class ResourceReporter:
     def _work(self) -> None:
         while (call := self._next_call()) is not None:
             self._make(call)
+        self._do_settled()
+
+    def _settled(self) -> bool:
+        if self._ledger.settled or not self._subscriber.get_num_connections():
+            self._unsettled_since_s = None
+            return True
+        now_s = time.monotonic()
+        if self._unsettled_since_s is None:
+            self._unsettled_since_s = now_s
+        return now_s - self._unsettled_since_s >= SETTLE_LIMIT_S
+
+    def _do_settled(self) -> None:
+        """Do what has waited, in the reporter's thread and under its lock: what comes meanwhile comes after it."""
+        for job in self._when_settled:
+            job()
+        self._when_settled.clear()
 
     def _next_call(self) -> Call | None:
         """Wait for the next transition to ask for; None at the end."""
         with self._changed:
             while not self._ended and not rospy.is_shutdown():
+                if self._when_settled and self._settled():
+                    self._do_settled()
                 now_s = time.monotonic()
                 call = self._ledger.next_call(now_s)
                 if call is not None:
@@ -86,7 +122,7 @@ class ResourceReporter:
             answer = self._caller.call(call)
         except CallFailedError as error:
             tell_call(service, request, None, begin_s, str(error))
-            self._note_refusal(call, str(error))
+            self._note_refusal(call, str(error), answered=False)
             return
         tell_call(service, request, answer, begin_s)
         if answer.accepted or answer.state == call.to:  # refused there: it had that state already
@@ -95,8 +131,8 @@ class ResourceReporter:
             return
         self._note_refusal(call, answer.reason)
 
-    def _note_refusal(self, call: Call, reason: str) -> None:
+    def _note_refusal(self, call: Call, reason: str, *, answered: bool = True) -> None:
         with self._changed:
-            first = self._ledger.refused(call, reason, time.monotonic())
+            first = self._ledger.refused(call, reason, time.monotonic(), answered=answered)
         if first and not rospy.is_shutdown():
             rospy.logwarn("%s.%s -> %s: %s; will be tried again", self._skillset, call.resource, call.to, reason)

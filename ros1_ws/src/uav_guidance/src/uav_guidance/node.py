@@ -32,8 +32,8 @@ from uav_msgs.srv import (
 from uav_msgs.srv import TakeoffRequest as TakeoffCall
 
 from perception_core.host import Input
-from perception_core.ros import DoneReporter, RawSubscriber, TunableSettings, read_settings, warn_of_garbage
-from resource_reporter import ResourceReporter, ToldService
+from perception_core.ros import RawSubscriber, TunableSettings, read_settings, warn_of_garbage
+from resource_reporter import DoneReporter, ResourceReporter, ToldService
 from uav_guidance import requests
 from uav_guidance.encoding import command_message, heartbeat_message, interval_message, setpoint_message
 from uav_guidance.follower import Setpoint
@@ -82,7 +82,6 @@ class GuidanceNode:
         self._state = rospy.Publisher("~state", GuidanceState, queue_size=5)
         self._pose = rospy.Publisher("~pose", PoseStamped, queue_size=10)
         self._tf = rospy.Publisher("/tf", TFMessage, queue_size=10)
-        self._done = DoneReporter()
         self._stepped_ns = self._done_ns = 0
         self._link = Link(
             settings.url,
@@ -97,6 +96,7 @@ class GuidanceNode:
         RawSubscriber(Input("/tf", TFMessage, self._on_transforms, warn_of_garbage, BUFFER_BYTES, queue_size=TRANSFORMS_WAITING))
         self._offer_services()
         self._tuning = TunableSettings(settings, self._tune)
+        self._done = DoneReporter(self._reporter)
 
     def run(self) -> None:
         """Step at 20 Hz of the mission clock until the node is shut down; a clock that starts late is waited for."""

@@ -3,7 +3,7 @@
 A topic is held against the simulated clock, or, written ``TOPIC=SENSOR``, against the last measurement that the sensor published: a
 node that works on images has done its share when the last image is dealt with, and need not say anything while there are none. It has
 nearly the sensor's period for that, as on a machine that is fast enough: so its verdicts come as regularly as the measurements.
-``TOPIC=0.06`` sets the seconds by which a topic may lag behind the clock.
+``TOPIC=0.06`` sets the seconds by which a topic may lag behind the clock; ``TOPIC=inf`` is waited for only until it has a publisher.
 """
 
 from __future__ import annotations
@@ -33,17 +33,17 @@ class Pacer:
         self._limit_s, self._timeout_s = limit_s, timeout_s
         words = [word.partition("=") for word in topics]
         said = {topic: against for topic, _, against in words if against}
-        self._limits_s = {topic: float(against) for topic, against in said.items() if against[0].isdigit()}
+        self._limits_s = {topic: float(against) for topic, against in said.items() if against[0].isdigit() or against == "inf"}
         self._sensor_of = {topic: against for topic, against in said.items() if topic not in self._limits_s}
-        self._clocked = [topic for topic, _, _ in words if topic not in self._sensor_of]
+        self._topics = [topic for topic, _, _ in words]
         self._measured: dict[str, deque[tuple[float, float]]] = {}  # of each sensor: stamps, and when they were published
         self._listeners: dict[str, _Listener] = {}
         self._lock = threading.Lock()
 
     def begin(self, now_s: float) -> None:
-        """Note that simulated time begins: what is held against the clock may not lag behind it from now on, heard or not."""
+        """Note that simulated time begins: no topic may lag behind the clock, or its sensor, from now on, heard or not."""
         with self._lock:
-            for topic in self._clocked:
+            for topic in self._topics:
                 self._listeners.setdefault(topic, _Listener(now_s))
 
     def measured(self, sensor: str, stamp_s: float, now_s: float) -> None:

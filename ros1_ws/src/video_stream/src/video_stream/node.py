@@ -69,7 +69,11 @@ class VideoStreamNode:
         self._waiting = False
         self._failure = ""
         self._loop: MissionLoop[Image | Picture] = MissionLoop(
-            [settings.report_port], on_tick=self._on_tick, on_datagram=self._on_report, on_item=self._on_item
+            [settings.report_port],
+            on_tick=self._on_tick,
+            on_datagram=self._on_report,
+            on_item=self._on_item,
+            reporters=[self._reporter],
         )
         self._service = ToldService("~stream", Stream, self._on_stream)
         if self._camera is None:

@@ -9,11 +9,10 @@ from typing import TYPE_CHECKING, Any
 
 import rospy
 
-from perception_core.ros.done import DoneReporter
 from perception_core.ros.subscription import RawSubscriber
 from perception_core.ros.switch import EnableSwitch
 from perception_core.ros.worker import NewestWorker
-from resource_reporter import ResourceReporter
+from resource_reporter import DoneReporter, ResourceReporter
 
 if TYPE_CHECKING:
     from collections.abc import Sequence
@@ -32,8 +31,8 @@ class RosHost:
     def __init__(self, skillset: str, outputs: Sequence[Output]) -> None:
         self._publishers = {each.topic: _publisher(each) for each in outputs}
         self._subscribers: dict[str, RawSubscriber] = {}
-        self._done = DoneReporter()
         self._reporter = ResourceReporter(skillset)
+        self._done: DoneReporter | None = None
         self._worker = NewestWorker[Callable[[], None]](lambda work: work())
         self._lock = Lock()
         self._warned_s: dict[str, float] = {}
@@ -45,6 +44,7 @@ class RosHost:
             self._subscribers[each.topic] = RawSubscriber(each)
         # reset: a clock that jumps back (a bag played again) must not end the timer's thread.
         self._timers = [rospy.Timer(rospy.Duration.from_sec(period_s), _job(work), reset=True) for period_s, work in core.timers]
+        self._done = DoneReporter(self._reporter)
 
     def now_ns(self) -> int:
         """Return the ROS clock."""
@@ -64,7 +64,8 @@ class RosHost:
 
     def done(self, stamp_ns: int) -> None:
         """Publish the stamp on ``~done``."""
-        self._done.done(stamp_ns)
+        if self._done is not None:  # nobody has heard of this node yet
+            self._done.done(stamp_ns)
 
     def report(self, resource: str, state: str, reason: str, *, insist: bool = True) -> None:
         """Report to the skillset."""
