@@ -18,7 +18,7 @@ from collections.abc import Callable, Sequence
 from pathlib import Path
 
 from alula.common.network import free_port
-from alula.common.runs import LATEST, live_runs
+from alula.common.runs import LATEST, Run, live_runs
 from alula.console.admission import Admission, is_loopback
 from alula.console.certificates import fingerprint, own_certificate, server_context
 from alula.console.link import ActError, Link, Mission, Skillsets
@@ -128,13 +128,13 @@ class LateLink:
     def __init__(self, make: Callable[[], Link]) -> None:
         self._make = functools.cache(make)
 
-    def connect(self, domain: int) -> Mission:
-        """Return the mission in a domain."""
-        return self._make().connect(domain)
+    def connect(self, run: Run) -> Mission:
+        """Return the mission of a run."""
+        return self._make().connect(run)
 
-    def listen(self, domain: int) -> Skillsets:
-        """Return the skillsets in a domain."""
-        return self._make().listen(domain)
+    def listen(self, run: Run) -> Skillsets:
+        """Return the skillsets of a run."""
+        return self._make().listen(run)
 
 
 def no_link() -> Link:

@@ -37,7 +37,7 @@ class Commands:
     def __init__(self, link: Link, options: Callable[[], Sequence[RunOption]]) -> None:
         self._options = options
         self._missions: PerRun[Mission] = PerRun(link.connect)
-        self._controls: PerRun[ManualControl] = PerRun(lambda domain: ManualControl(link.listen(domain)))
+        self._controls: PerRun[ManualControl] = PerRun(lambda run: ManualControl(link.listen(run)))
         self._acts: Mapping[str, Callable[[Asked, Path | None], Done]] = {
             "start": self._start,
             "abort": lambda asked, run: self._told("abort", asked, run, lambda mission: mission.abort()),

@@ -15,6 +15,7 @@ from typing import Any
 from websockets.asyncio.client import ClientConnection, connect
 
 from alula.common.network import free_port
+from alula.common.runs import Run
 from alula.console.admission import Admission
 from alula.console.link import ActError, Link, Skillsets
 from alula.console.server import FEED, Console
@@ -37,12 +38,12 @@ class Robot:
         self.domains: list[int] = []
         self.closed = 0
 
-    def connect(self, domain: int) -> Robot:
-        self.domains.append(domain)
+    def connect(self, run: Run) -> Robot:
+        self.domains.append(run.domain)
         return self
 
-    def listen(self, domain: int) -> Skillsets:
-        raise ActError(f"nothing is heard in domain {domain}")
+    def listen(self, run: Run) -> Skillsets:
+        raise ActError(f"nothing is heard in domain {run.domain}")
 
     def close(self) -> None:
         self.closed += 1

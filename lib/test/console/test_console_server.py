@@ -21,6 +21,7 @@ from websockets.asyncio.client import ClientConnection, connect
 from websockets.exceptions import ConnectionClosed, InvalidStatus
 
 from alula.common.record import EVENTS, MISSION, OPERATOR
+from alula.common.runs import Run
 from alula.console import acts, commands, server
 from alula.console.__main__ import main
 from alula.console.acts import ActError, WantedRun, read_wanted
@@ -180,7 +181,7 @@ def test_a_robot_that_can_not_be_reached_is_told_and_nothing_else_is_held_up(
     monkeypatch.setattr(commands, "is_live", lambda _run: True)
 
     class Nowhere(Robot):
-        def connect(self, domain: int) -> Robot:
+        def connect(self, run: Run) -> Robot:
             raise ActError("there is no ROS 2 here")
 
     async def play(bench: Bench) -> None:

@@ -185,7 +185,7 @@ class Watcher:
     """All skillsets that are asked for, and those that come later; ``close`` ends it."""
 
     def __init__(self, *, domain: int | None, namespace: str = "", names: Sequence[str] = ()) -> None:
-        self._session = Session("skill_panel", domain=domain)
+        self._session = Session("skill_panel", domain=domain, namespace=namespace)
         self.node = self._session.node
         self.domain: int = self.node.context.get_domain_id()
         self._namespace = namespace

@@ -203,7 +203,9 @@ def test_the_list_says_what_runs(skillset, ros2_domain, tmp_path):
     assert said.startswith(f"in DDS domain {ros2_domain}: /panel_test/navigation\n")
 
 
-def test_the_mission_clock_is_followed_also_when_it_is_heard_late(skillset, watcher):
+@pytest.mark.parametrize("topic", ["/clock", "/panel_test/clock"])
+def test_the_mission_clock_is_followed_also_when_it_is_heard_late(skillset, watcher, topic):
+    """It is that of the robot's namespace, or one that robots share."""
     from rosgraph_msgs.msg import Clock
 
     from skillset_ros2.session import Session
@@ -212,7 +214,7 @@ def test_the_mission_clock_is_followed_also_when_it_is_heard_late(skillset, watc
     assert watcher.now_ns > 1_000_000_000_000_000_000, "no clock was published yet"
     session = Session("clock_test", domain=watcher.domain)
     try:
-        clock = session.node.create_publisher(Clock, "/clock", 10)
+        clock = session.node.create_publisher(Clock, topic, 10)
         message = Clock()
         message.clock.sec = 42
 
