@@ -18,6 +18,7 @@ from collections.abc import Callable, Sequence
 from pathlib import Path
 
 from alula.common.network import free_port
+from alula.common.robots import RobotError, RobotFolder, load_robot_folder
 from alula.common.runs import LATEST, Run, live_runs
 from alula.console.admission import Admission, is_loopback
 from alula.console.certificates import fingerprint, own_certificate, server_context
@@ -39,6 +40,9 @@ def parse(arguments: Sequence[str] | None) -> argparse.Namespace:
     which = parser.add_mutually_exclusive_group()
     which.add_argument("--run", metavar="DIR|latest", default=LATEST, help="show this run's folder first (default: the newest)")
     which.add_argument("--domain", type=int, metavar="N", help="show the run under way in this DDS domain first")
+    parser.add_argument(
+        "--beside", type=Path, action="append", default=[], metavar="DIR", help="show the runs of the robot in this folder, too; repeatable"
+    )
     parser.add_argument(
         "--host",
         default="127.0.0.1",
@@ -93,6 +97,20 @@ def first_run(options: argparse.Namespace) -> Path | None:
     if not (folder / "run.json").is_file():
         raise ValueError(f"--run {options.run}: is no run's folder, it has no run.json")
     return folder
+
+
+def robots_beside(options: argparse.Namespace) -> list[RobotFolder]:
+    """Return the robots whose runs are shown beside those of the robot that the console is about.
+
+    Raises:
+        RobotError: a folder holds no robot.
+        ValueError: two could not be told apart.
+    """
+    robots = [load_robot_folder(folder.expanduser().resolve()) for folder in options.beside]
+    names = [robot.name for robot in robots]
+    if len(set(names)) < len(names):
+        raise ValueError(f"--beside: robots are told apart by their names, and these are {', '.join(names)}")
+    return robots
 
 
 def port_of(options: argparse.Namespace) -> int:
@@ -150,8 +168,9 @@ def main(arguments: Sequence[str] | None = None, make_link: Callable[[], Link] =
         token = "" if is_loopback(options.host) else secrets.token_urlsafe(24)
         tls, known_by = tls_of(options)
         admission = Admission(options.host, port_of(options), token, tls)
-        asyncio.run(serve_until_told(Console(admission, LateLink(make_link), fixed=fixed, ask_options=ask_options), admission, known_by))
-    except (ValueError, OSError) as error:
+        console = Console(admission, LateLink(make_link), fixed=fixed, beside=robots_beside(options), ask_options=ask_options)
+        asyncio.run(serve_until_told(console, admission, known_by))
+    except (ValueError, OSError, RobotError) as error:
         sys.stderr.write(f"alula console: {error}\n")
         return 2
     return 0
