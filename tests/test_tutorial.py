@@ -1,6 +1,6 @@
 """The tutorial, done as it says, command by command, and a skill more by hand; Alula's folder can't be written to all the while.
 
-Its live run is made while the drone flies.
+Its live run is made while the drone flies, in the same DDS domain: each has a namespace.
 """
 
 from __future__ import annotations
@@ -68,7 +68,7 @@ def passed(output: str) -> int:
 @pytest.fixture
 def drone(tmp_path: Path) -> Iterator[Flight]:
     """A flight of the checkout's robot, which is in the air."""
-    flight = start_flight(tmp_path / "flight", "--rate", "0")
+    flight = start_flight(tmp_path / "flight", "--rate", "0", "--namespace", "drone")
     try:
         flight.wait_in_air()
         yield flight
@@ -95,7 +95,8 @@ def test_the_tutorial_works(tmp_path, request):
     assert untouched >= 8
     assert "mission accomplished" in home.run(run)
     assert len(list(home.robot.glob("runs/*-patrol*/report.html"))) == 1
-    drone = request.getfixturevalue("drone")  # two robots at once, each in a graph of its own
+    drone = request.getfixturevalue("drone")
+    live += f" --namespace rover --domain {drone.domain}"
     assert "mission accomplished in degraded mode: rover.drive: RESOURCE_INVARIANT_VIOLATED way_stays_clear" in home.run(live)
     land(drone)
     flown = max(home.robot.glob("runs/*-patrol*"), key=lambda run: (run / "report.html").stat().st_mtime)
@@ -104,6 +105,8 @@ def test_the_tutorial_works(tmp_path, request):
     assert [(one["skill"], one["result"]) for one in summary["skills"]] == [("drive", "way_stays_clear"), ("back_off", "CLEAR_OF_IT")]
     assert summary["bridge"]["/rover/odom"]["count"] > 0
     assert (flown / "functional.bag").is_file()
+    assert json.loads((flown / "run.json").read_text(encoding="utf-8"))["namespace"] == "/rover"
+    assert "not in /rover" not in "".join(log.read_text(encoding="utf-8") for log in (flown / "logs").rglob("*.log"))
     home.run(f"{ALULA_ROOT}/setup/in_ros2 ruff check {home.robot}")
 
     home.insert(MODEL, "  // `alula check` proves this.\n", BLOCKS["skill"] + "\n")

@@ -11,7 +11,7 @@ from typing import Any
 
 from alula.commands.run_options import check_seed, groot_address, run_folder, run_parser, world_file
 from alula.common.faults import FaultError, parse_fault
-from alula.common.network import free_port
+from alula.common.network import DOMAINS, NAMESPACE, DomainClaim, free_port
 from alula.common.scenarios import Scenario, ScenarioError, load_scenario
 from alula.live import options
 from alula.live.part import RunPart
@@ -36,6 +36,10 @@ def parse(arguments: Sequence[str], part: RunPart) -> RunSpec:
     """Turn the command line into a specification; raise RequestError, or exit 2 as argparse does."""
     parser = run_parser("Run a scenario of the robot, in a ROS graph of its own.")
     parser.add_argument("--console", action="store_true", help="serve the operator's page beside the run")
+    parser.add_argument("--domain", type=int, metavar="N", help="run in this DDS domain (default: a free one)")
+    parser.add_argument(
+        "--namespace", default="", metavar="NAME", help="put its ROS 2 names below this one: runs with one may share a domain"
+    )
     parser.add_argument("--behaviour", action="append", default=[], metavar="FILE", help="with --mock: behaviour file of the mocks")
     parser.add_argument(options.FLAG, action=TellOptions, part=part, help="print the robot's own options as JSON, and run nothing")
     part.add_options(parser)
@@ -54,6 +58,8 @@ def parse(arguments: Sequence[str], part: RunPart) -> RunSpec:
         faults=read_faults(given.fail, {**part.faults, **dict(scenario.faults)}),
         world=world,
         master_port=free_port(),
+        domain=read_domain(given.domain),
+        namespace=read_namespace(given.namespace),
         console=given.console,
         monitor=given.monitor,
         groot=groot_address(given.groot),
@@ -61,10 +67,25 @@ def parse(arguments: Sequence[str], part: RunPart) -> RunSpec:
     )
 
 
-def with_domain(request: RunSpec, domain: int, part: RunPart) -> RunSpec:
-    """Return the run with its domain, and what only a run of that takes; raises RequestError, NoFreePortError."""
-    run = replace(request, domain=domain)
+def with_claim(request: RunSpec, claim: DomainClaim, part: RunPart) -> RunSpec:
+    """Return the run with its domain, and what only a run with its seat takes; raises RequestError, NoFreePortError."""
+    run = replace(request, domain=claim.domain, seat=claim.seat)
     return replace(run, own=part.claim(run))
+
+
+def read_domain(number: int | None) -> int:
+    """Return the domain that is asked for, 0 where none is; raises RequestError."""
+    if number is not None and number not in DOMAINS:
+        raise RequestError(f"--domain {number}: a run has a DDS domain from {DOMAINS[0]} to {DOMAINS[-1]}")
+    return number or 0
+
+
+def read_namespace(name: str) -> str:
+    """Return a namespace with its slash, empty where none is asked for; raises RequestError."""
+    namespace = f"/{name.strip('/')}" if name else ""
+    if namespace and not NAMESPACE.fullmatch(namespace):
+        raise RequestError(f"--namespace {name}: write a name such as rover, of letters, digits and _, beginning with a letter")
+    return namespace
 
 
 def read_scenario(name: str) -> Scenario:

@@ -20,8 +20,8 @@ from pathlib import Path
 import psutil
 
 from alula.commands.run_options import shown_at
-from alula.common.network import DomainClaim, NoFreeDomainError, NoFreePortError, claim_domain
-from alula.common.processes import RUN_ID_VARIABLE, end_run, node_name, processes_of_run
+from alula.common.network import DOMAINS, DomainClaim, NoFreeDomainError, NoFreePortError, claim_domain
+from alula.common.processes import NAMESPACE_VARIABLE, RUN_ID_VARIABLE, end_run, node_name, processes_of_run
 from alula.common.robots import RobotError
 from alula.common.scenarios import ScenarioError, load_scenario
 from alula.common.shared_memory import sweep_shared_memory
@@ -33,7 +33,7 @@ from alula.records.models import models_of
 from alula.report.deaths import Death, describe_exit, note_death
 from alula.report.ends import FRONT, ReportedEnd, ended_by_signal, note_end
 from alula.report.live import LiveEvents
-from alula_flight.command_line import parse, with_domain
+from alula_flight.command_line import parse, with_claim
 from alula_flight.console_page import console_page
 from alula_flight.outcome import CANNOT_START, GIVEN_UP, finish
 
@@ -60,6 +60,7 @@ def start_supervisor(spec: RunSpec, spec_path: Path, claim: DomainClaim) -> subp
         "ROS_HOME": str(out / "logs"),
         "ROS_LOG_DIR": str(out / "logs"),
         "ROS_DOMAIN_ID": str(spec.domain),
+        NAMESPACE_VARIABLE: spec.namespace,
     }
     with (out / "logs" / "supervisor.log").open("wb") as log:
         return subprocess.Popen(
@@ -69,7 +70,7 @@ def start_supervisor(spec: RunSpec, spec_path: Path, claim: DomainClaim) -> subp
             stdout=log,
             stderr=subprocess.STDOUT,
             start_new_session=True,
-            pass_fds=(claim.lock.fileno(),),
+            pass_fds=[lock.fileno() for lock in claim.locks],
             preexec_fn=_die_with_parent,  # noqa: PLW1509  (one prctl, no allocation)
         )
 
@@ -132,8 +133,8 @@ def main(arguments: list[str]) -> int:
     try:
         part = part_of_robot()
         request = parse(arguments, part)
-        claim = claim_domain()
-        spec = with_domain(request, claim.domain, part)
+        claim = claim_domain([request.domain] if request.domain else DOMAINS, request.namespace)
+        spec = with_claim(request, claim, part)
     except (RequestError, RobotError, ScenarioError, NoFreeDomainError, NoFreePortError) as error:
         sys.stderr.write(f"alula run: {error}\n")
         return CANNOT_START
@@ -168,7 +169,8 @@ def announce(spec: RunSpec) -> Callable[[str], None]:
         sys.stderr.flush()
 
     failing = f", failing {', '.join(spec.faults)}" if spec.faults else ""
-    say(f"running '{spec.scenario}', seed {spec.seed}{failing}; results in {spec.out_dir}")
+    place = f", in {spec.namespace} of DDS domain {spec.domain}" if spec.namespace else ""
+    say(f"running '{spec.scenario}', seed {spec.seed}{failing}{place}; results in {spec.out_dir}")
     return say
 
 

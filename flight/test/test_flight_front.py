@@ -13,7 +13,7 @@ from dataclasses import asdict
 import psutil
 import pytest
 
-from alula.common.network import NoFreeDomainError, claim_domain, free_port
+from alula.common.network import DomainClaim, NoFreeDomainError, claim_domain, free_port, is_claimed
 from alula.common.processes import RUN_ID_VARIABLE, end_run, processes_of_run
 from alula.common.record import EVENTS, RecordWriter
 from alula.common.record import FILE as RECORD
@@ -26,7 +26,7 @@ from alula.report.live import LiveEvents, event_line
 from alula.report.run_log import FILE
 from alula.report.verdict import conformance_lines
 from alula.runtime.core.events import ExecutionEvent, TransitionEvent
-from alula_flight.command_line import parse
+from alula_flight.command_line import parse, with_claim
 from alula_flight.console_page import console_page
 from alula_flight.outcome import CANNOT_START
 from alula_flight.run import main, monitor_of
@@ -102,12 +102,50 @@ def test_parallel_runs_get_different_domains_and_give_them_back():
 
 def test_a_domain_stays_claimed_as_long_as_any_process_has_the_claim():
     claim = claim_domain()
-    heir = subprocess.Popen([sys.executable, "-c", "input()"], stdin=subprocess.PIPE, pass_fds=(claim.lock.fileno(),))
+    heir = subprocess.Popen([sys.executable, "-c", "input()"], stdin=subprocess.PIPE, pass_fds=[lock.fileno() for lock in claim.locks])
     claim.release()
     with pytest.raises(NoFreeDomainError):
         claim_domain([claim.domain])
     heir.communicate(b"\n")
     claim_domain([claim.domain]).release()
+
+
+def test_runs_in_namespaces_share_a_domain_that_is_named_and_no_other_run_gets_it():
+    rover = claim_domain(namespace="/rover")
+    drone = claim_domain([rover.domain], "/drone")
+    assert drone.domain == rover.domain
+    assert drone.seat != rover.seat, "what follows from it, as ports, is apart"
+    with pytest.raises(NoFreeDomainError, match=f"DDS domain {rover.domain} is in use by a run without a namespace, or in /rover; end it"):
+        claim_domain([rover.domain], "/rover")
+    with pytest.raises(NoFreeDomainError, match="is in use by other runs; end it, or give each run a namespace of its own"):
+        claim_domain([rover.domain])
+    alone = claim_domain()
+    assert alone.domain not in {rover.domain, rover.seat, drone.seat}
+    with pytest.raises(NoFreeDomainError):
+        claim_domain([alone.domain], "/rover")
+    other = claim_domain(namespace="/other")
+    assert other.domain != rover.domain, "a domain is shared by those only that ask for it"
+    rover.release()
+    assert is_claimed(rover.domain), "the drone is still there"
+    claim_domain([drone.domain], "/rover").release()
+    for one in (drone, alone, other):
+        one.release()
+    claim_domain([drone.domain]).release()
+
+
+def test_domain_and_namespace_are_part_of_the_request(tmp_path):
+    words = ["mapping", "--out", str(tmp_path / "run")]
+    request = parse([*words, "--domain", "7", "--namespace", "fleet/rover/"], RunPart())
+    assert (request.domain, request.namespace) == (7, "/fleet/rover")
+    run = with_claim(request, DomainClaim(7, 8, ()), RunPart())
+    run.save(tmp_path / "run.json")
+    assert RunSpec.load(tmp_path / "run.json") == run
+    plain = parse(words, RunPart())
+    assert (plain.domain, plain.namespace) == (0, "")
+    with pytest.raises(RequestError, match="--domain 233: a run has a DDS domain from 1 to 101"):
+        parse([*words, "--domain", "233"], RunPart())
+    with pytest.raises(RequestError, match="--namespace ro-ver: write a name such as rover"):
+        parse([*words, "--namespace", "ro-ver"], RunPart())
 
 
 def test_free_port_can_be_bound():

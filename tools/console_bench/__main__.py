@@ -1,4 +1,4 @@
-"""`python -m console_bench FOLDER`: a real mission's process, ticked as any other; its record goes to the folder."""
+"""`python -m console_bench FOLDER [--ros-args ...]`: a real mission's process, ticked as any other; its record goes to the folder."""
 
 from __future__ import annotations
 
@@ -21,7 +21,7 @@ def main(folder: Path) -> int:
     """Run a mission whose only leaf runs for ever."""
     path = folder / "bench.xml"
     path.write_text(ENDLESS, encoding="utf-8")
-    return run_mission(plan_of_file(path, "bench", (), {}, NO_PART), folder, [sys.argv[0]])
+    return run_mission(plan_of_file(path, "bench", (), {}, NO_PART), folder, [sys.argv[0], *sys.argv[2:]])
 
 
 if __name__ == "__main__":

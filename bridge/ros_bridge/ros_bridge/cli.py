@@ -10,8 +10,9 @@ import sys
 from collections.abc import Sequence
 from pathlib import Path
 
+from alula.common.ros_arguments import split_arguments
 from alula.common.signals import StopEvent
-from ros_bridge import discovery_options
+from ros_bridge import config_values, discovery_options
 from ros_bridge.config_file import load_config
 from ros_bridge.errors import BridgeError, ConfigError, NoMasterError
 from ros_bridge.master import Connection
@@ -25,7 +26,7 @@ LOOPBACK = ("http://127.0.0.1", "http://localhost")
 
 
 def parse_arguments(arguments: Sequence[str]) -> argparse.Namespace:
-    """Read the command line without what roslaunch adds: ``own_name`` reads ``__name:=`` and ``__ns:=``, the rest has no effect."""
+    """Read the options without what roslaunch adds: ``own_name`` reads ``__name:=`` and ``__ns:=``, the rest has no effect."""
     parser = argparse.ArgumentParser(prog="ros_bridge", description="Bridges topics and services between ROS 1 and ROS 2.")
     parser.add_argument("--config", type=Path, action="append", default=[], help="configuration (YAML); several files are merged")
     discovery_options.add_arguments(parser)
@@ -38,6 +39,15 @@ def parse_arguments(arguments: Sequence[str]) -> argparse.Namespace:
         parser.error("nothing to bridge: give --config FILE, or --all, or --include PATTERN")
     options.all = options.all or (options.list and not options.config and not options.include)
     return options
+
+
+def ros2_namespace(arguments: Sequence[str]) -> str:
+    """Return the namespace of the ROS 2 node, empty for the root; raises ConfigError."""
+    told = [argument.removeprefix("__ns:=") for argument in arguments if argument.startswith("__ns:=")]
+    try:
+        return str(config_values.name(told[-1])) if told and told[-1] != "/" else ""
+    except ValueError as expected:
+        raise ConfigError(f"__ns:={told[-1]} is not {expected}") from None
 
 
 def set_up_logging() -> None:
@@ -66,12 +76,13 @@ def connect_master() -> Connection:
 def main(arguments: list[str]) -> int:
     """Run the bridge until SIGINT or SIGTERM; return 0, 1 when a type or the data plane is missing, 2 for bad options or no master."""
     set_up_logging()
+    arguments, ros2_arguments = split_arguments(arguments)
     options = parse_arguments(arguments)
     stop = StopEvent()
     for number in (signal.SIGINT, signal.SIGTERM):
         signal.signal(number, lambda *_: stop.set())
     try:
-        config = load_config(options.config, discovery_options.read_arguments(options))
+        config = load_config(options.config, discovery_options.read_arguments(options), ros2_namespace(ros2_arguments))
     except BridgeError as error:
         logger.error("%s", error)
         return EXIT_CONFIG
@@ -82,7 +93,7 @@ def main(arguments: list[str]) -> int:
         if options.list:
             sys.stdout.write(list_session(config, master, name))
         else:
-            run_session(config, options.stats, stop, master, name, wait=bool(options.config))
+            run_session(config, options.stats, stop, master, name, ros2_arguments, wait=bool(options.config))
     except (NoMasterError, ConfigError) as error:
         logger.error("%s", error)
         return EXIT_CONFIG

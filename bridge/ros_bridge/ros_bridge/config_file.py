@@ -12,7 +12,7 @@ from alula.common.located_yaml import Located, read_yaml
 from ros_bridge import config_values
 from ros_bridge.config import ActionRoute, BridgeConfig, Direction, Reliability, RosVersion, ServiceRoute, TopicRoute
 from ros_bridge.config_values import Reader
-from ros_bridge.discovery_options import READERS, make_selection, merge_selections
+from ros_bridge.discovery_options import READERS, below, make_selection, merge_selections
 from ros_bridge.errors import ConfigError
 from ros_bridge.mapping import TypeRule, TypeRules
 from ros_bridge.selection import Selection
@@ -45,18 +45,20 @@ RULE_KEYS: Mapping[str, Reader] = {
 SECTIONS = ("topics", "services", "actions", "discover", "types")
 
 
-def load_config(paths: Iterable[Path], selection: Selection | None = None) -> BridgeConfig:
+def load_config(paths: Iterable[Path], selection: Selection | None = None, namespace: str = "") -> BridgeConfig:
     """Read one or several files as one configuration; ``selection`` (the command line's) is added to theirs.
+
+    ROS 1's names lie below ``namespace`` in ROS 2, where nothing else is said of a name.
 
     Raises:
         ConfigError: A file can't be read, a key or value is wrong, or routes meet each other.
     """
-    configs = [read_config(path) for path in paths]
+    configs = [read_config(path, namespace) for path in paths]
     merged = BridgeConfig(
         tuple(route for config in configs for route in config.topics),
         tuple(route for config in configs for route in config.services),
         tuple(route for config in configs for route in config.actions),
-        merge_selections([*(config.selection for config in configs), *([selection] if selection is not None else [])]),
+        below(namespace, merge_selections([*(config.selection for config in configs), *([selection] if selection is not None else [])])),
         merge_rules(config.rules for config in configs),
     )
     _require_apart(merged)
@@ -70,14 +72,14 @@ def merge_rules(rules: Iterable[TypeRules]) -> TypeRules:
     return TypeRules(packages, [rule for one in rules for rule in one.own])
 
 
-def read_config(path: Path) -> BridgeConfig:
-    """Read one file; raises ConfigError."""
+def read_config(path: Path, namespace: str = "") -> BridgeConfig:
+    """Read one file, for a bridge in a namespace of ROS 2; raises ConfigError."""
     root = read_yaml(path, ConfigError)
     sections = root.record("the configuration", SECTIONS) if root is not None else {}
     return BridgeConfig(
-        tuple(_route(TopicRoute, item, TOPIC_KEYS, "direction") for item in _items(sections, "topics")),
-        tuple(_route(ServiceRoute, item, SERVICE_KEYS, "server") for item in _items(sections, "services")),
-        tuple(_route(ActionRoute, item, SERVICE_KEYS, "server") for item in _items(sections, "actions")),
+        tuple(_route(TopicRoute, item, TOPIC_KEYS, "direction", namespace) for item in _items(sections, "topics")),
+        tuple(_route(ServiceRoute, item, SERVICE_KEYS, "server", namespace) for item in _items(sections, "services")),
+        tuple(_route(ActionRoute, item, SERVICE_KEYS, "server", namespace) for item in _items(sections, "actions")),
         make_selection(_entry(sections["discover"], "'discover'", READERS)) if "discover" in sections else Selection(),
         _rules(sections["types"]) if "types" in sections else TypeRules(),
     )
@@ -120,7 +122,7 @@ def _value(part: Located, key: str, reader: Reader) -> Any:
         raise part.wrong(f"{key}: {value!r} is not {expected}") from None
 
 
-def _route(kind: type[Route], item: Located, readers: Mapping[str, Reader], way: str) -> Route:
+def _route(kind: type[Route], item: Located, readers: Mapping[str, Reader], way: str, namespace: str) -> Route:
     values = _entry(item, "a route", readers)
     name = values.pop("name", None)
     if name is None and not {"ros1_name", "ros2_name"} <= values.keys():
@@ -129,7 +131,7 @@ def _route(kind: type[Route], item: Located, readers: Mapping[str, Reader], way:
         if key not in values:
             raise item.wrong(f"'{key}' is missing for {name or values['ros1_name']}")
     values.setdefault("ros1_name", name)
-    values.setdefault("ros2_name", name)
+    values.setdefault("ros2_name", f"{namespace}{name}")
     values["type_name"] = values.pop("type")
     return kind(**values)
 

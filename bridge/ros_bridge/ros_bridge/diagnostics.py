@@ -22,7 +22,7 @@ if TYPE_CHECKING:
 
 logger = logging.getLogger("ros_bridge")
 
-TOPIC = "/diagnostics"
+TOPIC = "/diagnostics"  # in ROS 2 in the node's namespace
 TYPE = "diagnostic_msgs/DiagnosticArray"
 QUEUE = 10
 OK, WARN, ERROR = b"\x00", b"\x01", b"\x02"
@@ -37,7 +37,7 @@ class Diagnostics:
         self._array = interface_class(TYPE, "msg")
         self._status = interface_class("diagnostic_msgs/DiagnosticStatus", "msg")
         self._item = interface_class("diagnostic_msgs/KeyValue", "msg")
-        self._ros2 = context.node.create_publisher(self._array, TOPIC, QUEUE)
+        self._ros2 = context.node.create_publisher(self._array, TOPIC.lstrip("/"), QUEUE)
         self._ros1 = Ros1Publisher(context.plane, TOPIC, self._pair, depth=QUEUE)
         self._before: dict[Spec, tuple[int, int]] = {}
 

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import argparse
 from collections.abc import Iterable, Mapping
-from dataclasses import dataclass, field, fields
+from dataclasses import dataclass, field, fields, replace
 from typing import Any
 
 from ros_bridge import config_values
@@ -57,6 +57,11 @@ def merge_selections(selections: Iterable[Selection]) -> Selection:
             raise ConfigError(f"{option.name}: given as {' and as '.join(map(str, set_values))}; keep one")
         merged[option.name] = set_values[0] if set_values else option.default
     return Selection(**merged)
+
+
+def below(namespace: str, selection: Selection) -> Selection:
+    """Return a selection whose ROS 1 names lie in a namespace of ROS 2."""
+    return replace(selection, namespace2=f"{namespace}{selection.namespace2}")
 
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:

@@ -19,7 +19,7 @@ if TYPE_CHECKING:
 
 logger = logging.getLogger("ros_bridge")
 
-STATE_TOPIC = "/ros_bridge/state"
+STATE_TOPIC = "/ros_bridge/state"  # in ROS 2 in the node's namespace
 STATE_TYPE = "std_msgs/String"
 PERIOD_S = 0.2  # two beats may be late before the limit of 0.5 s
 LATCHED = QoSProfile(depth=1, durability=DurabilityPolicy.TRANSIENT_LOCAL)
@@ -32,7 +32,7 @@ class Heartbeat:
         """Open both ends; ``state`` is called for each beat."""
         self._state = state
         self._type = context.types.message(STATE_TYPE)
-        self._ros2 = context.node.create_publisher(String, STATE_TOPIC, LATCHED)
+        self._ros2 = context.node.create_publisher(String, STATE_TOPIC.lstrip("/"), LATCHED)
         self._ros1 = Ros1Publisher(context.plane, STATE_TOPIC, self._type, latched=True, depth=1)
         self._sequence = 0
         self._wake = threading.Event()

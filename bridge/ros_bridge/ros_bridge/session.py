@@ -28,8 +28,19 @@ SWITCH_INTERVAL_S = 0.0005  # a thread that converts a message must not keep oth
 END_WITHIN_S = 1.5
 
 
-def run_session(config: BridgeConfig, stats_file: Path | None, stop: threading.Event, master: Connection, name: str, *, wait: bool) -> None:
+def run_session(
+    config: BridgeConfig,
+    stats_file: Path | None,
+    stop: threading.Event,
+    master: Connection,
+    name: str,
+    ros2_arguments: list[str],
+    *,
+    wait: bool,
+) -> None:
     """Start both nodes, bridge until asked to stop (or shut down by either world), end both nodes.
+
+    ``name`` is that of the ROS 1 node, ``ros2_arguments`` are those of the ROS 2 node.
 
     Neither node takes time from ``/clock``: the bridge has to work before it ticks, and is what makes it tick in ROS 2.
 
@@ -42,7 +53,7 @@ def run_session(config: BridgeConfig, stats_file: Path | None, stop: threading.E
         require_master(master, name)
     if not wait_for_master(master, name, stop):
         return
-    rclpy.init(args=[], signal_handler_options=SignalHandlerOptions.NO)
+    rclpy.init(args=ros2_arguments, signal_handler_options=SignalHandlerOptions.NO)
     try:
         bridge = Bridge(config, types, master, name)
         bridge.run(stop, stats_file)

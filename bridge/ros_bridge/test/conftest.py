@@ -22,8 +22,8 @@ def master():
 
 @pytest.fixture(scope="module")
 def bridge(master, ros2_domain, tmp_path_factory, request):
-    """Run the bridge with the module's ``CONFIG``."""
-    process = BridgeProcess(master, tmp_path_factory.mktemp("bridge"), request.module.CONFIG)
+    """Run the bridge with the module's ``CONFIG``, and its ``ARGUMENTS`` where it has some."""
+    process = BridgeProcess(master, tmp_path_factory.mktemp("bridge"), request.module.CONFIG, *getattr(request.module, "ARGUMENTS", ()))
     process.wait_running()
     yield process
     ran = process.process.poll() is None

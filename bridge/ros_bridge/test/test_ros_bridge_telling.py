@@ -127,6 +127,7 @@ def test_options_that_ask_for_nothing_are_an_error():
     for arguments, words in (
         ([], "nothing to bridge: give --config FILE, or --all"),
         (["--all", "--namespace2", "x"], "'x' is not an absolute"),
+        (["--all", "--ros-args", "-r", "__ns:=rover"], "__ns:=rover is not an absolute ROS name such as"),
     ):
         run = subprocess.run(bridge_command(*arguments), capture_output=True, text=True, timeout=60, check=False)
         assert run.returncode == 2

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 import secrets
 import socket
 from collections.abc import Iterable
@@ -16,8 +17,11 @@ EPHEMERAL_PORT = 32_768
 PORTS = [port for port in range(20_000, 32_700) if (port - RTPS_PORT) % RTPS_PORTS_PER_DOMAIN]
 
 
+NAMESPACE = re.compile(r"(/[A-Za-z][A-Za-z0-9_]*)+")
+
+
 class NoFreeDomainError(Exception):
-    """All DDS domains are claimed by other runs on this machine."""
+    """The DDS domains that a run may have, or its namespace there, are claimed by other runs on this machine."""
 
 
 class NoFreePortError(Exception):
@@ -50,16 +54,16 @@ def udp_port_is_free(port: int, address: str = "127.0.0.1") -> bool:
     return True
 
 
-def udp_ports_of(domain: int, *, first: int, step: int, count: int = 1) -> int:
-    """Return the first of ``count`` UDP ports in a row on loopback that are free, and that only a run of this DDS domain takes.
+def udp_ports_of(seat: int, *, first: int, step: int, count: int = 1) -> int:
+    """Return the first of ``count`` UDP ports in a row on loopback that are free, and that only the run with this seat takes.
 
-    The candidates are ``first`` plus a multiple of ``step``, below the ports of outgoing connections. Who has claimed the domain can't
+    The candidates are ``first`` plus a multiple of ``step``, below the ports of outgoing connections. Who has claimed the seat can't
     meet another run there, however close their starts are; of other programs it is looked that they don't hold the ports.
 
     Raises:
         NoFreePortError: other programs hold one of each candidate.
     """
-    candidates = range(first + step * DOMAINS.index(domain), EPHEMERAL_PORT - count, step * len(DOMAINS))
+    candidates = range(first + step * DOMAINS.index(seat), EPHEMERAL_PORT - count, step * len(DOMAINS))
     for candidate in candidates:
         if all(udp_port_is_free(candidate + n) for n in range(count)):
             return candidate
@@ -68,37 +72,65 @@ def udp_ports_of(domain: int, *, first: int, step: int, count: int = 1) -> int:
 
 @dataclass(frozen=True)
 class DomainClaim:
-    """A DDS domain that no other run uses as long as the socket is open in any process (so also not after a crash)."""
+    """What a run has to itself as long as the sockets are open in any process (so also not after a crash).
+
+    Attributes:
+        domain: DDS domain of the run. Only runs that lie in namespaces, each in its own, share one.
+        seat: a number that no other run has, for what follows from it, as UDP ports.
+        locks: what holds both.
+    """
 
     domain: int
-    lock: socket.socket
+    seat: int
+    locks: tuple[socket.socket, ...]
 
     def release(self) -> None:
-        """Give the domain back, as far as this process is concerned."""
-        self.lock.close()
+        """Give all of it back, as far as this process is concerned."""
+        for lock in self.locks:
+            lock.close()
 
 
-def claim_domain(domains: Iterable[int] = DOMAINS) -> DomainClaim:
+def claim_domain(domains: Iterable[int] = DOMAINS, namespace: str = "") -> DomainClaim:
     """Claim the first free domain; the kernel gives it back when the last process that has the claim ends, however it ends.
 
-    The claim is the domain's first RTPS port, but of TCP, on loopback: it reaches exactly as far as the domain does, over all users
-    and containers that share the network.
+    With a namespace (absolute), a domain that is the only one to choose from is free, too, where all other runs have namespaces, and none
+    of them this one. The claims reach exactly as far as the domain does, over all users and containers that share the network; runs of
+    one user share a domain.
 
     Raises:
         NoFreeDomainError: all are taken.
     """
-    tried = 0
+    domains = tuple(domains)
     for domain in domains:
-        lock = socket.socket(socket.AF_INET, socket.SOCK_STREAM)
-        try:
-            lock.bind(("127.0.0.1", _claim_port(domain)))
-            lock.listen(1)
-        except OSError:
-            lock.close()
-            tried += 1
-        else:
-            return DomainClaim(domain, lock)
-    raise NoFreeDomainError(f"all {tried} DDS domains are in use by other runs on this machine; end some first")
+        locks = () if namespace and len(domains) > 1 and is_claimed(domain) else _lock(domain, namespace)
+        if locks and not namespace:
+            return DomainClaim(domain, domain, locks)
+        if locks:
+            own = claim_domain()
+            return DomainClaim(domain, own.seat, (*locks, *own.locks))
+    if len(domains) == 1:
+        who = f"in use by a run without a namespace, or in {namespace}" if namespace else "in use by other runs"
+        raise NoFreeDomainError(f"DDS domain {domains[0]} is {who}; end it, or give each run a namespace of its own (--namespace NAME)")
+    raise NoFreeDomainError(f"all {len(domains)} DDS domains are in use by other runs on this machine; end some first")
+
+
+def _lock(domain: int, namespace: str) -> tuple[socket.socket, ...]:
+    """Return what holds a domain, alone or with other namespaces; nothing where it is taken.
+
+    The claim is the domain's first RTPS port, but of TCP, on loopback. That of a namespace is the name of a socket besides.
+    """
+    port, name = socket.socket(socket.AF_INET, socket.SOCK_STREAM), socket.socket(socket.AF_UNIX, socket.SOCK_STREAM)
+    try:
+        if namespace:
+            port.setsockopt(socket.SOL_SOCKET, socket.SO_REUSEPORT, 1)
+            name.bind(f"\0alula/{domain}{namespace}")
+        port.bind(("127.0.0.1", _claim_port(domain)))
+        port.listen(1)
+    except OSError:
+        port.close()
+        name.close()
+        return ()
+    return port, name
 
 
 def is_claimed(domain: int) -> bool:

@@ -15,6 +15,8 @@ import psutil
 RUN_ID_VARIABLE = "ALULA_RUN_ID"
 NODE_NAME_VARIABLE = "ALULA_NODE_NAME"
 """Set for nodes of the ROS 2 world, which don't take the name that roslaunch writes on the command line."""
+NAMESPACE_VARIABLE = "ALULA_NAMESPACE"
+"""Where a run's names in ROS 2 lie, as ``/rover``; empty: nowhere in particular. `skillset_ros1`'s ``in_ros2`` has nodes know it."""
 NAME_WORD = "__name:="
 KILL_S = 5.0
 LOOK_S = 0.05

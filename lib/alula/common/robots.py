@@ -6,12 +6,14 @@ script passes on in ``ALULA_ROBOT``. The drone of this repository is one.
 
 from __future__ import annotations
 
+import contextlib
 import functools
 import importlib
 import os
 import re
 import sys
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Iterator, Mapping
+from contextvars import ContextVar
 from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any
@@ -125,12 +127,28 @@ class RobotFolder:
             raise RobotError(f"{self.root / FILE}: {text} can't be imported: {error}") from error
 
 
+_MEANT: ContextVar[RobotFolder | None] = ContextVar("robot", default=None)
+
+
+@contextlib.contextmanager
+def meaning(robot: RobotFolder | None) -> Iterator[None]:
+    """Have `find_robot` return this robot as long as the context lasts, in this thread; None: the one that it finds."""
+    token = _MEANT.set(robot)
+    try:
+        yield
+    finally:
+        _MEANT.reset(token)
+
+
 def find_robot(start: Path | None = None) -> RobotFolder:
-    """Return the robot that was named, or the one of the current folder (``start``) or a folder above it.
+    """Return the robot that is meant or was named, or the one of the current folder (``start``) or a folder above it.
 
     Raises:
         RobotError: there is none, or its file is wrong.
     """
+    meant = _MEANT.get()
+    if meant is not None and start is None:
+        return meant
     named = os.environ.get(VARIABLE)
     if named and start is None:
         return load_robot_folder(Path(named).resolve())

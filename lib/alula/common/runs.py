@@ -19,11 +19,12 @@ class NoRunError(Exception):
 
 @dataclass(frozen=True)
 class Run:
-    """A run's folder, the DDS domain that it has claimed, and the id that its processes carry; empty: not known."""
+    """A run's folder, DDS domain and namespace there (``/rover``; empty: none), and the id that its processes carry; empty: not known."""
 
     folder: Path
     domain: int
     run_id: str = ""
+    namespace: str = ""
 
     @property
     def live(self) -> bool:
@@ -43,7 +44,7 @@ def load_run(folder: Path) -> Run:
     """Read a run's folder; raise NoRunError."""
     try:
         known = json.loads((folder / "run.json").read_text(encoding="utf-8"))
-        return Run(folder, int(known["domain"]), str(known.get("run_id", "")))
+        return Run(folder, int(known["domain"]), str(known.get("run_id", "")), str(known.get("namespace", "")))
     except (OSError, ValueError, KeyError, TypeError, AttributeError) as error:
         raise NoRunError(f"{folder} is no run's folder: it has no run.json that names a domain") from error
 
@@ -56,10 +57,10 @@ def live_runs(folder: Path | None = None) -> list[Run]:
             found.append((path.stat().st_mtime, load_run(path.parent)))
         except (OSError, NoRunError):
             continue
-    # Domains are used again: the last run that was given one is the one that holds it.
-    newest: dict[int, Run] = {}
+    # Domains are used again: the last run that was given one, in its namespace, is the one that holds it.
+    newest: dict[tuple[int, str], Run] = {}
     for _, run in sorted(found, key=lambda pair: pair[0], reverse=True):
-        newest.setdefault(run.domain, run)
+        newest.setdefault((run.domain, run.namespace), run)
     return [run for run in newest.values() if run.live]
 
 

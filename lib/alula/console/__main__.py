@@ -18,7 +18,8 @@ from collections.abc import Callable, Sequence
 from pathlib import Path
 
 from alula.common.network import free_port
-from alula.common.runs import LATEST, live_runs
+from alula.common.robots import RobotError, RobotFolder, load_robot_folder
+from alula.common.runs import LATEST, Run, live_runs
 from alula.console.admission import Admission, is_loopback
 from alula.console.certificates import fingerprint, own_certificate, server_context
 from alula.console.link import ActError, Link, Mission, Skillsets
@@ -39,6 +40,9 @@ def parse(arguments: Sequence[str] | None) -> argparse.Namespace:
     which = parser.add_mutually_exclusive_group()
     which.add_argument("--run", metavar="DIR|latest", default=LATEST, help="show this run's folder first (default: the newest)")
     which.add_argument("--domain", type=int, metavar="N", help="show the run under way in this DDS domain first")
+    parser.add_argument(
+        "--beside", type=Path, action="append", default=[], metavar="DIR", help="show the runs of the robot in this folder, too; repeatable"
+    )
     parser.add_argument(
         "--host",
         default="127.0.0.1",
@@ -95,6 +99,20 @@ def first_run(options: argparse.Namespace) -> Path | None:
     return folder
 
 
+def robots_beside(options: argparse.Namespace) -> list[RobotFolder]:
+    """Return the robots whose runs are shown beside those of the robot that the console is about.
+
+    Raises:
+        RobotError: a folder holds no robot.
+        ValueError: two could not be told apart.
+    """
+    robots = [load_robot_folder(folder.expanduser().resolve()) for folder in options.beside]
+    names = [robot.name for robot in robots]
+    if len(set(names)) < len(names):
+        raise ValueError(f"--beside: robots are told apart by their names, and these are {', '.join(names)}")
+    return robots
+
+
 def port_of(options: argparse.Namespace) -> int:
     """Return the port to listen on."""
     if options.port is not None:
@@ -128,13 +146,13 @@ class LateLink:
     def __init__(self, make: Callable[[], Link]) -> None:
         self._make = functools.cache(make)
 
-    def connect(self, domain: int) -> Mission:
-        """Return the mission in a domain."""
-        return self._make().connect(domain)
+    def connect(self, run: Run) -> Mission:
+        """Return the mission of a run."""
+        return self._make().connect(run)
 
-    def listen(self, domain: int) -> Skillsets:
-        """Return the skillsets in a domain."""
-        return self._make().listen(domain)
+    def listen(self, run: Run) -> Skillsets:
+        """Return the skillsets of a run."""
+        return self._make().listen(run)
 
 
 def no_link() -> Link:
@@ -150,8 +168,9 @@ def main(arguments: Sequence[str] | None = None, make_link: Callable[[], Link] =
         token = "" if is_loopback(options.host) else secrets.token_urlsafe(24)
         tls, known_by = tls_of(options)
         admission = Admission(options.host, port_of(options), token, tls)
-        asyncio.run(serve_until_told(Console(admission, LateLink(make_link), fixed=fixed, ask_options=ask_options), admission, known_by))
-    except (ValueError, OSError) as error:
+        console = Console(admission, LateLink(make_link), fixed=fixed, beside=robots_beside(options), ask_options=ask_options)
+        asyncio.run(serve_until_told(console, admission, known_by))
+    except (ValueError, OSError, RobotError) as error:
         sys.stderr.write(f"alula console: {error}\n")
         return 2
     return 0

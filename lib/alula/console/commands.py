@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import contextlib
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
@@ -32,12 +32,13 @@ Asked = Mapping[str, Any]
 
 
 class Commands:
-    """The acts by name. They wait for answers, so they are called in threads."""
+    """The acts by name. They wait for answers, so they are called in threads. ``name_of`` returns what viewers call a run."""
 
-    def __init__(self, link: Link, options: Callable[[], Sequence[RunOption]]) -> None:
+    def __init__(self, link: Link, options: Callable[[], Sequence[RunOption]], name_of: Callable[[Path], str]) -> None:
         self._options = options
+        self._name_of = name_of
         self._missions: PerRun[Mission] = PerRun(link.connect)
-        self._controls: PerRun[ManualControl] = PerRun(lambda domain: ManualControl(link.listen(domain)))
+        self._controls: PerRun[ManualControl] = PerRun(lambda run: ManualControl(link.listen(run)))
         self._acts: Mapping[str, Callable[[Asked, Path | None], Done]] = {
             "start": self._start,
             "abort": lambda asked, run: self._told("abort", asked, run, lambda mission: mission.abort()),
@@ -77,17 +78,25 @@ class Commands:
         return Done(folder, "start", f"{folder.name} is started")
 
     def _told(self, what: str, asked: Asked, run: Path | None, act: Callable[[Mission], str]) -> Done:
-        folder = _confirmed(asked, run)
+        folder = self._confirmed(asked, run)
         return Done(folder, what, act(self._missions.of(load_run(folder))))
 
     def _off(self, asked: Asked, run: Path | None) -> Done:
-        folder = _confirmed(asked, run)
+        folder = self._confirmed(asked, run)
         return Done(folder, "off", acts.everything_off(folder))
 
     def _skill(self, asked: Asked, run: Path | None) -> Done:
-        folder = _confirmed(asked, run)
+        folder = self._confirmed(asked, run)
         what, answer = self.manual_control_of(folder).do(asked)
         return Done(folder, what, answer, noted=asked.get("act") not in QUESTIONS)
+
+    def _confirmed(self, asked: Asked, run: Path | None) -> Path:
+        """Return the run that a command means; raise ActError unless the request names the very run that is shown."""
+        if run is None or asked.get("run") != self._name_of(run):
+            raise ActError("the run that is shown is another one by now; look again")
+        if not is_live(run):
+            raise ActError("this run is over")
+        return run
 
 
 def _runs_of(folders: set[Path]) -> set[Run]:
@@ -98,15 +107,6 @@ def _runs_of(folders: set[Path]) -> set[Run]:
     return runs
 
 
-def _confirmed(asked: Asked, run: Path | None) -> Path:
-    """Return the run that a command means; raise ActError unless the request names the very run that is shown."""
-    if run is None or asked.get("run") != run.name:
-        raise ActError("the run that is shown is another one by now; look again")
-    if not is_live(run):
-        raise ActError("this run is over")
-    return run
-
-
 def is_live(folder: Path) -> bool:
     """Tell whether a run is under way."""
     try:
@@ -115,9 +115,9 @@ def is_live(folder: Path) -> bool:
         return False
 
 
-def runs_in(folder: Path, fixed: Path | None) -> list[Path]:
+def runs_in(folders: Iterable[Path], fixed: Path | None) -> list[Path]:
     """Return the folders of runs, the newest first; ``fixed`` is one, wherever it lies."""
-    found = {path.parent for path in folder.glob("*/run.json")} | ({fixed} if fixed is not None else set())
+    found = {path.parent for folder in folders for path in folder.glob("*/run.json")} | ({fixed} if fixed is not None else set())
     stamped = []
     for path in found:
         with contextlib.suppress(OSError):

@@ -9,6 +9,7 @@ from collections.abc import Iterable, Mapping
 from dataclasses import dataclass, field
 from pathlib import Path
 
+from alula.common.robots import RobotFolder, meaning
 from alula.console.entries import FACTS, written
 from alula.console.following import RunFollower
 
@@ -29,10 +30,14 @@ class Place:
 
 
 class Feed:
-    """The entries of one run. ``session`` names this life of the feed: a viewer that comes with another one begins again."""
+    """The entries of one run, of a robot (None: the one that the console is about).
 
-    def __init__(self, folder: Path) -> None:
+    ``session`` names this life of the feed: a viewer that comes with another one begins again.
+    """
+
+    def __init__(self, folder: Path, robot: RobotFolder | None = None) -> None:
         self.folder = folder
+        self._robot = robot
         self.session = secrets.token_hex(8)
         self.last_s: float | None = None
         """Mission clock of the newest entry; None: it has not been heard yet."""
@@ -54,7 +59,8 @@ class Feed:
 
     def read(self) -> list[tuple[str, float | None, str]]:
         """Return what came since the last call: topic, seconds of mission clock, and the entry as JSON."""
-        return [(topic, t_s, written((topic, t_s, value))) for topic, t_s, value in self._follower.poll(READ_ENTRIES)]
+        with meaning(self._robot):
+            return [(topic, t_s, written((topic, t_s, value))) for topic, t_s, value in self._follower.poll(READ_ENTRIES)]
 
     def add(self, entries: Iterable[tuple[str, float | None, str]]) -> None:
         """Add entries, and wake the viewers if there were any."""

@@ -62,7 +62,7 @@ class Skillset(Protocol):
 
 
 class Skillsets(Closable, Protocol):
-    """The skillsets in one domain, listened to until it is closed."""
+    """The skillsets of one run, listened to until it is closed."""
 
     @property
     def watched(self) -> Sequence[Skillset]:
@@ -81,13 +81,13 @@ class Skillsets(Closable, Protocol):
 
 
 class Link(Protocol):
-    """How robots are reached: by the domain of their run. Both methods take up to a second; what they return is used many times."""
+    """How robots are reached: by their run. Both methods take up to a second; what they return is used many times."""
 
-    def connect(self, domain: int) -> Mission:
+    def connect(self, run: Run) -> Mission:
         """Return the mission there, which may come later, end, and come again. Raises ActError where nothing can be reached at all."""
         ...
 
-    def listen(self, domain: int) -> Skillsets:
+    def listen(self, run: Run) -> Skillsets:
         """Return the skillsets there. Raises ActError where nothing can be reached at all."""
         ...
 
@@ -96,12 +96,12 @@ T = TypeVar("T", bound=Closable)
 
 
 class PerRun(Generic[T]):
-    """A connection for each run, made by ``make(domain)`` at its first use and closed when the run is no longer wanted.
+    """A connection for each run, made by ``make(run)`` at its first use and closed when the run is no longer wanted.
 
     A run that is started anew, be it in another domain, is another run.
     """
 
-    def __init__(self, make: Callable[[int], T]) -> None:
+    def __init__(self, make: Callable[[Run], T]) -> None:
         self._make = make
         self._open: dict[Run, T] = {}
         self._lock = Lock()
@@ -110,7 +110,7 @@ class PerRun(Generic[T]):
         """Return the connection of a run; the first call opens it."""
         with self._lock:
             if run not in self._open:
-                self._open[run] = self._make(run.domain)
+                self._open[run] = self._make(run)
             return self._open[run]
 
     def keep(self, runs: set[Run]) -> None:

@@ -25,6 +25,7 @@ from websockets.exceptions import ConnectionClosed
 from websockets.http11 import Request, Response
 from websockets.protocol import State
 
+from alula.common.robots import RobotFolder
 from alula.common.runs import runs_folder
 from alula.common.scenarios import scenario_names
 from alula.console import acts, commands, journal
@@ -68,8 +69,9 @@ class Viewer:
 
 
 class Console:
-    """Serves the page of all runs in a folder; ``fixed`` is the one that is shown first, else the newest. ``link`` reaches the robots.
+    """Serves the page of all runs of a robot; ``fixed`` is the one that is shown first, else the newest. ``link`` reaches the robots.
 
+    The runs of the robots ``beside`` it are called ``ROBOT/RUN``, those of its own ``RUN``. Only its own robot's are started here.
     ``ask_options`` says which options the robot's live runs have; it raises RequestError where none can be started.
     """
 
@@ -79,10 +81,12 @@ class Console:
         link: Link,
         *,
         fixed: Path | None = None,
+        beside: Sequence[RobotFolder] = (),
         ask_options: Callable[[], Awaitable[Sequence[RunOption]]] | None = None,
     ) -> None:
         self._admission = admission
         self._fixed = fixed
+        self._beside = tuple(beside)
         self._offers: dict[str, object] = {"scenarios": scenario_names(), "worlds": acts.world_names(), "over": [acts.MOCKS], "options": []}
         self._ask_options = ask_options
         self._options: Sequence[RunOption] = ()
@@ -93,7 +97,7 @@ class Console:
         self._runs: list[Path] = []
         self._live: set[Path] = set()
         self._starting = asyncio.Lock()
-        self._commands = commands.Commands(link, lambda: self._options)
+        self._commands = commands.Commands(link, lambda: self._options, self._name_of)
         self._threads = {manual: ThreadPoolExecutor(WAITING, "manual" if manual else "acts") for manual in (False, True)}
         self._under_way: dict[tuple[object, ...], asyncio.Task[commands.Done]] = {}
         self._manual: dict[Path, str] = {}
@@ -171,7 +175,7 @@ class Console:
         return self._report(path)
 
     def _report(self, path: str) -> Response:
-        run = next((folder for folder in self._runs if path == f"/runs/{folder.name}/{REPORT}"), None)
+        run = next((folder for folder in self._runs if path == f"/runs/{self._name_of(folder)}/{REPORT}"), None)
         if run is None or not (run / REPORT).is_file():
             return self._page_of(HTTPStatus.NOT_FOUND, b"there is no such page\n", "text/plain; charset=utf-8")
         # In a sandbox, a page of a run has an origin of its own: nothing in it can command.
@@ -205,9 +209,20 @@ class Console:
             return
         self._offers |= {"over": [acts.LIVE, acts.MOCKS], "options": [asdict(option) for option in self._options]}
 
+    def _folders(self) -> list[Path]:
+        return [runs_folder(), *(robot.runs for robot in self._beside)]
+
+    def _robot_of(self, run: Path) -> RobotFolder | None:
+        """Return the robot beside the console's own that a run is of; None for one of its own."""
+        return next((robot for robot in self._beside if run.parent == robot.runs), None)
+
+    def _name_of(self, run: Path) -> str:
+        robot = self._robot_of(run)
+        return run.name if robot is None else f"{robot.name}/{run.name}"
+
     async def _look_for_runs(self) -> None:
         while True:
-            self._runs = await asyncio.to_thread(commands.runs_in, runs_folder(), self._fixed)
+            self._runs = await asyncio.to_thread(commands.runs_in, self._folders(), self._fixed)
             self._live = await asyncio.to_thread(lambda: {run for run in self._runs[:SHOWN_RUNS] if commands.is_live(run)})
             await asyncio.sleep(LOOK_S)
 
@@ -238,11 +253,11 @@ class Console:
             shown = self._commands.manual_control_of(run).describe()
         except Exception as error:  # noqa: BLE001 - whatever a skillset says, the next look may be better
             shown = {"problems": [f"{type(error).__name__}: {error}"], "skillsets": []}
-        return json.dumps({"manual": {"run": run.name, **shown}})
+        return json.dumps({"manual": {"run": self._name_of(run), **shown}})
 
     def _run_of(self, viewer: Viewer) -> Path | None:
         """Return the run that a viewer watches: the one that it chose, or the one that is shown first."""
-        chosen = next((folder for folder in self._runs if folder.name == viewer.run), None)
+        chosen = next((folder for folder in self._runs if self._name_of(folder) == viewer.run), None)
         return chosen or self._shown_first()
 
     def _shown_first(self) -> Path | None:
@@ -250,7 +265,7 @@ class Console:
 
     def _feed(self, folder: Path) -> Feed:
         if folder not in self._feeds:
-            feed = Feed(folder)
+            feed = Feed(folder, self._robot_of(folder))
             self._feeds[folder] = (feed, asyncio.create_task(feed.follow()))
         return self._feeds[folder][0]
 
@@ -301,10 +316,11 @@ class Console:
     def _status(self, viewer: Viewer, run: Path | None, feed: Feed | None) -> dict[str, Any]:
         commander = next((other.name for other in self._viewers if other.key == self._commander), "")
         return {
-            "run": "" if run is None else run.name,
+            "run": "" if run is None else self._name_of(run),
             "live": run in self._live,
             "report": run is not None and (run / REPORT).is_file(),
-            "runs": [folder.name for folder in self._runs[:SHOWN_RUNS]],
+            "runs": [self._name_of(folder) for folder in self._runs[:SHOWN_RUNS]],
+            "underWay": [self._name_of(folder) for folder in self._runs[:SHOWN_RUNS] if folder in self._live],
             **self._offers,
             "commands": viewer.may and viewer.key == self._commander,
             "may": viewer.may,
@@ -353,7 +369,7 @@ class Console:
         if command == "start":
             async with self._starting:
                 done = await self._act(viewer, command, asked, run)
-            viewer.run = done.run.name
+            viewer.run = self._name_of(done.run)
         elif command in commands.ON_THE_FLIGHT:
             done = await asyncio.shield(self._joined(viewer, command, asked, run))
         else:

@@ -29,7 +29,9 @@ class RunSpec:
         faults: what is to fail, as on the command line.
         world: file of the world; empty: the scenario has none.
         master_port: TCP port of its ROS 1 master, on loopback.
-        domain: DDS domain; 0 until it is claimed.
+        domain: DDS domain; 0 until it is claimed, or named on the command line.
+        seat: a number that no other run under way has, for ports that follow from it; 0 until it is claimed.
+        namespace: what its names in ROS 2 begin with, as ``/rover``; empty: nothing.
         console: the operator's page is served beside it.
         monitor: every event is held against the models.
         groot: ``HOST:PORT`` where viewers find the mission's tree; empty: nowhere.
@@ -44,6 +46,8 @@ class RunSpec:
     world: str = ""
     master_port: int = 0
     domain: int = 0
+    seat: int = 0
+    namespace: str = ""
     console: bool = False
     monitor: bool = False
     groot: str = ""

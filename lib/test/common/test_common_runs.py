@@ -50,6 +50,17 @@ def test_the_newest_run_that_holds_its_domain_is_the_latest(folder):
         one.release()
 
 
+def test_runs_of_one_domain_are_told_apart_by_their_namespaces(folder):
+    drone = claim_domain(namespace="/drone")
+    rover = claim_domain([drone.domain], "/rover")
+    make_run(folder, "flies", drone.domain, age_s=9, namespace="/drone")
+    make_run(folder, "flew", drone.domain, age_s=19, namespace="/drone")
+    make_run(folder, "drives", rover.domain, age_s=3, namespace="/rover")
+    assert [(run.folder.name, run.namespace) for run in live_runs()] == [("drives", "/rover"), ("flies", "/drone")]
+    drone.release()
+    rover.release()
+
+
 def test_a_run_that_crashed_is_not_live_because_another_run_has_its_domain_now(folder):
     claim = claim_domain()
     place = make_run(folder, "crashed", claim.domain, age_s=0, run_id="one that crashed")

@@ -15,6 +15,8 @@ from typing import Any
 from websockets.asyncio.client import ClientConnection, connect
 
 from alula.common.network import free_port
+from alula.common.robots import RobotFolder
+from alula.common.runs import Run
 from alula.console.admission import Admission
 from alula.console.link import ActError, Link, Skillsets
 from alula.console.server import FEED, Console
@@ -35,14 +37,16 @@ class Robot:
     def __init__(self, *, abort: Callable[[], str] = str, pause: Callable[[], str] = str, resume: Callable[[], str] = str) -> None:
         self._abort, self._pause, self._resume = abort, pause, resume
         self.domains: list[int] = []
+        self.runs: list[Run] = []
         self.closed = 0
 
-    def connect(self, domain: int) -> Robot:
-        self.domains.append(domain)
+    def connect(self, run: Run) -> Robot:
+        self.domains.append(run.domain)
+        self.runs.append(run)
         return self
 
-    def listen(self, domain: int) -> Skillsets:
-        raise ActError(f"nothing is heard in domain {domain}")
+    def listen(self, run: Run) -> Skillsets:
+        raise ActError(f"nothing is heard in domain {run.domain}")
 
     def close(self) -> None:
         self.closed += 1
@@ -86,12 +90,20 @@ class Bench:
             return error.code, error.read().decode()
 
 
-def serve(play: Callable[[Bench], Awaitable[None]], *, token: str = "", fixed: Path | None = None, link: Link | None = None) -> None:
+def serve(
+    play: Callable[[Bench], Awaitable[None]],
+    *,
+    token: str = "",
+    fixed: Path | None = None,
+    link: Link | None = None,
+    beside: Sequence[RobotFolder] = (),
+) -> None:
     """Serve a console, and play a story against it."""
 
     async def story() -> None:
         bench = Bench(free_port(), token)
-        async with Console(Admission("127.0.0.1", int(bench.base.rpartition(":")[2]), token), link or Robot(), fixed=fixed).open():
+        admission = Admission("127.0.0.1", int(bench.base.rpartition(":")[2]), token)
+        async with Console(admission, link or Robot(), fixed=fixed, beside=beside).open():
             await asyncio.wait_for(play(bench), 3 * WAIT_S)
 
     asyncio.run(story())

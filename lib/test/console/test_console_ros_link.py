@@ -19,16 +19,17 @@ pytest.importorskip("rclpy")
 from console_serving import WAIT_S
 
 from alula.common.network import claim_domain
+from alula.common.runs import Run
 from alula.console.link import ActError
 from skill_panel import ros_link
 from skill_panel.ros_link import RosLink, RosMission
 
 
 @contextlib.contextmanager
-def mission(domain: int, folder: Path) -> Iterator[None]:
+def mission(domain: int, folder: Path, namespace: str = "/") -> Iterator[None]:
     """Run a mission that does not end by itself."""
     folder.mkdir()
-    words = [sys.executable, "-m", "console_bench", str(folder)]
+    words = [sys.executable, "-m", "console_bench", str(folder), "--ros-args", "-r", f"__ns:={namespace}"]
     with subprocess.Popen(words, env={**os.environ, "ROS_DOMAIN_ID": str(domain)}) as process:
         try:
             yield
@@ -40,7 +41,7 @@ def test_one_connection_serves_a_mission_that_ends_and_comes_again(
     ros2_domain: int, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     monkeypatch.setattr(ros_link, "ANSWER_S", WAIT_S)
-    robot = RosLink().connect(ros2_domain)
+    robot = RosLink().connect(Run(Path(), ros2_domain))
     try:
         for name in ("first", "second"):
             with mission(ros2_domain, tmp_path / name):
@@ -66,7 +67,7 @@ def paused(robot: RosMission) -> str:
 def test_missions_in_two_domains_are_told_apart(ros2_domain: int, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(ros_link, "ANSWER_S", WAIT_S)
     claim = claim_domain()
-    here, there = RosLink().connect(ros2_domain), RosLink().connect(claim.domain)
+    here, there = RosLink().connect(Run(Path(), ros2_domain)), RosLink().connect(Run(Path(), claim.domain))
     try:
         with mission(claim.domain, tmp_path / "there"):
             assert "paused" in paused(there)
@@ -79,11 +80,31 @@ def test_missions_in_two_domains_are_told_apart(ros2_domain: int, tmp_path: Path
         claim.release()
 
 
+def test_missions_in_two_namespaces_of_a_domain_are_commanded_each_for_itself(
+    ros2_domain: int, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr(ros_link, "ANSWER_S", WAIT_S)
+    drone, rover = (RosLink().connect(Run(Path(), ros2_domain, namespace=space)) for space in ("/drone", "/rover"))
+    try:
+        with mission(ros2_domain, tmp_path / "drone", "/drone"), mission(ros2_domain, tmp_path / "rover", "/rover"):
+            assert "paused" in paused(rover)
+            assert "paused" in paused(drone)
+            assert rover.set_paused(paused=False) == "the mission goes on"
+            with pytest.raises(ActError, match="the mission is not paused"):
+                rover.set_paused(paused=False)
+            assert drone.set_paused(paused=False) == "the mission goes on"
+            assert drone.abort() == "the robot stops where it is"
+            assert "paused" in paused(rover)
+    finally:
+        drone.close()
+        rover.close()
+
+
 def test_a_mission_that_is_not_there_is_told_so_and_the_pilot_is_named_not_the_button_that_drops_a_vehicle(
     ros2_domain: int, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     monkeypatch.setattr(ros_link, "ANSWER_S", 0.2)
-    robot = RosLink().connect(ros2_domain)
+    robot = RosLink().connect(Run(Path(), ros2_domain))
     try:
         with pytest.raises(ActError) as refused:
             robot.abort()
@@ -105,7 +126,7 @@ def test_a_mission_that_hangs_is_told_so_and_closing_ends_calls_that_wait(ros2_d
 
     deaf = Session("deaf", domain=ros2_domain, executor=Hung)
     deaf.node.create_service(Trigger, "/mission/abort", lambda _request, response: response)
-    robot = RosLink().connect(ros2_domain)
+    robot = RosLink().connect(Run(Path(), ros2_domain))
     try:
         monkeypatch.setattr(ros_link, "ANSWER_S", 5.0)
         with pytest.raises(ActError, match="was told and has not answered for 5 s, it may still obey"):

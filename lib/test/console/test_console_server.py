@@ -21,6 +21,8 @@ from websockets.asyncio.client import ClientConnection, connect
 from websockets.exceptions import ConnectionClosed, InvalidStatus
 
 from alula.common.record import EVENTS, MISSION, OPERATOR
+from alula.common.robots import load_robot_folder
+from alula.common.runs import Run
 from alula.console import acts, commands, server
 from alula.console.__main__ import main
 from alula.console.acts import ActError, WantedRun, read_wanted
@@ -173,6 +175,67 @@ def test_a_mission_is_connected_to_once_ahead_of_commands_and_left_when_its_run_
     assert link.closed == 2
 
 
+def test_runs_of_a_robot_beside_are_shown_in_its_words_and_commanded_each_for_itself(
+    make_run: Callable[..., Path], tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """Both runs have one name and are in one domain: what is sent to the one must not reach the other."""
+    own, other = make_run("same"), make_run("other")
+    (tmp_path / "rover").mkdir()
+    (tmp_path / "rover" / "robot.yaml").write_text("name: rover\npage: {stop: stop the rover}\n", encoding="utf-8")
+    rover = load_robot_folder(tmp_path / "rover")
+    rover.runs.mkdir()
+    away = other.rename(rover.runs / "same")
+    known = json.loads((away / "run.json").read_text(encoding="utf-8"))
+    (away / "run.json").write_text(json.dumps({**known, "namespace": "/rover"}), encoding="utf-8")
+    os.utime(away / "run.json", (1.0, 1.0))
+    monkeypatch.setattr(commands, "is_live", lambda _run: True)
+    told: list[str] = []
+
+    class Both(Robot):
+        def connect(self, run: Run) -> Robot:
+            name = run.namespace or "own"
+            return Robot(abort=lambda: told.append(f"{name} stops") or "stops", pause=lambda: told.append(f"{name} holds") or "holds")
+
+    async def play(bench: Bench) -> None:
+        viewer = await bench.viewer("me")
+        status = (await heard(viewer, lambda message: len(message.get("status", {}).get("underWay", [])) == 2))["status"]
+        assert (status["run"], status["runs"], status["underWay"]) == ("same", ["same", "rover/same"], ["same", "rover/same"])
+        assert await answer_to(viewer, command="pause", run="same") == "holds"
+        await viewer.send(json.dumps({"watch": "rover/same"}))
+        await heard(viewer, lambda message: "stop the rover" in str(message.get("entries")))
+        await heard(viewer, lambda message: message.get("status", {}).get("run") == "rover/same")
+        assert "another one by now" in await answer_to(viewer, command="abort", run="same")
+        assert await answer_to(viewer, command="abort", run="rover/same") == "stops"
+        assert told == ["own holds", "/rover stops"]
+        assert not (own / "operator.jsonl").read_text(encoding="utf-8").count("abort")
+        assert (away / "operator.jsonl").read_text(encoding="utf-8").count("abort") == 1
+        (away / "report.html").write_text("the rover's", encoding="utf-8")
+        assert await bench.get("/runs/rover%2Fsame/report.html") == (200, "the rover's")
+        assert (await bench.get("/runs/same/report.html"))[0] == 404
+
+    serve(play, link=Both(), beside=[rover])
+
+
+@pytest.mark.parametrize(
+    ("robots", "complaint"),
+    [([None], "robot.yaml: No such file or directory; name the robot's folder"), (["rover", "rover"], "told apart by their names")],
+)
+def test_robots_beside_have_to_be_robots_with_names_of_their_own(
+    robots: list[str | None], complaint: str, tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    words: list[str] = []
+    for number, name in enumerate(robots):
+        folder = tmp_path / str(number)
+        folder.mkdir()
+        if name is not None:
+            (folder / "robot.yaml").write_text(f"name: {name}\n", encoding="utf-8")
+        words += ["--beside", str(folder)]
+    assert main(words) == 2
+    said = capsys.readouterr().err
+    assert complaint in said
+    assert said.count("\n") == 1
+
+
 def test_a_robot_that_can_not_be_reached_is_told_and_nothing_else_is_held_up(
     make_run: Callable[..., Path], monkeypatch: pytest.MonkeyPatch
 ) -> None:
@@ -180,7 +243,7 @@ def test_a_robot_that_can_not_be_reached_is_told_and_nothing_else_is_held_up(
     monkeypatch.setattr(commands, "is_live", lambda _run: True)
 
     class Nowhere(Robot):
-        def connect(self, domain: int) -> Robot:
+        def connect(self, run: Run) -> Robot:
             raise ActError("there is no ROS 2 here")
 
     async def play(bench: Bench) -> None:

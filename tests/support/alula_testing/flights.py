@@ -34,6 +34,11 @@ class Flight:
         return str(json.loads((self.out / "run.json").read_text(encoding="utf-8"))["run_id"])
 
     @property
+    def domain(self) -> int:
+        """Its DDS domain."""
+        return int(json.loads((self.out / "run.json").read_text(encoding="utf-8"))["domain"])
+
+    @property
     def summary(self) -> dict[str, Any]:
         """The run's summary."""
         return dict(json.loads((self.out / "summary.json").read_text(encoding="utf-8")))

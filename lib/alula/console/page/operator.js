@@ -10,12 +10,12 @@ const DOUBT_MS = 3000; // an answer takes some milliseconds; after so long the o
 const called = (command) => (command === "abort" ? robotWords(run).stop : CALLED[command] ?? command);
 
 /** Fills a select or a datalist with names; what was chosen stays chosen. */
-function offer(node, names) {
-  const key = JSON.stringify(names);
+function offer(node, names, marked = []) {
+  const key = JSON.stringify([names, marked]);
   if (node.offered === key) return;
   const chosen = node.value;
   node.offered = key;
-  node.replaceChildren(...names.map((name) => el("option", { value: name }, name)));
+  node.replaceChildren(...names.map((name) => el("option", { value: name }, marked.includes(name) ? `● ${name}` : name)));
   if (names.includes(chosen)) node.value = chosen;
 }
 
@@ -161,7 +161,7 @@ class OperatorBar {
     [this.status, this.paused] = [status, held !== null];
     const met = (start ?? []).filter(([, otherwise]) => !otherwise).length;
     setText(this.met, start?.length ? `before the start: ${met} of ${start.length} conditions met` : "before the start");
-    offer(this.runs, status.runs);
+    offer(this.runs, status.runs, status.underWay);
     if (this.runs.value !== status.run && document.activeElement !== this.runs) this.runs.value = status.run;
     offer(this.scenario, status.scenarios);
     offer(this.worlds, status.worlds);

@@ -101,7 +101,7 @@ $members
             NotThereError: they are not there within the time.
         """
         make = partial(cls, namespace=namespace)
-        return connected(make, "$package", domain=domain, timeout_s=timeout_s, skillsets=skillsets)
+        return connected(make, "$package", namespace=namespace, domain=domain, timeout_s=timeout_s, skillsets=skillsets)
 '''
 
 INIT = '''\

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 
+from alula.common.network import DomainClaim
 from alula.live.spec import RunSpec
 from alula_flight import command_line, launch
 from uav_flight.part import DronePart, Flight
@@ -16,7 +17,7 @@ def parse(words: Sequence[str]) -> RunSpec:
 
 def with_domain(request: RunSpec, domain: int) -> RunSpec:
     """Return a run with its ports."""
-    return command_line.with_domain(request, domain, DronePart())
+    return command_line.with_claim(request, DomainClaim(domain, domain, ()), DronePart())
 
 
 def flight_of(request: RunSpec, domain: int) -> Flight:

@@ -25,10 +25,11 @@ LIST_S = 3.0
 
 @dataclass(frozen=True)
 class Place:
-    """Where to look: a DDS domain, and how it is called on the screen."""
+    """Where to look: a DDS domain, a namespace there (empty: all), and how it is called on the screen."""
 
     domain: int
     title: str
+    namespace: str = ""
 
 
 def parse(arguments: Sequence[str] | None) -> argparse.Namespace:
@@ -55,17 +56,18 @@ def place_of(options: argparse.Namespace) -> Place:
     if options.run is not None:
         return _of_run(find_run(options.run))
     if options.domain is not None:
-        return Place(options.domain, f"in DDS domain {options.domain}")
+        return Place(options.domain, f"in DDS domain {options.domain}", options.namespace)
     own = os.environ.get("ROS_DOMAIN_ID", "")
     runs = [] if own.isdigit() else live_runs()
     if runs:
         return _of_run(runs[0])
     domain = int(own) if own.isdigit() else 0
-    return Place(domain, f"in DDS domain {domain}")
+    return Place(domain, f"in DDS domain {domain}", options.namespace)
 
 
 def _of_run(run: Run) -> Place:
-    return Place(run.domain, f"in the run {run.folder.name} (DDS domain {run.domain})")
+    where = f"DDS domain {run.domain}, {run.namespace}" if run.namespace else f"DDS domain {run.domain}"
+    return Place(run.domain, f"in the run {run.folder.name} ({where})", run.namespace)
 
 
 def say_what_runs(options: argparse.Namespace) -> None:
@@ -73,7 +75,7 @@ def say_what_runs(options: argparse.Namespace) -> None:
     for place in dict.fromkeys([place_of(options), *(_of_run(run) for run in live_runs())]):
         session = Session("skill_panel", domain=place.domain)
         try:
-            look = partial(skillsets_in, session.node, options.namespace, options.skillsets)
+            look = partial(skillsets_in, session.node, place.namespace, options.skillsets)
             found = [f"{space}/{name}" for space, name in sorted(all_found(look, LIST_S))]
         finally:
             session.close()
@@ -82,7 +84,11 @@ def say_what_runs(options: argparse.Namespace) -> None:
 
 def others_than(place: Place) -> list[str]:
     """Return a line for each run under way elsewhere."""
-    return [f"A run is under way: ./alula panel --run {run.folder}" for run in live_runs() if run.domain != place.domain]
+    return [
+        f"A run is under way: ./alula panel --run {run.folder}"
+        for run in live_runs()
+        if (run.domain, run.namespace) != (place.domain, place.namespace)
+    ]
 
 
 def main(arguments: Sequence[str] | None = None) -> int:
@@ -101,7 +107,7 @@ def main(arguments: Sequence[str] | None = None) -> int:
         return 2
     from skill_panel.app import Panel
 
-    watcher = Watcher(domain=place.domain, namespace=options.namespace, names=options.skillsets)
+    watcher = Watcher(domain=place.domain, namespace=place.namespace, names=options.skillsets)
     try:
         state = os.environ.get("ALULA_ROBOT_STATE", "")
         memory = Memory(Path(state) / "panel.json" if state else None)

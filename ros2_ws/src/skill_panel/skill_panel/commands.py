@@ -23,7 +23,7 @@ from alula.common.suggestions import nearest
 from alula.runtime.core.errors import SkillRuntimeError
 from alula.runtime.core.events import event_record
 from alula.runtime.waiting import NoResponseError
-from skill_panel.__main__ import DOMAINS, LIST_S, place_of
+from skill_panel.__main__ import DOMAINS, LIST_S, Place, place_of
 from skill_panel.watcher import all_found, skillsets_in
 
 DONE, NOT_DONE, WRONG = 0, 1, 2
@@ -256,12 +256,13 @@ def drive(options: argparse.Namespace, out: Out) -> int:
     place = place_of(options)
     session = Session("alula", domain=place.domain)
     try:
-        names: list[str] = []
+        found: list[tuple[str, str]] = []
         problem = CommandError(f"no skillset runs {place.title}; alula run SCENARIO or alula mock starts some")
         # What is not there may belong to a skillset that the graph has not told of yet.
-        while more := _other_skillsets(session.node, options.namespace, names):
-            names = sorted([*names, *more])
-            robot = Robot(session.node, names, namespace=options.namespace)
+        while more := _other_skillsets(session.node, place, found):
+            found += more
+            names = sorted(name for _, name in found)
+            robot = Robot(session.node, names, namespace=_one_namespace(found, place))
             try:
                 if not robot.wait_ready(ANSWER_S):
                     raise CommandError(f"the managers of {', '.join(names)} do not answer {place.title}")
@@ -275,9 +276,17 @@ def drive(options: argparse.Namespace, out: Out) -> int:
         session.close()
 
 
-def _other_skillsets(node: Any, namespace: str, known: Sequence[str]) -> list[str]:
-    """Return the names of the skillsets that are not known yet, as soon as there are some and the graph tells of no more."""
-    return all_found(lambda: [name for _, name in skillsets_in(node, namespace) if name not in known], LIST_S)
+def _other_skillsets(node: Any, place: Place, known: Sequence[tuple[str, str]]) -> list[tuple[str, str]]:
+    """Return namespace and name of the skillsets that are not known yet, as soon as there are some and the graph tells of no more."""
+    return all_found(lambda: [one for one in skillsets_in(node, place.namespace) if one not in known], LIST_S)
+
+
+def _one_namespace(found: Sequence[tuple[str, str]], place: Place) -> str:
+    """Return the namespace of all; raise CommandError where there are several."""
+    spaces = sorted({space for space, _ in found})
+    if len(spaces) > 1:
+        raise CommandError(f"{len(spaces)} robots run {place.title}: say which by --namespace: {', '.join(one or '/' for one in spaces)}")
+    return spaces[0]
 
 
 def main(arguments: Sequence[str] | None = None) -> int:

@@ -8,6 +8,7 @@ from typing import Any
 
 from std_srvs.srv import SetBool, Trigger
 
+from alula.common.runs import Run
 from alula.console.link import ActError, Mission, Skillsets
 from skill_panel.watcher import Watcher
 from skillset_ros2.session import Session
@@ -20,24 +21,24 @@ LEFT = "press again; where the robot does not obey, take it over by hand"
 
 
 class RosLink:
-    """Reaches robots by their DDS domains."""
+    """Reaches robots by the DDS domains and namespaces of their runs."""
 
-    def connect(self, domain: int) -> Mission:
-        """Return the mission in a domain."""
-        return RosMission(domain)
+    def connect(self, run: Run) -> Mission:
+        """Return the mission of a run."""
+        return RosMission(run)
 
-    def listen(self, domain: int) -> Skillsets:
-        """Return the skillsets in a domain."""
-        return Watcher(domain=domain)
+    def listen(self, run: Run) -> Skillsets:
+        """Return the skillsets of a run."""
+        return Watcher(domain=run.domain, namespace=run.namespace)
 
 
 class RosMission:
     """The services of ``/mission``, found ahead of need: DDS takes a second and more to find them, an answer some milliseconds."""
 
-    def __init__(self, domain: int) -> None:
-        self._session = Session("console", domain=domain)
-        self._abort = self._session.node.create_client(Trigger, "/mission/abort")
-        self._pause = self._session.node.create_client(SetBool, "/mission/pause")
+    def __init__(self, run: Run) -> None:
+        self._session = Session("console", domain=run.domain)
+        self._abort = self._session.node.create_client(Trigger, f"{run.namespace}/mission/abort")
+        self._pause = self._session.node.create_client(SetBool, f"{run.namespace}/mission/pause")
         self._over = threading.Event()
         self._awaited: set[threading.Event] = set()
 

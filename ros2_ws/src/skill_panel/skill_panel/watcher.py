@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import threading
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from functools import partial
 from typing import Any, TypeVar
 
@@ -65,21 +65,29 @@ class Watched:
         """See whether the managers are there."""
         if self.view is not None:
             self.view.heard_heartbeat(alive=self.client.ready)
-        elif self.client.ready:
+        elif self.client.ready and not self.problem:
+            try:
+                kinds = self._actions(self.client.model)
+            except (AttributeError, ImportError):
+                self.problem = f"{self.root} is there, but the interfaces of {self._name} that are built here are another robot's"
+                return
             view = SkillsetView(self.root, self.client.model)
             view.heard_states(self.client.resources)
             view.heard_skills(self.client.skills)
             for event in self._heard:
                 view.heard_event(event)
             self.view = view
-            self._follow_progress(view.model)
+            self._follow_progress(kinds)
 
-    def _follow_progress(self, model: Skillset) -> None:
-        """Listen to the feedback of all executions: a client by itself hears only that of the executions that it started."""
+    def _actions(self, model: Skillset) -> dict[str, Any]:
+        """Return the actions of all skills; raise AttributeError or ImportError where one is not among the interfaces here."""
         actions = action_module(self._name)
-        for skill in model.skills:
-            topic = f"{self.root}/skill/{skill.name}/_action/feedback"
-            kind: Any = action_type(actions, skill.name)
+        return {skill.name: action_type(actions, skill.name) for skill in model.skills}
+
+    def _follow_progress(self, kinds: Mapping[str, Any]) -> None:
+        """Listen to the feedback of all executions: a client by itself hears only that of the executions that it started."""
+        for skill, kind in kinds.items():
+            topic = f"{self.root}/skill/{skill}/_action/feedback"
             self._node.create_subscription(kind.Impl.FeedbackMessage, topic, self._on_feedback, QoSProfile(depth=FEEDBACK_DEPTH))
 
     def ask_for_data(self) -> None:
@@ -185,7 +193,7 @@ class Watcher:
     """All skillsets that are asked for, and those that come later; ``close`` ends it."""
 
     def __init__(self, *, domain: int | None, namespace: str = "", names: Sequence[str] = ()) -> None:
-        self._session = Session("skill_panel", domain=domain)
+        self._session = Session("skill_panel", domain=domain, namespace=namespace)
         self.node = self._session.node
         self.domain: int = self.node.context.get_domain_id()
         self._namespace = namespace
@@ -208,7 +216,7 @@ class Watcher:
     def problems(self) -> list[str]:
         """What keeps skillsets that are there from being shown."""
         with self._lock:
-            return list(self._problems.values())
+            return [*self._problems.values(), *(one.problem for one in self._watched.values() if one.problem)]
 
     @property
     def now_ns(self) -> int:

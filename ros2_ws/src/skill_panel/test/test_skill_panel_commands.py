@@ -97,9 +97,10 @@ class LateGraph:
         monkeypatch.setattr("skillset_ros2.robot.Robot", self._robot)
         monkeypatch.setattr("skillset_ros2.session.Session", lambda *_, **__: SimpleNamespace(node=None, close=lambda: None))
 
-    def _look(self, *_: object) -> list[tuple[str, str]]:
+    def _look(self, _: object, namespace: str) -> list[tuple[str, str]]:
         passed_s = time.monotonic() - self._began_s
-        return [("", name) for name, appears_s in self._appear_s.items() if appears_s <= passed_s]
+        found = [f"/{name}".rpartition("/") for name, appears_s in self._appear_s.items() if appears_s <= passed_s]
+        return [(space.rstrip("/"), name) for space, _, name in found if space.startswith(namespace)]
 
     def _robot(self, _: object, names: list[str], **__: object) -> Any:
         clients = {name: self.world.client(name) for name in names}
@@ -120,6 +121,15 @@ def test_a_skill_of_a_skillset_that_the_graph_tells_of_late_is_found(
 ) -> None:
     LateGraph(monkeypatch, perception=0.1, navigation=2.0)
     assert main(["why", "takeoff", "--domain", "5"]) == 1
+    assert "SDK_authority" in capsys.readouterr().out
+
+
+def test_of_several_robots_one_has_to_be_named(monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]) -> None:
+    LateGraph(monkeypatch, **{"drone/navigation": 0.1, "other/navigation": 0.1})
+    assert main(["why", "takeoff", "--domain", "5"]) == 2
+    said = "alula why: 2 robots run in DDS domain 5: say which by --namespace: /drone, /other\n"
+    assert capsys.readouterr().err == said
+    assert main(["why", "takeoff", "--domain", "5", "--namespace", "/drone"]) == 1
     assert "SDK_authority" in capsys.readouterr().out
 
 

@@ -203,7 +203,26 @@ def test_the_list_says_what_runs(skillset, ros2_domain, tmp_path):
     assert said.startswith(f"in DDS domain {ros2_domain}: /panel_test/navigation\n")
 
 
-def test_the_mission_clock_is_followed_also_when_it_is_heard_late(skillset, watcher):
+def test_a_skillset_of_another_robot_whose_actions_are_others_is_told_and_not_shown(skillset, ros2_domain, monkeypatch):
+    import mapping_interfaces.action
+
+    from skill_panel.watcher import Watcher
+
+    monkeypatch.setattr("skill_panel.watcher.action_module", lambda _name: mapping_interfaces.action)
+    watcher = Watcher(domain=ros2_domain, namespace="/panel_test")
+    try:
+        assert wait_for(lambda: bool(watcher.problems), READY_S)
+        assert watcher.watched == []
+        assert watcher.problems == [
+            "/panel_test/navigation is there, but the interfaces of navigation that are built here are another robot's"
+        ]
+    finally:
+        watcher.close()
+
+
+@pytest.mark.parametrize("topic", ["/clock", "/panel_test/clock"])
+def test_the_mission_clock_is_followed_also_when_it_is_heard_late(skillset, watcher, topic):
+    """It is that of the robot's namespace, or one that robots share."""
     from rosgraph_msgs.msg import Clock
 
     from skillset_ros2.session import Session
@@ -212,7 +231,7 @@ def test_the_mission_clock_is_followed_also_when_it_is_heard_late(skillset, watc
     assert watcher.now_ns > 1_000_000_000_000_000_000, "no clock was published yet"
     session = Session("clock_test", domain=watcher.domain)
     try:
-        clock = session.node.create_publisher(Clock, "/clock", 10)
+        clock = session.node.create_publisher(Clock, topic, 10)
         message = Clock()
         message.clock.sec = 42
 

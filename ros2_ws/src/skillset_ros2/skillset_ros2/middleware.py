@@ -23,7 +23,7 @@ from skillset_ros2.actions import RclpyLink, RclpyServer
 from skillset_ros2.base import RclpyBase
 from skillset_ros2.calls import Calls, Discovery
 from skillset_ros2.convert import message_class
-from skillset_ros2.names import ALIVE, SERVICE, SOURCE, action_type, latched
+from skillset_ros2.names import ALIVE, SERVICE, SOURCE, action_type, in_namespace, latched
 
 
 class RclpyMiddleware(RclpyBase):
@@ -58,7 +58,7 @@ class RclpyMiddleware(RclpyBase):
         codec = self._codecs.topic(topic)
         take: OnValue = lambda message: callback(codec.decode(message))  # noqa: E731
         if topic.outside:
-            self.listen(topic.name, codec.kind, take, SOURCE, events=None)
+            self.listen(in_namespace(topic.name), codec.kind, take, SOURCE, events=None)
             return lambda: True
         if codec.kind is None:
             self._listen_once_known(self.name(topic.name), take, latched(topic.depth))

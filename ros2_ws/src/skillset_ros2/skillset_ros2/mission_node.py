@@ -64,12 +64,12 @@ class MissionNode(Node):  # type: ignore[misc]  # rclpy is not typed
         )
         self._view: NodeView | None = None
         self._heartbeat: Publisher | None = None
-        self._tree = self.create_publisher(String, "/mission/tree", LATCHED)
+        self._tree = self.create_publisher(String, "mission/tree", LATCHED)
         for name in plan.skillsets:
             hear: Callable[[Event], None] = lambda event: self.driver.event(event_of(event))  # noqa: E731
-            self.create_subscription(Event, f"/{name}/events", hear, ALL_EVENTS, event_callbacks=QUIET)
-        self.create_service(Trigger, "/mission/abort", self._on_abort)
-        self.create_service(SetBool, "/mission/pause", self._on_pause)
+            self.create_subscription(Event, f"{name}/events", hear, ALL_EVENTS, event_callbacks=QUIET)
+        self.create_service(Trigger, "mission/abort", self._on_abort)
+        self.create_service(SetBool, "mission/pause", self._on_pause)
         self.create_timer(TICK_PERIOD_S, self.driver.wake)
 
     @property
@@ -105,7 +105,7 @@ class MissionNode(Node):  # type: ignore[misc]  # rclpy is not typed
         """Advertise the heartbeats once every skillset can be called: simulated time begins with them."""
         if self._heartbeat is None and all(client.ready for client in self._skillset_clients):
             # Latched: time waits for the first heartbeats, which may be sent before a bridge has connected.
-            self._heartbeat = self.create_publisher(Header, "/mission/heartbeat", LATCHED)
+            self._heartbeat = self.create_publisher(Header, "mission/heartbeat", LATCHED)
 
     def _parameter(self, name: str, default: float) -> Any:
         return self.declare_parameter(name, default).value

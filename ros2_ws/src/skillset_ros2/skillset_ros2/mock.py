@@ -23,6 +23,7 @@ from rclpy.utilities import remove_ros_args
 
 from alula.common.faults import FaultError, FaultRequest, parse_fault
 from alula.common.robots import BEHAVIOUR, RobotError, find_robot
+from alula.common.ros_arguments import without_roslaunch
 from alula.common.signals import StopEvent
 from alula.language.errors import LanguageError
 from alula.language.load import load_robot
@@ -34,7 +35,7 @@ from alula.runtime.mock import Behaviour, MockRobot, load_behaviour, starter
 from skillset_ros2.executor import NodeExecutor
 from skillset_ros2.mock_host import RosMockHost
 from skillset_ros2.node import SkillsetNode
-from skillset_ros2.spin import ros2_arguments, spin_until
+from skillset_ros2.spin import spin_until
 
 CANNOT_START = 2
 
@@ -167,7 +168,7 @@ def run(cast: Cast, behaviours: Sequence[Path], known: Sequence[Skillset], optio
 
 def main(arguments: Sequence[str] | None = None) -> int:
     """Mock the skillsets of a robot's folder; return the exit code."""
-    words = ros2_arguments(sys.argv if arguments is None else arguments)
+    words = without_roslaunch(sys.argv if arguments is None else arguments)
     options = parse(remove_ros_args(words)[1:], program="alula mock", folder=True)
     try:
         folder = options.robot or find_robot().skillsets
@@ -185,7 +186,7 @@ def main(arguments: Sequence[str] | None = None) -> int:
 
 def main_of(skillset: Skillset, bindings: DataBindings, arguments: Sequence[str] | None = None) -> int:
     """Mock one generated skillset (the entry point of ``<skillset>_managers``); return the exit code."""
-    words = ros2_arguments(sys.argv if arguments is None else arguments)
+    words = without_roslaunch(sys.argv if arguments is None else arguments)
     options = parse(remove_ros_args(words)[1:], program=f"{skillset.name}_managers.mock", folder=False)
     if options.starter:
         sys.stdout.write(starter([skillset]))

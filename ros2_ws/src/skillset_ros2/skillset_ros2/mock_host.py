@@ -11,7 +11,7 @@ from skillset_interfaces.msg import Event
 from alula.runtime.managers import DataBindings
 from alula.runtime.timers import Job, Timer
 from skillset_ros2.convert import fields_of, fill, message_class
-from skillset_ros2.names import EVENTS
+from skillset_ros2.names import EVENTS, in_namespace
 from skillset_ros2.node import SkillsetNode
 from skillset_ros2.timers import RclpyTimers
 
@@ -79,7 +79,7 @@ class RosMockHost:
         if "header" in fields_of(message) and "header" not in values:
             message.header.stamp = self._node.get_clock().now().to_msg()
         if (skillset, data) not in self._publishers:
-            self._publishers[skillset, data] = self._node.create_publisher(type(message), topic, 10)
+            self._publishers[skillset, data] = self._node.create_publisher(type(message), in_namespace(topic), 10)
         self._publishers[skillset, data].publish(message)
 
     def note(self, error: str) -> None:

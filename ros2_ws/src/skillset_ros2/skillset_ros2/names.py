@@ -6,12 +6,17 @@ import importlib
 from types import ModuleType
 
 from rclpy.duration import Duration
+from rclpy.node import Node
 from rclpy.qos import DurabilityPolicy, HistoryPolicy, LivelinessPolicy, QoSProfile, ReliabilityPolicy
 
 from alula.model.ros_types import camel
 
 LIVELINESS_LEASE_S = 2.0
 """Without a heartbeat for so long (wall clock), a manager process is taken for dead; DDS itself sends the heartbeats."""
+
+
+OF_ALL_ROBOTS = ("/parameter_events", "/rosout", "/tf", "/tf_static")
+"""Topics that nodes of all namespaces share in ROS 2."""
 
 
 def latched(depth: int) -> QoSProfile:
@@ -37,6 +42,22 @@ SERVICE = QoSProfile(depth=1000, reliability=ReliabilityPolicy.RELIABLE, durabil
 """Of all services: with ROS's default, the eleventh request of a burst is lost."""
 SOURCE = QoSProfile(depth=10)
 """Of the functional layer's topics."""
+
+
+def in_namespace(name: str) -> str:
+    """Return a name of the functional layer, absolute there, as one in the node's namespace: the robot's other nodes lie there, too."""
+    return name.lstrip("/")
+
+
+def names_outside(node: Node) -> list[str]:
+    """Return what a node publishes, follows and calls although it lies outside of the node's namespace, which may be another robot's."""
+    space = node.get_namespace().rstrip("/")
+    named = [
+        *(one.topic_name for one in (*node.publishers, *node.subscriptions)),
+        *(one.service_name for one in node.clients),
+        *(node.resolve_service_name(one._action_name) for one in node.waitables if hasattr(one, "send_goal_async")),  # noqa: SLF001
+    ]
+    return sorted({name for name in named if not name.startswith(f"{space}/") and name not in OF_ALL_ROBOTS})
 
 
 def action_module(skillset: str) -> ModuleType:

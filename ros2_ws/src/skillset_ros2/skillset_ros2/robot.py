@@ -59,13 +59,21 @@ class RobotClient:
         self.close()
 
 
-def connected(make: Callable[[Node], RobotT], name: str, *, domain: int | None, timeout_s: float, skillsets: Sequence[str] = ()) -> RobotT:
+def connected(
+    make: Callable[[Node], RobotT],
+    name: str,
+    *,
+    namespace: str = "",
+    domain: int | None,
+    timeout_s: float,
+    skillsets: Sequence[str] = (),
+) -> RobotT:
     """Make a robot on a node that spins by itself, and wait until its skillsets can be called.
 
     Raises:
         NotThereError: they can't within the time.
     """
-    session = Session(name, domain=domain)
+    session = Session(name, domain=domain, namespace=namespace)
     try:
         robot = make(session.node)
         robot._session = session  # noqa: SLF001 - what `close` ends
@@ -96,7 +104,7 @@ class Robot(RobotClient):
     def connect(cls, *skillsets: str, namespace: str = "", domain: int | None = None, timeout_s: float = CONNECT_S) -> Self:
         """Connect to skillsets by name, on a node that spins by itself; raise NotThereError."""
         make: Callable[[Node], Self] = lambda node: cls(node, skillsets, namespace=namespace)  # noqa: E731
-        return connected(make, "robot_client", domain=domain, timeout_s=timeout_s)
+        return connected(make, "robot_client", namespace=namespace, domain=domain, timeout_s=timeout_s)
 
     def __getitem__(self, skillset: str) -> SkillsetView:
         """Return a skillset; raise KeyError, and RuntimeError before ``wait_ready``."""

@@ -12,7 +12,10 @@ from rclpy.context import Context
 from rclpy.executors import Executor, ExternalShutdownException, ShutdownException
 from rclpy.node import Node
 from rclpy.parameter import Parameter
+from rclpy.qos import QoSProfile, ReliabilityPolicy
 from rclpy.signals import SignalHandlerOptions
+from rclpy.time_source import CLOCK_TOPIC
+from rosgraph_msgs.msg import Clock
 
 from skillset_ros2.executor import NodeExecutor
 
@@ -25,10 +28,12 @@ class Session:
     Args:
         name: begins the node's name.
         domain: the DDS domain; by default the environment's ROS_DOMAIN_ID.
+        namespace: of the robot whose mission clock it takes, as ``/robot1``.
         executor: what spins the node.
     """
 
-    def __init__(self, name: str, *, domain: int | None = None, executor: type[Executor] = NodeExecutor) -> None:
+    def __init__(self, name: str, *, domain: int | None = None, namespace: str = "", executor: type[Executor] = NodeExecutor) -> None:
+        self._clock = f"{namespace.rstrip('/')}/clock"
         self._context = Context()
         rclpy.init(args=[], context=self._context, domain_id=domain, signal_handler_options=SignalHandlerOptions.NO)
         self.node = Node(f"{name}_{os.getpid():x}_{threading.get_native_id():x}", context=self._context, enable_rosout=False)
@@ -41,8 +46,12 @@ class Session:
         atexit.register(self.close)
 
     def follow_clock(self) -> None:
-        """Take the mission clock of ``/clock`` where one is published."""
-        if self.node.count_publishers("/clock"):
+        """Take the mission clock where one is published: in the robot's namespace, or else ``/clock``, which several may share."""
+        if self._clock != CLOCK_TOPIC and self.node.count_publishers(self._clock):
+            # rclpy's own subscription can be led elsewhere when the node is made only, and nothing is known of the graph then.
+            tick = self.node._time_source.clock_callback  # noqa: SLF001
+            self.node.create_subscription(Clock, self._clock, tick, QoSProfile(depth=1, reliability=ReliabilityPolicy.BEST_EFFORT))
+        if self.node.count_publishers(self._clock) or self.node.count_publishers(CLOCK_TOPIC):
             self.node.set_parameters([Parameter("use_sim_time", value=True)])
 
     def close(self) -> None:

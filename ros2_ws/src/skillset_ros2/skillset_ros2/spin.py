@@ -20,6 +20,7 @@ from rclpy.node import Node
 from rclpy.signals import SignalHandlerOptions
 from std_msgs.msg import Header
 
+from alula.common.ros_arguments import ROS_ARGUMENTS, without_roslaunch
 from alula.common.shared_memory import sweep_shared_memory
 from alula.common.signals import StopEvent
 from alula.model.model import Skillset
@@ -27,7 +28,7 @@ from alula.runtime.core.errors import SkillRuntimeError
 from alula.runtime.hook_processes import RemoteHooks, pipe_address
 from alula.runtime.managers import DataBindings
 from skillset_ros2.executor import NodeExecutor
-from skillset_ros2.names import latched
+from skillset_ros2.names import latched, names_outside
 from skillset_ros2.node import HooksFactory, HooksNode, SkillsetNode
 from skillset_ros2.processes import RESOURCES, end_with, supervise, wait_for
 
@@ -39,13 +40,7 @@ REFUSED = 2
 SWEPT_AFTER_S = 5.0
 END_LIMIT_S = 30.0
 """Wall clock; hooks may take some seconds to stop their functions."""
-ROS_ARGUMENTS = "--ros-args"
 ALL = "all"
-
-
-def ros2_arguments(arguments: Sequence[str]) -> list[str]:
-    """Return the command line without the words that roslaunch adds for ROS 1 (``__name:=...``), which rclpy refuses."""
-    return [word for word in arguments if not (word.startswith("__") and ":=" in word)]
 
 
 def run_skillset(
@@ -95,6 +90,7 @@ def run_skillset(
             address = "" if options.part == ALL else pipe_address(*names)
             node = make_part(options.part, skillset, interfaces, hooks_factory, data_bindings, address=address, stop=stop, on_rival=refuse)
             if node is not None:
+                warn_of_names_outside(node)
                 spin_until(node, stop, at_stop=_limit_the_end)
                 node.destroy_node()
     except SkillRuntimeError as error:
@@ -105,6 +101,12 @@ def run_skillset(
     if refusals:
         sys.stderr.write(f"{refusals[0]}\n")
         sys.exit(REFUSED)
+
+
+def warn_of_names_outside(node: Node) -> None:
+    """Tell which names of a node in a namespace are not in it: its hooks would hear and command another robot, or nobody."""
+    if outside := names_outside(node) if node.get_namespace() != "/" else []:
+        node.get_logger().warning(f"not in {node.get_namespace()}: {', '.join(outside)}; hooks write names without the slash in front")
 
 
 def rivals_there(skillset: str) -> bool:
@@ -148,7 +150,7 @@ def make_part(
 
 def _options(skillset: Skillset, arguments: Sequence[str]) -> tuple[argparse.Namespace, list[str]]:
     """Return the options of this command and the words for ROS."""
-    words = ros2_arguments(arguments)
+    words = without_roslaunch(arguments)
     split = words.index(ROS_ARGUMENTS) if ROS_ARGUMENTS in words else len(words)
     skills = [skill.name for skill in skillset.skills]
     parser = argparse.ArgumentParser(description=f"Serve the skillset {skillset.name}.", epilog="ROS arguments follow after --ros-args.")

@@ -165,6 +165,24 @@ def test_goals_have_the_right_states_for_plain_action_clients(navigation):
     client.destroy()
 
 
+def test_what_hooks_have_outside_of_the_namespace_is_told(spinning):
+    from geometry_msgs.msg import Point
+    from navigation_interfaces.action import Hover
+    from rclpy.node import Node
+    from std_srvs.srv import Trigger
+
+    from skillset_ros2 import ActionClient
+    from skillset_ros2.names import names_outside
+
+    node = spinning.spin(Node("hooks_outside", namespace="/uav1"))
+    for slash in ("", "/"):
+        node.create_subscription(Point, f"{slash}heard", print, 1)
+        node.create_publisher(Point, f"{slash}told", 1)
+        node.create_client(Trigger, f"{slash}called")
+        ActionClient(node, Hover, f"{slash}done")
+    assert names_outside(node) == ["/called", "/done", "/heard", "/told"]
+
+
 def test_time_is_the_mission_clock_and_names_follow_the_namespace(spinning):
     parameters = [Parameter("use_sim_time", value=True)]
     navigation = Navigation(spinning, namespace="uav1", parameter_overrides=parameters)

@@ -18,6 +18,9 @@ UAV = str(ALULA_ROOT / "skillsets/uav")
 QUICK = "skills:\n  navigation.takeoff: {delay: 0.3, progress: f, then: [{after: 0.1, set: {navigation.flight_status: IN_AIR}}]}\n"
 
 
+OBSTACLE = "data: {perception.zed_obstacle: {period: 0.1, value: {distance_m: 2.5}}}\n"
+
+
 class MockProcess:
     """The process; its words are kept for failures."""
 
@@ -45,14 +48,14 @@ class MockProcess:
 class Caller:
     """A node with clients, spun by its waits."""
 
-    def __init__(self, *skillsets: str) -> None:
+    def __init__(self, *skillsets: str, namespace: str = "") -> None:
         from rclpy.executors import SingleThreadedExecutor
         from rclpy.node import Node
 
         from skillset_ros2 import SkillsetClient
 
         self.node = Node("skill_runtime_mock_caller")
-        self.clients = {name: SkillsetClient(self.node, name) for name in skillsets}
+        self.clients = {name: SkillsetClient(self.node, name, namespace=namespace) for name in skillsets}
         self._executor = SingleThreadedExecutor()
         self._executor.add_node(self.node)
 
@@ -61,7 +64,10 @@ class Caller:
         while not what():
             missing = {name: client.missing for name, client in self.clients.items()}
             assert time.monotonic() < end, f"it did not come; missing: {missing}"
-            self._executor.spin_once(timeout_sec=0.05)
+            self.turn()
+
+    def turn(self) -> None:
+        self._executor.spin_once(timeout_sec=0.05)
 
     def close(self) -> None:
         self._executor.shutdown(timeout_sec=0)
@@ -72,8 +78,8 @@ class Caller:
 def call(ros2_domain):
     made = []
 
-    def call(*skillsets: str) -> Caller:
-        made.append(Caller(*skillsets))
+    def call(*skillsets: str, namespace: str = "") -> Caller:
+        made.append(Caller(*skillsets, namespace=namespace))
         return made[-1]
 
     yield call
@@ -153,18 +159,69 @@ def test_one_generated_skillset_is_mocked_on_the_simulated_clock(mock, call):
 
 
 def test_data_are_published_where_the_functional_layer_would(mock, call, tmp_path):
-    text = "data: {perception.zed_obstacle: {period: 0.1, value: {distance_m: 2.5}}}\n"
     from uav_msgs.msg import Obstacle
 
-    field = next(name for name, kind in Obstacle.get_fields_and_field_types().items() if kind in {"double", "float"})
-    (tmp_path / "data.yaml").write_text(text.replace("distance_m", field))
+    (tmp_path / "data.yaml").write_text(OBSTACLE)
     mock("perception_managers.mock", "--behaviour", str(tmp_path / "data.yaml"))
     caller = call("perception")
     seen: list = []
     caller.node.create_subscription(Obstacle, "/perception/data/zed_obstacle", seen.append, 10)
     caller.wait(lambda: len(seen) > 2)
-    assert getattr(seen[-1], field) == 2.5
+    assert seen[-1].distance_m == 2.5
     assert seen[-1].header.stamp.sec > 0
+
+
+def test_two_robots_with_a_skillset_of_one_name_share_a_domain_and_nothing_else(mock, call, tmp_path):
+    """Skills, events, states, transitions, data of the functional layer and the clock are each robot's own."""
+    from rclpy.qos import QoSProfile
+    from rosgraph_msgs.msg import Clock
+    from skillset_interfaces.msg import Event
+
+    (tmp_path / "data.yaml").write_text(OBSTACLE)
+    for space, words in {"/one": ("--behaviour", str(tmp_path / "data.yaml")), "/two": ()}.items():
+        clock = ("-r", f"__ns:={space}", "-r", f"/clock:={space}/clock", "-p", "use_sim_time:=true")
+        mock("skillset_ros2.mock", UAV, "--skillset", "perception", *words, "--ros-args", *clock)
+    callers = [call("perception", namespace=space) for space in ("/one", "/two")]
+    one, two = (caller.clients["perception"] for caller in callers)
+    node, now = callers[0].node, Clock()
+    clocks = [node.create_publisher(Clock, f"{space}/clock", QoSProfile(depth=10)) for space in ("/one", "/two")]
+    heard: list[list[Event]] = [[], []]
+    for space, events in zip(("/one", "/two"), heard, strict=True):
+        node.create_subscription(Event, f"{space}/perception/events", events.append, 100)
+
+    def until(what, *ticking) -> None:
+        def look() -> bool:
+            now.clock.sec += 1
+            for clock in ticking:
+                clock.publish(now)
+            callers[1].turn()
+            return what()
+
+        callers[0].wait(look)
+
+    until(lambda: one.ready and two.ready and one.resources["zed_status"] == two.resources["zed_status"] == "OK", *clocks)
+    watch, other = one.start("zed_depthmap"), two.start("lidar_depthmap")
+    until(lambda: watch.state.name == other.state.name == "RUNNING")
+    none = one.interrupt_all("lidar_depthmap")
+    until(lambda: none.done)
+    assert none.value == 0
+    broken = one.transition("zed_status", "BROKEN")
+    until(lambda: broken.done and watch.done)
+    assert (watch.outcome, watch.result) == ("RESOURCE_INVARIANT_VIOLATED", "zed_ok")
+    received: list[bool] = []
+
+    def answered() -> bool:
+        """Ask one robot after the other for what the first one's functional layer publishes."""
+        told = [client.read_data("zed_obstacle") for client in (one, two)]
+        until(lambda: all(answer.done for answer in told), clocks[0])
+        received[:] = [answer.value.received for answer in told]
+        return received[0]
+
+    while not answered():
+        pass
+    assert received == [True, False]
+    assert (other.state.name, two.resources["zed_status"], one.resources["zed_status"]) == ("RUNNING", "OK", "BROKEN")
+    assert [{event.skill for event in events if event.skill} for events in heard] == [{"zed_depthmap"}, {"lidar_depthmap"}]
 
 
 @pytest.mark.parametrize(

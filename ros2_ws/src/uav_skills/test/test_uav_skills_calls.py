@@ -24,7 +24,7 @@ class Future:
 
 @dataclass
 class FakeService:
-    srv_name: str
+    service_name: str
     ready: bool = True
     sent: list = field(default_factory=list)
     forgotten: list = field(default_factory=list)

@@ -33,7 +33,7 @@ Reply = Callable[[Response], None]
 class Service(Protocol):
     """What is needed of an rclpy service client."""
 
-    srv_name: str
+    service_name: str
 
     def service_is_ready(self) -> bool:
         """Tell whether a server is there."""
@@ -64,7 +64,7 @@ class _Call:
         return self.sent_s is None or now_s - self.sent_s < ARRIVED_AFTER_S
 
     def refusal(self) -> Response:
-        name = self.service.srv_name
+        name = self.service.service_name
         if self.sent_s is None:
             return Response(accepted=False, reason=f"service {name} is not there for {SERVER_TIMEOUT_S:g} s")
         return Response(accepted=False, reason=f"service {name} does not answer for {RESPONSE_TIMEOUT_S:g} s")

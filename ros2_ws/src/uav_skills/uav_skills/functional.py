@@ -79,12 +79,12 @@ class GuidanceApi(FunctionalPart):
         self._orphans = orphans
         self.state: GuidanceState | None = None
         self._listeners: list[Callable[[GuidanceState], None]] = []
-        self._takeoff = self._client(Takeoff, "/uav_guidance/takeoff")
-        self._position = self._client(SetPositionReference, "/uav_guidance/set_position")
-        self._heading = self._client(SetHeadingReference, "/uav_guidance/set_heading")
-        self._hover = self._client(Command, "/uav_guidance/hover")
-        self._land = self._client(Command, "/uav_guidance/land")
-        self._subscribe(GuidanceState, "/uav_guidance/state", self._on_state)
+        self._takeoff = self._client(Takeoff, "uav_guidance/takeoff")
+        self._position = self._client(SetPositionReference, "uav_guidance/set_position")
+        self._heading = self._client(SetHeadingReference, "uav_guidance/set_heading")
+        self._hover = self._client(Command, "uav_guidance/hover")
+        self._land = self._client(Command, "uav_guidance/land")
+        self._subscribe(GuidanceState, "uav_guidance/state", self._on_state)
 
     def listen(self, listener: Callable[[GuidanceState], None]) -> None:
         """Pass every state on to ``listener``."""
@@ -131,8 +131,8 @@ class DepthApi(FunctionalPart):
     def __init__(self, node: Node, node_name: str) -> None:
         super().__init__(node)
         self.heard_s: float | None = None
-        self._enable = self._client(SetBool, f"/{node_name}/enable")
-        self._subscribe(Obstacle, f"/{node_name}/obstacle", self._on_obstacle)
+        self._enable = self._client(SetBool, f"{node_name}/enable")
+        self._subscribe(Obstacle, f"{node_name}/obstacle", self._on_obstacle)
 
     def enable(self, *, on: bool, reply: Reply = ignore_response) -> None:
         """Start or stop the obstacle detection."""
@@ -150,12 +150,12 @@ class MappingApi(FunctionalPart):
         super().__init__(node)
         self.state: MappingState | None = None
         self.registered_s: float | None = None
-        self._enable = self._client(SetBool, "/lidar_mapping/enable")
-        self._save = self._client(Trigger, "/lidar_mapping/save")
+        self._enable = self._client(SetBool, "lidar_mapping/enable")
+        self._save = self._client(Trigger, "lidar_mapping/save")
         self.lidar_fault = ""
         """Why the LiDAR is not believed; empty when it is well."""
-        self._subscribe(MappingState, "/lidar_mapping/state", self._on_state)
-        self._subscribe(ResourceStates, "/perception/resource_states", self._on_perception, LATCHED)
+        self._subscribe(MappingState, "lidar_mapping/state", self._on_state)
+        self._subscribe(ResourceStates, "perception/resource_states", self._on_perception, LATCHED)
 
     def enable(self, *, on: bool, reply: Reply = ignore_response) -> None:
         """Start or stop the registration of scans."""
@@ -185,8 +185,8 @@ class VideoApi(FunctionalPart):
         """When the encoder last said that it sends."""
         self.told_idle = False
         """Whether it said last that it doesn't."""
-        self._stream = self._client(Stream, "/video_stream/stream")
-        self._subscribe(VideoState, "/video_stream/state", self._on_state)
+        self._stream = self._client(Stream, "video_stream/stream")
+        self._subscribe(VideoState, "video_stream/state", self._on_state)
 
     def begin(self, *, min_fps: float, min_quality: float, patience_s: float, reply: Reply) -> None:
         """Send, with what the telepilot needs at least."""

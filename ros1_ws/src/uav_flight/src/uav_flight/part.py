@@ -95,8 +95,8 @@ class DronePart(RunPart):
         flight = Flight.of(spec)
         port = flight.body_port
         if flight.sensors == "simulated" and flight.autopilot is not None and not port:
-            port = body_port(read_connection(flight.autopilot), spec.domain)
-        radio_port = udp_ports_of(spec.domain, first=RADIO_PORT, step=RADIO_PORTS, count=RADIO_PORTS)
+            port = body_port(read_connection(flight.autopilot), spec.seat)
+        radio_port = udp_ports_of(spec.seat, first=RADIO_PORT, step=RADIO_PORTS, count=RADIO_PORTS)
         return asdict(replace(flight, body_port=port, radio_port=radio_port))
 
     def words(self, spec: RunSpec) -> list[str]:

@@ -12,6 +12,11 @@ from alula.runtime.plain import to_plain
 Subscribers = dict[str, list[Callable[[Any], None]]]
 
 
+def absolute(name: str) -> str:
+    """Return a name of a node without a namespace as the functional layer has it."""
+    return f"/{name.lstrip('/')}"
+
+
 class RecordedFuture:
     """An answer that comes, or does not."""
 
@@ -42,7 +47,7 @@ class RecordedService:
     """A client of a service whose answers are recorded."""
 
     def __init__(self, name: str, answer: Answer) -> None:
-        self.srv_name = name
+        self.service_name = name
         self._answer = answer
 
     def service_is_ready(self) -> bool:
@@ -51,7 +56,7 @@ class RecordedService:
 
     def call_async(self, request: Any) -> RecordedFuture:
         """Return a future of the recorded response to this request."""
-        return self._answer(self.srv_name, to_plain(request))
+        return self._answer(self.service_name, to_plain(request))
 
     def remove_pending_request(self, future: RecordedFuture) -> None:
         """Do nothing: no request is pending here."""
@@ -93,11 +98,11 @@ class BagNode:
 
     def create_client(self, _kind: object, name: str, **_: object) -> RecordedService:
         """Return a client that the record answers."""
-        return RecordedService(name, self._answer)
+        return RecordedService(absolute(name), self._answer)
 
     def create_subscription(self, _kind: object, topic: str, callback: Callable[[Any], None], *_: object, **__: object) -> None:
         """Have the callback called with each recorded message of a topic."""
-        self._subscribers.setdefault(topic, []).append(callback)
+        self._subscribers.setdefault(absolute(topic), []).append(callback)
 
     def declare_parameter(self, _name: str, value: object) -> SimpleNamespace:
         """Return a parameter with its default: a replay has no others."""

@@ -54,7 +54,7 @@ class Localise(AbstractLocaliseSkill):
         self._watch = watch
         self._execution: Execution | None = None
         self._called_s = 0.0
-        self._service = node.create_client(Trigger, "/localize")
+        self._service = node.create_client(Trigger, "localize")
         watch.every(self._look)
 
     def on_dispatch(self, execution: Execution) -> None:
@@ -85,8 +85,8 @@ class StopHere(AbstractStopHereSkill):
 
     def __init__(self, node: Node, watch: Watch) -> None:
         self._execution: Execution | None = None
-        self._commands = node.create_publisher(Twist, "/cmd_vel", 5)
-        node.create_subscription(Odometry, "/odom", self._on_odometry, 5)
+        self._commands = node.create_publisher(Twist, "cmd_vel", 5)
+        node.create_subscription(Odometry, "odom", self._on_odometry, 5)
         watch.every(self._command)
 
     def on_dispatch(self, execution: Execution) -> None:
@@ -114,10 +114,10 @@ def make_hooks(node: Node) -> dict[str, SkillHooks]:
     """Make the hooks of all skills."""
     watch = Watch(node)
     return {
-        "drive_to": DriveTo(node, watch, "/move_base"),
-        "follow_corridor": FollowCorridor(node, watch, "/follow_corridor"),
-        "creep": Creep(node, watch, "/creep"),
-        "dock": Dock(node, watch, "/dock"),
+        "drive_to": DriveTo(node, watch, "move_base"),
+        "follow_corridor": FollowCorridor(node, watch, "follow_corridor"),
+        "creep": Creep(node, watch, "creep"),
+        "dock": Dock(node, watch, "dock"),
         "localise": Localise(node, watch),
         "stop_here": StopHere(node, watch),
     }

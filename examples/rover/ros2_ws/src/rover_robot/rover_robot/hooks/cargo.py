@@ -31,8 +31,8 @@ class Question(SkillHooks):
         self._watch = watch
         self._execution: Execution | None = None
         self._asked_s = 0.0
-        self._voice = node.create_publisher(String, "/person/ask", 5)
-        node.create_subscription(String, "/person/answer", self._on_answer, 5)
+        self._voice = node.create_publisher(String, "person/ask", 5)
+        node.create_subscription(String, "person/answer", self._on_answer, 5)
         watch.every(self._look)
 
     def text(self, inputs: object) -> str:
@@ -110,7 +110,7 @@ class OpenDoor(AbstractOpenDoorSkill):
     def _client(self, door: str) -> Client[SetBool.Request, SetBool.Response]:
         """Return the one client of a door."""
         if door not in self._clients:
-            self._clients[door] = self._node.create_client(SetBool, f"/door/{door}/open")
+            self._clients[door] = self._node.create_client(SetBool, f"door/{door}/open")
         return self._clients[door]
 
     def _on_answer(self, execution: Execution, answer: SetBool.Response) -> None:

@@ -64,4 +64,4 @@ class Bumper(Eye, AbstractBumperSkill):
 def make_hooks(node: Node) -> dict[str, SkillHooks]:
     """Make the hooks of all skills."""
     watch = Watch(node)
-    return {"scan": Scan(node, watch, "/scan", LaserScan), "bumper": Bumper(node, watch, "/bumper", Bool)}
+    return {"scan": Scan(node, watch, "scan", LaserScan), "bumper": Bumper(node, watch, "bumper", Bool)}

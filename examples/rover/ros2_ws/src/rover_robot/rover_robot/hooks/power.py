@@ -28,7 +28,7 @@ class Battery:
     def __init__(self, node: Node, watch: Watch) -> None:
         self.watch = watch
         self._told: deque[tuple[float, float]] = deque()
-        node.create_subscription(BatteryState, "/battery_state", self._on_state, 5)
+        node.create_subscription(BatteryState, "battery_state", self._on_state, 5)
 
     @property
     def level(self) -> float | None:
