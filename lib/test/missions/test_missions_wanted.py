@@ -399,6 +399,26 @@ def test_a_refusal_is_told_where_a_tick_needs_more_of_another_skillset(tmp_path:
         assert not play(path, one.run, NO_PART).left
 
 
+REACHING = """
+skillset arm {
+  skill reach { input { height: float64 } success DONE }
+}
+"""
+
+
+def test_inputs_that_a_function_may_refuse_need_an_answer_and_the_refusal_plays(tmp_path: Path) -> None:
+    (robot,) = check_texts([ModelFile("arm.rl", REACHING)])
+    path = written(tmp_path, "", '<arm.reach height="1.0"/>')
+    (finding,) = prove_mission(path, robot.skillsets, NO_PART).findings
+    assert (finding.code, "is refused: NOT_VALIDATED" in finding.message) == ("ALU705", True)
+    assert isinstance(finding, MissionFinding)
+    assert finding.run is not None
+    played = play(path, finding.run, NO_PART)
+    assert (played.left, played.end.outcome.value) == ("", "given_up")
+    path = written(tmp_path, "", '<Fallback><arm.reach height="1.0"/><AlwaysFailure/></Fallback>')
+    assert prove_mission(path, robot.skillsets, NO_PART).findings == []
+
+
 DRIVING = """
 skillset rover {
   resource wheels { state { FREE USED } initial FREE transition { FREE -> USED USED -> FREE } }

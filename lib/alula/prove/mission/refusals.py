@@ -12,10 +12,14 @@ from alula.prove.mission.state import Event, Kind, State
 
 @dataclass(frozen=True)
 class Refusal:
-    """A refused request that ends the mission; ``race``: what changed between the request and its arrival, empty where nothing did."""
+    """A refused request that ends the mission, as NOT_READY or NOT_VALIDATED (``how``).
+
+    ``race``: what changed between the request and its arrival, empty where nothing did.
+    """
 
     events: tuple[Event, ...]
     state: State
+    how: str
     by: str
     race: str
 
@@ -35,7 +39,7 @@ def refusal_of(regions: Regions, row: Row) -> Refusal | None:
     at = max(at for at, event in enumerate(events[:before]) if event.kind is Kind.REFUSE and event.leaf == row.leaf)
     by = " ".join(filter(None, (events[at].state, events[at].result and f"({events[at].result})")))
     asked = max((one for one, event in enumerate(events[:at]) if row.leaf in event.started), default=0)
-    return Refusal(tuple(events), state, by, ", ".join(_changes(events[asked:at], events[at].skillset)))
+    return Refusal(tuple(events), state, events[at].state, by, ", ".join(_changes(events[asked:at], events[at].skillset)))
 
 
 def failing(regions: Regions, row: Row) -> Way | None:
