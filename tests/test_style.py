@@ -35,6 +35,7 @@ TYPED = [
     "tools/console_bench",
     "tools/perception_bench",
     "tools/log_mutations",
+    "tools/mission_mutations",
     *(f"ros2_ws/src/{name}/{name}" for name in ROS2_PACKAGES),
     *(f"ros1_ws/src/{name}/src/{name}" for name in ROS1_PACKAGES),
 ]

@@ -377,6 +377,48 @@ def test_a_request_that_fails_in_both_ways_has_both_findings(tmp_path: Path) -> 
     assert all("is refused" not in "".join(one.example[-1:]) for one in found.findings if one.code == "ALU702")
 
 
+WATCHING = """
+skillset eyes {
+  resource light { state { ON OFF } initial ON transition { extern ON -> OFF  extern OFF -> ON } }
+  skill watch { invariant { lit { guard light == ON } } success DONE failure LOST }
+}
+"""
+
+
+def test_a_refusal_is_told_where_a_tick_needs_more_of_another_skillset(tmp_path: Path) -> None:
+    """The tick that sees the refusal is taken with managers of `eyes` that more steps lead to than to any that go with the refusal."""
+    (robot,) = check_texts([ModelFile("both.rl", WATCHING + ROBOT)])
+    first = "<drone.land/><Sequence><drone.hover/><drone.climb/></Sequence>"
+    both = "".join(f'<Parallel success_count="1" failure_count="1">{one}</Parallel>' for one in (first, "<drone.land/><eyes.watch/>"))
+    path = written(tmp_path, "", f"<Fallback>{both}</Fallback>")
+    found = [one for one in prove_mission(path, robot.skillsets, NO_PART).findings if one.code == "ALU705"]
+    assert found
+    for one in found:
+        assert isinstance(one, MissionFinding)
+        assert one.run is not None
+        assert not play(path, one.run, NO_PART).left
+
+
+REACHING = """
+skillset arm {
+  skill reach { input { height: float64 } success DONE }
+}
+"""
+
+
+def test_inputs_that_a_function_may_refuse_need_an_answer_and_the_refusal_plays(tmp_path: Path) -> None:
+    (robot,) = check_texts([ModelFile("arm.rl", REACHING)])
+    path = written(tmp_path, "", '<arm.reach height="1.0"/>')
+    (finding,) = prove_mission(path, robot.skillsets, NO_PART).findings
+    assert (finding.code, "is refused: NOT_VALIDATED" in finding.message) == ("ALU705", True)
+    assert isinstance(finding, MissionFinding)
+    assert finding.run is not None
+    played = play(path, finding.run, NO_PART)
+    assert (played.left, played.end.outcome.value) == ("", "given_up")
+    path = written(tmp_path, "", '<Fallback><arm.reach height="1.0"/><AlwaysFailure/></Fallback>')
+    assert prove_mission(path, robot.skillsets, NO_PART).findings == []
+
+
 DRIVING = """
 skillset rover {
   resource wheels { state { FREE USED } initial FREE transition { FREE -> USED USED -> FREE } }

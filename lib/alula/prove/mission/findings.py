@@ -43,7 +43,7 @@ def _left_taken(regions: Regions) -> Iterator[Diagnostic]:
         for place, closure in enumerate(regions.regions[number].closures):
             for one in sorted(closure.all, key=closure.depth.__getitem__):
                 managers = system.managers_of(one)
-                if any(execution.phase != "ended" for execution in managers.executions) or not managers.states:
+                if any(execution.phase != "ended" for execution in managers.executions) or managers.states is None:
                     continue
                 lost = _lost(regions, place, one)
                 if not lost or (place, lost) in told_already:
@@ -76,8 +76,9 @@ def _startable(regions: Regions, place: int, number: int) -> set[str]:
     names = [resource.name for resource in skillset.resources]
     found: set[str] = set()
     for one in closure.all:
-        states = dict(zip(names, system.managers_of(one).states, strict=False))
-        if states:
+        known = system.managers_of(one).states
+        if known is not None:
+            states = dict(zip(names, known, strict=True))
             found |= {skill.name for skill in skillset.skills if not any(semantics.unmet_preconditions(skill, states, {}))}
     return found
 
@@ -89,8 +90,8 @@ def _unanswered(regions: Regions, answers: Answers) -> Iterator[Diagnostic]:
         if row.starts or row.outcomes & GOOD or not row.loses or not row.outcomes:
             continue
         refusal = refusal_of(regions, row)
-        if refusal is not None and (row.leaf, "ALU705") not in seen:
-            seen.add((row.leaf, "ALU705"))
+        if refusal is not None and (row.leaf, refusal.how) not in seen:
+            seen.add((row.leaf, refusal.how))
             yield _refused(regions, row, refusal)
         way = failing(regions, row)
         if way is None or (row.leaf, "ALU702") in seen:

@@ -82,7 +82,7 @@ class ManagersSteps:
 
     def moves(self, managers: Managers) -> Iterator[tuple[Event, Managers]]:
         """Yield each thing that can happen in them or to them."""
-        if not managers.states:
+        if managers.states is None:
             if self._failures.deaths:
                 yield Event(Kind.RESTART, self.model.name), Managers(self.initial().states, managers.executions)
             return
@@ -99,7 +99,7 @@ class ManagersSteps:
 
     def resource(self, managers: Managers, name: str) -> str | None:
         """Return the state of a resource, None where they have died."""
-        return managers.states[self._names.index(name)] if managers.states else None
+        return None if managers.states is None else managers.states[self._names.index(name)]
 
     # --- steps -------------------------------------------------------------------------------------------------------
 
@@ -156,7 +156,7 @@ class ManagersSteps:
         state = ExecutionState.FAILED.value
         left = [one if one.phase == ENDED else self._ended(one, state) for one in managers.executions]
         ended = tuple(self._ending(one, state) for one in managers.executions if one.phase != ENDED)
-        return Event(Kind.DIE, self.model.name, failure=True, ended=ended), Managers((), _ordered(left))
+        return Event(Kind.DIE, self.model.name, failure=True, ended=ended), Managers(None, _ordered(left))
 
     def _extern(self, managers: Managers, situation: Situation) -> Iterator[tuple[Event, Managers]]:
         for resource in self._skillset.resources:
@@ -177,7 +177,7 @@ class ManagersSteps:
 
     def _situation(self, managers: Managers) -> Situation:
         running = tuple(Running(str(one.leaf), self.skills[one.leaf]) for one in managers.executions if one.phase == RUNNING)
-        return Situation(dict(zip(self._names, managers.states, strict=True)), running)
+        return Situation(dict(zip(self._names, managers.states or (), strict=True)), running)
 
     def _managers(self, situation: Situation, others: tuple[Execution, ...]) -> Managers:
         return Managers(tuple(situation.states[name] for name in self._names), others)

@@ -84,9 +84,13 @@ class _Answers(Oracle):
 class _Function(SkillHooks):
     """A function that ends when the run says so, also when it was interrupted."""
 
-    def __init__(self, running: dict[str, Execution], told: dict[str, float]) -> None:
+    def __init__(self, running: dict[str, Execution], told: dict[str, float], refuses: Callable[[], bool]) -> None:
         self._running = running
         self._told = told
+        self._refuses = refuses
+
+    def validate(self, _: object) -> str:
+        return "as in the counterexample" if self._refuses() else ""
 
     def on_dispatch(self, execution: Execution) -> None:
         self._running[execution.id] = execution
@@ -125,11 +129,13 @@ class _Player:
         self._running: dict[str, Execution] = {}
         self._told: dict[str, float] = {}
         """The progress that functions tell."""
+        self._refusing = False
+        """Whether the function that is asked now refuses the inputs."""
         self._handles: dict[int, SkillHandle] = {}
         self._oracle = _Answers()
         playables = [playable(one) for one in run.skillsets]
         self._data = {one.skillset.name: one.data for one in playables}
-        make = lambda managers: {one.name: _Function(self._running, self._told) for one in managers.skillset.skills}  # noqa: E731
+        make = lambda managers: {one.name: self._function() for one in managers.skillset.skills}  # noqa: E731
         self.world = LocalWorld([one.skillset for one in playables], make)
         nodes = MissionPart(opaque(Robot(self._oracle), part).nodes, memory=part.memory)
         plan = plan_of_file(path, path.stem, run.skillsets, _Unknown(), nodes)
@@ -145,6 +151,9 @@ class _Player:
             node.leaf.with_inputs({})
         self.world.on_event(lambda _, event: self._driver.event(event))
         self.world.run_for(0.0)
+
+    def _function(self) -> _Function:
+        return _Function(self._running, self._told, lambda: self._refusing)
 
     def take(self, event: Event) -> None:
         """Have it happen; raise LeftError where it does not."""
@@ -229,8 +238,10 @@ class _Player:
         by_data = event.failure and event.state == ExecutionState.NOT_READY.value
         if by_data:
             self._say_data(event.skillset, refuses(event.name, event.result))
+        self._refusing = event.state == ExecutionState.NOT_VALIDATED.value
         self._held.pop(handle.id)()
         self.world.run_for(0.0)
+        self._refusing = False
         if by_data:
             self._say_data(event.skillset, AS_WANTED)
         found = f"{handle.state.value} {handle.result}".strip()

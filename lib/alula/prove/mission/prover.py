@@ -24,8 +24,8 @@ from alula.prove.mission.system import System
 from alula.prove.mission.waits import Waits
 from alula.prove.mission.wanted import wanted
 
-LOOKED_AT = Failures(refusals=False, hooks=False, aborts=False)
-"""What the models say can fail; hooks that raise or refuse, processes that die and aborts are not looked at by default."""
+LOOKED_AT = Failures(hooks=False, aborts=False)
+"""What the models say can fail, and functions that refuse inputs; hooks that raise, processes that die and aborts are left out."""
 
 
 @dataclass(frozen=True)

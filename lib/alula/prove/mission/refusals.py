@@ -12,10 +12,14 @@ from alula.prove.mission.state import Event, Kind, State
 
 @dataclass(frozen=True)
 class Refusal:
-    """A refused request that ends the mission; ``race``: what changed between the request and its arrival, empty where nothing did."""
+    """A refused request that ends the mission, as NOT_READY or NOT_VALIDATED (``how``).
+
+    ``race``: what changed between the request and its arrival, empty where nothing did.
+    """
 
     events: tuple[Event, ...]
     state: State
+    how: str
     by: str
     race: str
 
@@ -29,12 +33,13 @@ def refusal_of(regions: Regions, row: Row) -> Refusal | None:
     if not refused:
         return None
     number = min(refused, key=closure.depth.__getitem__)
-    before = len(regions.run(row.region, {place: number}))
-    events, state = regions.run_on(row.region, outcome, (*sets[:place], frozenset({number}), *sets[place + 1 :]))
+    refusing = (*sets[:place], frozenset({number}), *sets[place + 1 :])
+    before = len(regions.run(row.region, dict(enumerate(regions.soonest(row.region, refusing)))))
+    events, state = regions.run_on(row.region, outcome, refusing)
     at = max(at for at, event in enumerate(events[:before]) if event.kind is Kind.REFUSE and event.leaf == row.leaf)
     by = " ".join(filter(None, (events[at].state, events[at].result and f"({events[at].result})")))
     asked = max((one for one, event in enumerate(events[:at]) if row.leaf in event.started), default=0)
-    return Refusal(tuple(events), state, by, ", ".join(_changes(events[asked:at], events[at].skillset)))
+    return Refusal(tuple(events), state, events[at].state, by, ", ".join(_changes(events[asked:at], events[at].skillset)))
 
 
 def failing(regions: Regions, row: Row) -> Way | None:

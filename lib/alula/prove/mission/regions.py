@@ -233,13 +233,18 @@ class Regions:
             tick = Event(KINDS[ticked.act], started=started, interrupted=interrupted, choices=choices, touched=touched)
             events.insert(0, tick)
 
+    def soonest(self, number: int, sets: Sets) -> tuple[int, ...]:
+        """Return managers of these sets that a run to a region comes to by the fewest steps."""
+        closures = self.regions[number].closures
+        return tuple(min(known, key=one.depth.__getitem__) for known, one in zip(sets, closures, strict=True))
+
     def run_on(self, number: int, outcome: Outcome, sets: Sets, most: int = 20_000) -> tuple[list[Event], State]:
         """Return a run to a region, through a tick with some managers of these sets and on to an end, and the situation at its end.
 
         It ends after the tick where none of the next ``most`` situations is an end.
         """
-        region, system = self.regions[number], self.system
-        goal = tuple(min(known, key=one.depth.__getitem__) for known, one in zip(sets, region.closures, strict=True))
+        system = self.system
+        goal = self.soonest(number, sets)
         events = self.run(number, dict(enumerate(goal)))
         started, interrupted, choices, touched = outcome[1:]
         events.append(Event(Kind.TICK, started=started, interrupted=interrupted, choices=choices, touched=touched))

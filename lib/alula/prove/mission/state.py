@@ -54,11 +54,11 @@ class Execution(NamedTuple):
 class Managers(NamedTuple):
     """The managers of one skillset.
 
-    ``states`` are those of its resources in the model's order, none where the managers have died; in ``executions`` those that run come
+    ``states`` are those of its resources in the model's order, None where the managers have died; in ``executions`` those that run come
     first, in the order of their start.
     """
 
-    states: tuple[str, ...]
+    states: tuple[str, ...] | None
     executions: tuple[Execution, ...] = ()
 
 

@@ -228,7 +228,7 @@ class System:
             case ("resource", str(skillset), str(name)):
                 return self._steps[self._place[skillset]].resource(managers, name)
             case ("alive", _):
-                return bool(managers.states)
+                return managers.states is not None
             case ("execution", int(leaf)):
                 known = next(one for one in managers.executions if one.leaf == leaf)
                 return (known.phase, known.state, known.result) if known.phase == ENDED else (known.phase,)

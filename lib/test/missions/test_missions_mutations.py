@@ -1,0 +1,150 @@
+"""The mutation study: what it says of altered missions is so, and of a seeded few of the drone's none is missed."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from dataclasses import replace
+from pathlib import Path
+
+import pytest
+
+from alula.common.robots import find_robot
+from alula.language.models import ModelFile, check_texts
+from alula.missions.check.page import whole
+from alula.missions.filed.part import NO_PART
+from alula.model.model import Skillset
+from alula.prove.mission.page import ROBOT
+from alula.prove.mission.prover import LOOKED_AT
+from alula.prove.mission.state import State
+from alula.prove.mission.system import System
+from mission_mutations import models
+from mission_mutations.__main__ import judged, mutants
+from mission_mutations.judging import ANOTHER_RUN, ANSWERS, EQUAL, FOUND, Judge, Robot, Verdict
+from mission_mutations.mutants import KINDS, Mutant, chosen, mutants_of
+
+ROOT = find_robot(Path(__file__)).root
+(DRONE,) = check_texts([ModelFile("robot.rl", ROBOT)])[0].skillsets
+GOOD = """<Fallback>
+  <Sequence><drone.lift/><Parallel success_count="1" failure_count="1"><drone.hover/><AlwaysSuccess/></Parallel></Sequence>
+  <RetryUntilSuccessful num_attempts="2"><drone.land/></RetryUntilSuccessful>
+  <AlwaysFailure/>
+</Fallback>"""
+TWO_WAYS = """<Fallback>
+  <drone.hover outcome="{how}"/>
+  <Sequence><ScriptCondition code="how == 'ABORTED'"/><drone.lift/></Sequence>
+  <drone.land/>
+</Fallback>"""
+COUNTS = """<Sequence>
+  <Script code="rounds := 0"/>
+  <Until if="rounds &gt;= 3">
+    <Sequence><ForceSuccess><drone.hover/></ForceSuccess><Script name="one more" code="rounds += 1"/></Sequence>
+  </Until>
+</Sequence>"""
+
+
+def judge_of(folder: Path, text: str) -> Judge:
+    (folder / "example.xml").write_text(whole(text))
+    return Judge(Robot(folder, (DRONE,), NO_PART, {}), "example")
+
+
+def verdict(folder: Path, before: str, after: str) -> Verdict:
+    return judge_of(folder, before).judge(Mutant("example", "by hand", "", "example.xml", whole(after)))
+
+
+def test_what_is_not_given_back_is_found_and_flies(tmp_path: Path) -> None:
+    judge = judge_of(tmp_path, GOOD)
+    what, model = next((what, model) for _, what, model in models.altered(DRONE, ["lift"]) if "broken" in what)
+    one = judge.judge(Mutant("example", "by hand", what, skillset=model))
+    assert (one.verdict, one.by, one.flown) == (FOUND, "ALU701", True)
+
+
+def test_another_answer_is_found_beside_the_original_and_a_flight_tells_them_apart(tmp_path: Path) -> None:
+    skills = ("<drone.lift/>", "<drone.hover/>")
+    one = verdict(tmp_path, *(f"<Fallback>{first}{then}<drone.land/></Fallback>" for first, then in (skills, skills[::-1])))
+    assert (one.verdict, one.by, one.flown) == (FOUND, ANSWERS, True)
+
+
+def test_what_does_the_same_is_equal(tmp_path: Path) -> None:
+    never = TWO_WAYS.replace("<drone.land/>", "<ForceSuccess><drone.land/></ForceSuccess>")
+    assert (
+        verdict(tmp_path, never, never.replace("<drone.lift/></Sequence>", "<Sequence><drone.lift/></Sequence></Sequence>")).verdict
+        == EQUAL
+    )
+
+
+def test_numbers_that_the_search_does_not_know_are_not_said_to_be_equal(tmp_path: Path) -> None:
+    for before, after in (("rounds += 1", "rounds += 2"), ("rounds := 0", "rounds := 1"), ("rounds &gt;= 3", "!(rounds &gt;= 3)")):
+        assert verdict(tmp_path, COUNTS, COUNTS.replace(before, after)).verdict != EQUAL, after
+
+
+def observed(folder: Path, text: str, skillset: Skillset) -> set[object]:
+    """Return all that can be seen of a mission's situations, one looked at after another."""
+    (folder / "seen.xml").write_text(text)
+    system = System.read(folder / "seen.xml", (skillset,), NO_PART, LOOKED_AT)
+    first = system.initial()
+    known, todo = {first}, [first]
+    while todo:
+        for _, after in system.steps(todo.pop()):
+            if after not in known:
+                known.add(after)
+                todo.append(after)
+    return {_seen(system, state) for state in known}
+
+
+def _seen(system: System, state: State) -> object:
+    running = sorted((system.leaves[leaf].model.name, one.phase, one.asked) for leaf, one in system.open(state))
+    return system.managers(state, "drone").states, tuple(running), system.outcome(state)
+
+
+def all_mutants(folder: Path) -> Iterator[Mutant]:
+    used = {"drone": [skill.name for skill in DRONE.skills]}
+    yield from mutants_of(folder / "example.xml", [folder / "example.xml"], [DRONE], used)
+
+
+@pytest.mark.parametrize("text", [GOOD, TWO_WAYS])
+def test_an_equal_mutant_shows_the_same_situations(text: str, tmp_path: Path) -> None:
+    """Held against a search of one situation after another, which knows no regions."""
+    judge = judge_of(tmp_path, text)
+    original = observed(tmp_path, whole(text), DRONE)
+    verdicts = []
+    for mutant in all_mutants(tmp_path):
+        one = judge.judge(mutant)
+        verdicts.append(one.verdict)
+        if one.verdict == EQUAL:
+            assert observed(tmp_path, mutant.text or whole(text), mutant.skillset or DRONE) == original, one
+    assert verdicts.count(EQUAL) > 3
+    assert verdicts.count(FOUND) > 10
+
+
+def test_each_kind_alters_what_it_says(tmp_path: Path) -> None:
+    (tmp_path / "example.xml").write_text(
+        whole(GOOD.replace("<drone.lift/>", '<ForceSuccess><drone.lift _onFailure="a := 1"/></ForceSuccess>', 1))
+    )
+    kinds = {one.kind for one in all_mutants(tmp_path)}
+    assert kinds == set(KINDS)
+    for one in all_mutants(tmp_path):
+        assert one.text != (tmp_path / "example.xml").read_text()
+        assert one.skillset != DRONE
+
+
+def test_a_model_is_altered_at_one_place() -> None:
+    for kind, what, mutant in models.altered(DRONE, ["hover"]):
+        assert [skill.name for skill, old in zip(mutant.skills, DRONE.skills, strict=True) if skill != old] == ["hover"], (kind, what)
+        assert replace(mutant, skills=DRONE.skills) == DRONE
+
+
+def test_choice_is_by_the_seed_and_even() -> None:
+    everything = [Mutant("m", kind, str(number)) for kind in KINDS for number in range(30)]
+    some = chosen(everything, 16, seed=4)
+    assert some == chosen(everything, 16, seed=4) != chosen(everything, 16, seed=5)
+    assert all([one.kind for one in some].count(kind) == 2 for kind in KINDS)
+    assert len(chosen(everything, 1000, seed=1)) == len(set(everything))
+
+
+@pytest.mark.long
+def test_of_the_drones_a_seeded_mutant_of_each_kind_is_not_missed() -> None:
+    some = chosen(list(mutants(ROOT, ["inspection"])), len(KINDS), seed=0)
+    assert {one.kind for one in some} == set(KINDS)
+    verdicts = [judged(ROOT, one) for one in some]
+    assert all(one.verdict in {FOUND, EQUAL} for one in verdicts), verdicts
+    assert all(one.flown for one in verdicts if one.by in {ANSWERS, ANOTHER_RUN, "ALU701", "ALU702", "ALU704", "property"}), verdicts

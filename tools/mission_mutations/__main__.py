@@ -1,0 +1,90 @@
+"""Prints what `check` makes of altered missions: ``setup/in_ros2 python -m mission_mutations [--count N] [--seed N] [--json FILE]``."""
+
+from __future__ import annotations
+
+import argparse
+import json
+import sys
+import traceback
+from collections.abc import Iterator, Sequence
+from concurrent.futures import ProcessPoolExecutor
+from functools import cache
+from pathlib import Path
+
+from alula.commands.check_missions import faults_of
+from alula.commands.mission_robot import models_of, part_of
+from alula.common.robots import find_robot
+from alula.language.messages import messages_of
+from alula.trees.reading import read_files
+from mission_mutations.judging import MISSED, Judge, Robot, Verdict
+from mission_mutations.mutants import Mutant, chosen, mutants_of
+from mission_mutations.telling import by_what, table
+
+COMMAND = "mission_mutations"
+MAIN = "main_tree_to_execute="
+
+
+@cache
+def robot_of(root: Path) -> Robot:
+    """Return a robot with what its missions are made of."""
+    robot = find_robot(root)
+    models = models_of(robot, COMMAND)
+    return Robot(robot.root / "missions", models, part_of(robot, COMMAND), faults_of(models), messages_of(robot))
+
+
+@cache
+def judge_of(root: Path, mission: str) -> Judge:
+    """Return the judge of a mission, made once in each process."""
+    return Judge(robot_of(root), mission)
+
+
+def judged(root: Path, mutant: Mutant) -> Verdict:
+    """Judge one mutant, in any process; a search that raises finds nothing."""
+    try:
+        return judge_of(root, mutant.mission).judge(mutant)
+    except Exception as error:  # noqa: BLE001 - whatever it is, the study tells it and goes on
+        told = traceback.format_exception(error)[-2:]
+        return Verdict(mutant.mission, mutant.kind, mutant.what, MISSED, type(error).__name__, "".join(told), flown=None, cpu_s=0.0)
+
+
+def mutants(root: Path, missions: Sequence[str]) -> Iterator[Mutant]:
+    """Yield all mutants of some of a robot's missions, all of them where none is named."""
+    robot = robot_of(root)
+    paths = [path for path in sorted(robot.folder.glob("*.xml")) if MAIN in path.read_text(encoding="utf-8")]
+    for path in paths:
+        if not missions or path.stem in missions:
+            parts = [Path(document.path) for document in read_files(path).documents]
+            text = "".join(path.read_text(encoding="utf-8") for path in parts)
+            used = {one.name: [skill.name for skill in one.skills if f"<{one.name}.{skill.name}" in text] for one in robot.skillsets}
+            yield from mutants_of(path, parts, robot.skillsets, used)
+
+
+def main(arguments: Sequence[str] | None = None) -> int:
+    """Judge, print, and end with 1 where a mutant was missed."""
+    parser = argparse.ArgumentParser(prog=COMMAND, description="Alter a robot's missions and models, and look what `check` finds.")
+    parser.add_argument("missions", nargs="*", metavar="MISSION", help="names of missions (default: all of the robot's)")
+    parser.add_argument("--count", type=int, default=300, help="so many mutants, of each kind alike (default 300)")
+    parser.add_argument("--seed", type=int, default=0)
+    parser.add_argument("--processes", type=int, default=1, help="at once (default 1)")
+    parser.add_argument("--json", type=Path, metavar="FILE", help="also write each mutant to this file")
+    given = parser.parse_args(arguments)
+    root = find_robot().root
+    everything = list(mutants(root, given.missions))
+    some = chosen(everything, given.count, given.seed)
+    sys.stderr.write(f"{len(some)} of {len(everything)} mutants\n")
+    verdicts: list[Verdict] = []
+    with ProcessPoolExecutor(given.processes) as pool:
+        for number, verdict in enumerate(pool.map(judged, [root] * len(some), some), 1):
+            verdicts.append(verdict)
+            sys.stderr.write(
+                f"{number} of {len(some)}: {verdict.verdict} ({verdict.by}), {verdict.cpu_s} s: {verdict.kind}: {verdict.what}\n"
+            )
+            if given.json is not None:
+                told = {"seed": given.seed, "mutants": [one.as_dict() for one in verdicts]}
+                given.json.write_text(json.dumps(told, indent=1) + "\n", encoding="utf-8")
+    sys.stdout.write(f"{table(verdicts)}\n\n{by_what(verdicts)}\n")
+    return 1 if any(one.verdict == MISSED for one in verdicts) else 0
+
+
+if __name__ == "__main__":
+    sys.exit(main())
