@@ -1,6 +1,7 @@
 """``./alula campaign``: does a campaign, goes on where it stopped, and ends with the failure coverage.
 
-Ends with 0: all done, 1: done, and runs had trouble, 2: could not start, or could not write its folder any more.
+Ends with 0: all done, 1: done, and runs had trouble, or answers that the proof does not know, 2: could not start, or could not write
+its folder any more.
 """
 
 from __future__ import annotations
@@ -9,14 +10,17 @@ import argparse
 import sys
 import time
 from collections.abc import Sequence
+from functools import partial
 from pathlib import Path
 
+from alula.campaign.beside import MissionAnswers, beside
 from alula.campaign.coverage import Coverage, cover, processes
 from alula.campaign.failures import ways_to_fail
 from alula.campaign.mocked_scenarios import load_mocked_scenario
 from alula.campaign.plan import MOCKS, Campaign, load_campaign
+from alula.campaign.proved import proved
 from alula.campaign.running import options_of, run
-from alula.campaign.table import ROWS, Table
+from alula.campaign.table import ROWS, Row, Table
 from alula.campaign.telling import as_page, as_text
 from alula.common.files import write_json, write_text
 from alula.common.robots import RobotError
@@ -71,13 +75,28 @@ class Teller:
             sys.stderr.flush()
 
 
-def finish(table: Table, out: Path, title: str) -> Coverage:
+def answers_of(campaign: Campaign, rows: Sequence[Row]) -> list[MissionAnswers]:
+    """Return the answers of each mission of a campaign over mocks, flown beside proved; live runs don't tell theirs."""
+    if campaign.over != MOCKS:
+        return []
+    found, models, effects = [], robot_skillsets(), effects_of_robot()
+    for name in dict.fromkeys(campaign.scenarios):
+        tell = partial(_tell_proof, name)
+        mission = proved(load_scenario(name), models, effects, tell)
+        found.append(beside(name, mission, [row for row in rows if row["scenario"] == name]))
+    return found
+
+
+def _tell_proof(scenario: str, progress: str) -> None:
+    sys.stderr.write(f"looking at all runs of {scenario}: {progress}\n")
+
+
+def finish(campaign: Campaign, table: Table, out: Path, title: str) -> Coverage:
     """Order the table and write the coverage beside it."""
     table.finish()
-    coverage = cover(
-        [table.rows[number] for number in sorted(table.rows)],
-        ways_to_fail(robot_skillsets(), processes(map(load_scenario, scenario_names()))),
-    )
+    rows = [table.rows[number] for number in sorted(table.rows)]
+    ways = ways_to_fail(robot_skillsets(), processes(map(load_scenario, scenario_names())))
+    coverage = cover(rows, ways, answers_of(campaign, rows))
     write_json(out / "coverage.json", coverage.as_dict())
     write_text(out / "coverage.txt", as_text(coverage))
     write_text(out / "coverage.html", as_page(coverage, title))
@@ -96,7 +115,7 @@ def main(arguments: Sequence[str] | None = None) -> int:
         if table.rows:
             sys.stderr.write(f"{len(table.rows)} of {len(campaign.runs)} runs are in {out / ROWS}\n")
         run(campaign, table, out, Teller(len(campaign.runs), len(table.rows)), options, given.dask)
-        coverage = finish(table, out, f"Campaign {given.file.stem}")
+        coverage = finish(campaign, table, out, f"Campaign {given.file.stem}")
     except (AnalysisError, RobotError, ScenarioError) as error:
         sys.stderr.write(f"alula campaign: {error}\n")
         return CANNOT_START
@@ -107,8 +126,9 @@ def main(arguments: Sequence[str] | None = None) -> int:
         sys.stderr.write(f"interrupted; the same command goes on from {out / ROWS}\n")
         return TROUBLE
     sys.stdout.write(as_text(coverage))
+    sys.stderr.write("".join(f"alula campaign: {line}\n" for line in coverage.unknown))
     sys.stderr.write(f"{out / 'coverage.html'}\n")
-    return TROUBLE if coverage.troubled else DONE
+    return TROUBLE if coverage.troubled or coverage.unknown else DONE
 
 
 if __name__ == "__main__":

@@ -11,6 +11,7 @@ from pathlib import Path
 from typing import Any
 from xml.etree import ElementTree as ET
 
+from alula.campaign.beside import MissionAnswers
 from alula.campaign.failures import FAULT, KINDS, Way, name_of
 from alula.common.faults import parse_fault
 from alula.common.robots import find_robot
@@ -55,6 +56,13 @@ class Coverage:
     troubled: Sequence[int]
     """Runs that did not come to an end or conform, left something open, collided, did not land, had problems, or an exit code that
     does not say their outcome."""
+    answers: Sequence[MissionAnswers] = ()
+    """Of each mission, flown beside proved."""
+
+    @property
+    def unknown(self) -> list[str]:
+        """Each flown answer that the proof of its mission does not know, in a line."""
+        return [line for mission in self.answers for line in mission.unknown]
 
     @property
     def never(self) -> list[Way]:
@@ -65,11 +73,13 @@ class Coverage:
         """Return the whole matrix as ``coverage.json`` has it."""
         tried = [cover.as_dict() for cover in self.covers if cover.times]
         never = [vars(way) for way in self.never]
-        return {"runs": self.runs, "outcomes": dict(self.outcomes), "troubled": list(self.troubled), "tried": tried, "never": never}
+        answers = [mission.as_dict() for mission in self.answers]
+        whole = {"runs": self.runs, "outcomes": dict(self.outcomes), "troubled": list(self.troubled)}
+        return {**whole, "tried": tried, "never": never, "answers": answers}
 
 
-def cover(rows: Iterable[Row], ways: Iterable[Way]) -> Coverage:
-    """Count what became of each way to fail."""
+def cover(rows: Iterable[Row], ways: Iterable[Way], answers: Sequence[MissionAnswers] = ()) -> Coverage:
+    """Count what became of each way to fail; ``answers`` are those of the same runs, beside the proved ones."""
     covers = {way: Cover(way) for way in ways}
     outcomes: Counter[str] = Counter()
     troubled: list[int] = []
@@ -86,7 +96,7 @@ def cover(rows: Iterable[Row], ways: Iterable[Way]) -> Coverage:
             way = Way(failure["kind"], failure["name"])
             _count(covers.setdefault(way, Cover(way)), row, str(failure["answered_by"]), failure["after_s"])
     ordered = sorted(covers.values(), key=lambda one: (KINDS.index(one.way.kind), one.way.name))
-    return Coverage(ordered, runs, dict(outcomes.most_common()), troubled)
+    return Coverage(ordered, runs, dict(outcomes.most_common()), troubled, answers)
 
 
 def is_troubled(row: Row) -> bool:

@@ -7,6 +7,7 @@ from dataclasses import dataclass, field
 from functools import cached_property
 from pathlib import Path
 
+from alula.campaign.flown import FlownAnswer, Ticks
 from alula.common.faults import FaultError, FaultRequest
 from alula.common.robots import RobotError, find_robot
 from alula.common.scenarios import Scenario, ScenarioError, load_scenario
@@ -20,6 +21,7 @@ from alula.records.tree import Places, tip_of
 from alula.runtime.core.errors import SkillRuntimeError
 from alula.runtime.core.events import EngineEvent
 from alula.runtime.mock import Behaviour, load_behaviour
+from alula.trees.node import Node
 
 
 @dataclass(frozen=True)
@@ -34,6 +36,8 @@ class MockedRun:
     """When each fault came, seconds of mission clock; those that came to nothing are missing."""
     places: Places = field(default_factory=Places)
     """Where in the tree its executions were started."""
+    answers: Sequence[FlownAnswer] = ()
+    """What its tree did about each failure that it saw."""
 
 
 @dataclass(frozen=True)
@@ -64,10 +68,14 @@ class MockedScenario:
 
     def run(self, faults: Sequence[FaultRequest] = (), seed: int = 0) -> MockedRun:
         """Run the mission once over mocks, in virtual time; the same faults and seed give the same run."""
-        mission = MockedMission(self.skillsets, self.behaviour, self.plan, faults=faults, seed=seed)
+        ticks = Ticks()
+        mission = MockedMission(self.skillsets, self.behaviour, self.plan, faults=faults, seed=seed, listener=ticks)
+        if isinstance(mission.director.root, Node):
+            ticks.watch(mission.director.root)
         end = mission.run()
         places = Places(mission.places, tip_of(mission.director.view().as_dict()))
-        return MockedRun(mission.events, end, mission.notes, mission.open_executions, dict(mission.robot.faults), places)
+        answers = ticks.answers(mission.places)
+        return MockedRun(mission.events, end, mission.notes, mission.open_executions, dict(mission.robot.faults), places, answers)
 
 
 def load_mocked_scenario(name: str, behaviour: Sequence[Path] = (), *, world: str = "") -> MockedScenario:

@@ -11,6 +11,7 @@ from pathlib import Path
 from typing import Any
 
 from alula.campaign.failures import FAULT, PROCESS, Way, as_dict, failures_by, failures_in, name_of, ways_to_fail
+from alula.campaign.flown import FlownAnswer
 from alula.campaign.mocked_scenarios import MockedScenario, load_mocked_scenario
 from alula.campaign.plan import SIMULATOR, PlannedRun
 from alula.common.record import RecordError, read_record
@@ -18,14 +19,14 @@ from alula.common.robots import find_robot
 from alula.live.options import entry
 from alula.records.causes.effects import EffectsByFault
 from alula.records.causes.fault_file import effects_of_robot
-from alula.records.causes.faults import Fault, faults_asked
+from alula.records.causes.faults import Fault, faults_asked, trace
 from alula.records.causes.told_ends import with_told_ends
 from alula.records.conformance import Monitor
 from alula.records.errors import AnalysisError
 from alula.records.models import models_of
 from alula.records.run import RecordedRun, lift_off_of, load_recorded_run, origin_of
 from alula.records.tree import Places, places_in
-from alula.runtime.core.events import EngineEvent, TransitionEvent
+from alula.runtime.core.events import EngineEvent, ExecutionEvent, TransitionEvent
 from alula.runtime.mock import Behaviour
 
 Row = dict[str, Any]
@@ -51,7 +52,8 @@ def _mocked(planned: PlannedRun, behaviour: tuple[str, ...]) -> Row:
     landed = _landed(mocked.events)
     found = {"outcome": mocked.end.outcome.value, "reason": mocked.end.reason, "landed": landed, "open": list(mocked.open)}
     found |= {"problems": list(mocked.notes), "collisions": None, "min_clearance_m": None, "died": [], "exit_code": None}
-    return _row(planned, found, _Evidence(mocked.events, mocked.places, first_s=mocked.faults, behaviour=scenario.behaviour), monitor, ways)
+    left = _Evidence(mocked.events, mocked.places, first_s=mocked.faults, behaviour=scenario.behaviour, answers=mocked.answers)
+    return _row(planned, found, left, monitor, ways)
 
 
 def _landed(events: Sequence[EngineEvent]) -> bool | None:
@@ -82,6 +84,7 @@ class _Evidence:
         known: the events, and the ends that only the mission was told of; None: there are none of these.
         first_s: when mocks say that each fault came first.
         behaviour: of the mocks.
+        answers: what the tree did about each failure that it saw; live runs don't tell.
     """
 
     events: Sequence[EngineEvent]
@@ -89,6 +92,7 @@ class _Evidence:
     known: Sequence[EngineEvent] | None = None
     first_s: Mapping[str, float] | None = None
     behaviour: Behaviour | None = None
+    answers: Sequence[FlownAnswer] = ()
 
 
 def _row(planned: PlannedRun, found: Mapping[str, Any], left: _Evidence, monitor: Monitor, ways: Sequence[Way]) -> Row:
@@ -113,7 +117,17 @@ def _row(planned: PlannedRun, found: Mapping[str, Any], left: _Evidence, monitor
         "events": len(left.events),
         "conforms": monitor.verdict.conforms,
         "failures": [as_dict(failure, origin_s) for failure in every],
+        "answers": _answers(left.answers, events, [fault for _, fault in asked], origin_s),
     }
+
+
+def _answers(answers: Sequence[FlownAnswer], events: Sequence[EngineEvent], faults: Sequence[Fault], origin_s: float) -> list[Row]:
+    """Return the answers to failures, each with when it failed, and the fault of the run that it follows from, if any."""
+    causes = {failure.end.id: traced.fault.name for traced in trace(faults, events) for failure in traced.failures}
+    ended_s = {event.id: event.stamp_s for event in events if isinstance(event, ExecutionEvent) and event.state.terminal}
+    return [
+        {**one.as_dict(), "at_s": round(ended_s.get(one.id, origin_s) - origin_s, 6), "fault": causes.get(one.id, "")} for one in answers
+    ]
 
 
 def _ended(died: Mapping[str, Any], events: Sequence[EngineEvent], effects: EffectsByFault) -> Fault:

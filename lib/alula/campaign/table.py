@@ -13,7 +13,10 @@ from alula.records.errors import AnalysisError
 
 ROWS, PLAN = "runs.jsonl", "campaign.json"
 COLUMNS = frozenset(
-    ("run", "faults", "outcome", "landed", "open", "problems", "collisions", "min_clearance_m", "conforms", "exit_code", "failures")
+    (
+        *("run", "scenario", "faults", "outcome", "landed", "open", "problems", "collisions", "min_clearance_m", "conforms", "exit_code"),
+        *("failures", "answers"),
+    )
 )
 """What the coverage reads of a row."""
 

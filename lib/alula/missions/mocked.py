@@ -5,13 +5,14 @@ from __future__ import annotations
 import time
 from collections.abc import Sequence
 from pathlib import Path
+from typing import Protocol
 
 from alula.common.faults import FaultRequest
 from alula.missions.director import Director, End, Outcome
-from alula.missions.driver import TICK_PERIOD_S, MissionDriver
+from alula.missions.driver import TICK_PERIOD_S, Job, MissionDriver
 from alula.missions.plan import MissionPlan
 from alula.missions.record import MissionRecord
-from alula.missions.skillset import MissionClient
+from alula.missions.skillset import MissionClient, Recorder
 from alula.model.execution_state import ExecutionState
 from alula.model.model import Skillset
 from alula.runtime.core.events import EngineEvent, ExecutionEvent
@@ -21,6 +22,14 @@ from alula.runtime.mock import Behaviour, MockRobot, mock_world
 LATENCY_S = 0.005
 LIMIT_S = 3600.0
 """Mission clock after which a mission that goes round in circles is aborted, and after which twice it is left."""
+
+
+class Listener(Recorder, Protocol):
+    """Hears what passes between a tree and its skillsets, tick by tick."""
+
+    def tick(self) -> None:
+        """The tree is ticked now."""
+        ...
 
 
 class MockedMission:
@@ -36,6 +45,7 @@ class MockedMission:
         tick_period_s: of the tree, besides the ticks after events; 10 Hz as over ROS 2.
         latency_s: of each message between mission and managers.
         groot: where viewers find the tree, as `MissionDriver` has it; it raises, too, what that does.
+        listener: hears of a mission that leaves nothing behind what its record would have told.
     """
 
     def __init__(
@@ -50,6 +60,7 @@ class MockedMission:
         tick_period_s: float = TICK_PERIOD_S,
         latency_s: float = LATENCY_S,
         groot: str = "",
+        listener: Listener | None = None,
     ) -> None:
         self.world: LocalWorld
         self.robot: MockRobot
@@ -63,8 +74,14 @@ class MockedMission:
         self._tick_period_s = tick_period_s
         clock_ns = lambda: self.world.clock.now_ns  # noqa: E731
         record = self._record = None if out is None else MissionRecord(out, plan, clock_ns, plan.parameters)
-        client = lambda name, wake: MissionClient(self.world.client(name), wake, record)  # noqa: E731
-        self._driver = MissionDriver(plan, client, clock_ns, plan.parameters, record=record, soon=self.world.clock.soon, groot=groot)
+        client = lambda name, wake: MissionClient(self.world.client(name), wake, record or listener)  # noqa: E731
+
+        def due(tick: Job) -> None:
+            if listener is not None:
+                self.world.clock.soon(listener.tick)
+            self.world.clock.soon(tick)
+
+        self._driver = MissionDriver(plan, client, clock_ns, plan.parameters, record=record, soon=due, groot=groot)
         self._leaves = self._driver.leaves
         self.world.on_event(self._on_event)
 

@@ -5,23 +5,24 @@ from __future__ import annotations
 import itertools
 
 from alula.model.conditions import NO_DATA, judge
-from alula.model.expressions import ResourceIs, atoms
-from alula.model.model import Invariant, Resource, Skillset, Transition
+from alula.model.expressions import Expression, ResourceIs, atoms
+from alula.model.model import Resource, Skillset, Transition
 
 
 def breaks(skillset: Skillset, resource: Resource, arrow: Transition) -> bool:
     """Tell whether an arrow can make an invariant false that was not."""
-    return any(_breaks(skillset, one, resource, arrow) for skill in skillset.skills for one in skill.invariants)
+    return any(can_break(skillset, one.condition, resource, arrow) for skill in skillset.skills for one in skill.invariants)
 
 
-def _breaks(skillset: Skillset, invariant: Invariant, resource: Resource, arrow: Transition) -> bool:
-    names = list(dict.fromkeys(atom.resource for atom in atoms(invariant.condition) if isinstance(atom, ResourceIs)))
+def can_break(skillset: Skillset, condition: Expression, resource: Resource, arrow: Transition) -> bool:
+    """Tell whether an arrow can make a condition false that was not."""
+    names = list(dict.fromkeys(atom.resource for atom in atoms(condition) if isinstance(atom, ResourceIs)))
     if resource.name not in names:
         return False
     others = [name for name in names if name != resource.name]
     for states in itertools.product(*(skillset.resource(name).states for name in others)):
         rest = dict(zip(others, states, strict=True))
-        before, after = (judge(invariant.condition, {**rest, resource.name: state}, NO_DATA) for state in (arrow.source, arrow.target))
+        before, after = (judge(condition, {**rest, resource.name: state}, NO_DATA) for state in (arrow.source, arrow.target))
         if before is not False and after is False:
             return True
     return False

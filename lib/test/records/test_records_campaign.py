@@ -217,7 +217,7 @@ def row(number=0, **other):
         "collisions": 0,
         "conforms": True,
     }
-    return {**known, "min_clearance_m": 1.0, "died": [], "exit_code": 0, "failures": [], **other}
+    return {**known, "min_clearance_m": 1.0, "died": [], "exit_code": 0, "failures": [], "answers": [], "scenario": "mapping", **other}
 
 
 def test_the_coverage_counts_answers_and_keeps_the_worst():

@@ -1,7 +1,7 @@
 """What a mission does about each failure: the coverage of its failures, from all its runs.
 
-A row is a skill that fails in some way, at a moment: the leaves whose skills are asked for or run then. Its answer is what the tree asks
-for next; its outcomes are all ways in which the mission can end from there, whatever else happens.
+A row is a skill that fails in some way, at a moment: the other leaves that run then, their skills asked for. Its answer is what the tree
+asks for next; its outcomes are all ways in which the mission can end from there, whatever else happens.
 """
 
 from __future__ import annotations
@@ -9,6 +9,7 @@ from __future__ import annotations
 from dataclasses import dataclass, field
 
 from alula.prove.mission.regions import Regions, Sets, Ticked
+from alula.prove.mission.state import State
 from alula.prove.mission.ticking import Outcome
 
 GOOD = frozenset({"accomplished", "degraded"})
@@ -28,6 +29,8 @@ class Row:
     ``way`` how the tick goes that sees it.
 
     ``loses``: before it the mission could be accomplished, and the tree does not come to a node that says that it gives up.
+    ``asks``: the leaves that are asked for at once, in the tick that sees it or in the next that asks for any; an empty set where the
+    mission ends without.
     """
 
     skill: str
@@ -39,6 +42,7 @@ class Row:
     way: Way
     loses: bool = False
     starts: set[str] = field(default_factory=set)
+    asks: set[frozenset[int]] = field(default_factory=set)
     outcomes: set[str] = field(default_factory=set)
 
     def as_dict(self) -> dict[str, object]:
@@ -60,7 +64,7 @@ class Answers:
         self._regions = regions
         self._system = regions.system
         self._leads = self._leading()
-        self._starting: dict[int, frozenset[str]] = {}
+        self._asking: dict[int, frozenset[frozenset[int]]] = {}
         self._giving_up = {number for number, node in enumerate(self._system.nodes) if node.wiring.type.name == GIVES_UP}
         rows: dict[tuple[str, str, int, tuple[str, ...]], Row] = {}
         for number, region in enumerate(regions.regions):
@@ -83,8 +87,9 @@ class Answers:
         skill = f"{node.skillset}.{node.model.name}"
         moment = self._moment(number, leaf)
         row = rows.setdefault((skill, end, leaf, moment), Row(skill, end, node.name, leaf, moment, number, way))
-        started = frozenset(self._name(one) for one in ticked.outcome.started)
-        row.starts |= started or self._started_from(target)
+        asks = {frozenset(ticked.outcome.started)} if ticked.outcome.started else self._asked_from(target)
+        row.asks |= asks
+        row.starts |= {self._name(one) for asked in asks for one in asked}
         row.outcomes |= self._leads[target]
         row.loses |= bool(self._leads[number] & GOOD) and not self._gives_up(target, ticked)
 
@@ -104,28 +109,33 @@ class Answers:
         return dict(sorted(found.items(), key=lambda one: one[0]))
 
     def _moment(self, region: int, but: int) -> tuple[str, ...]:
-        """Return the other leaves whose executions the tree hangs on."""
-        held = self._system.ticker.memories[self._regions.regions[region].memory].held
-        return tuple(sorted({self._name(leaf) for leaf in held if leaf != but}))
+        """Return the other leaves that run and have asked for their skills."""
+        memory = self._regions.regions[region].memory
+        asked = {leaf for leaf, _ in self._system.ticker.memories[memory].leaves}
+        active = set(map(id, self._system.active(State(memory, ()))))
+        return tuple(sorted({self._name(leaf) for leaf in asked if leaf != but and id(self._system.leaves[leaf]) in active}))
 
     def _name(self, leaf: int) -> str:
         node = self._system.leaves[leaf]
         return f"{node.skillset}.{node.model.name}"
 
-    def _started_from(self, region: int) -> frozenset[str]:
-        """Return what the next ticks that ask for anything ask for."""
-        if region not in self._starting:
-            found: set[str] = set()
+    def _asked_from(self, region: int) -> frozenset[frozenset[int]]:
+        """Return what the next ticks that ask for anything ask for; an empty set where the mission ends without."""
+        if region not in self._asking:
+            found: set[frozenset[int]] = set()
             seen, todo = {region}, [region]
             while todo:
-                for target, ticked in self._regions.regions[todo.pop()].next:
+                at = self._regions.regions[todo.pop()]
+                if self._system.ticker.memories[at.memory].end is not None:
+                    found.add(frozenset())
+                for target, ticked in at.next:
                     if ticked.outcome.started:
-                        found |= {self._name(leaf) for leaf in ticked.outcome.started}
+                        found.add(frozenset(ticked.outcome.started))
                     elif target not in seen:
                         seen.add(target)
                         todo.append(target)
-            self._starting[region] = frozenset(found)
-        return self._starting[region]
+            self._asking[region] = frozenset(found)
+        return self._asking[region]
 
     def _gives_up(self, region: int, first: Ticked) -> bool:
         """Tell whether a tick, or one of the next before anything is asked for, comes to a node by which the tree gives up."""

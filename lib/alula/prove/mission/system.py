@@ -57,7 +57,7 @@ class System:
         self.leaves = tuple(ticker.leaves)
         """The leaves that are skills, by the numbers that executions and events have them by."""
         self.nodes: tuple[Node, ...] = tuple(ticker.nodes)
-        self._steps = [ManagersSteps(one, self._skills_of(one), failures, deadline, self._told_end) for one in skillsets]
+        self._steps = [ManagersSteps(one, self._skills_of(one), failures, deadline, self.told_end) for one in skillsets]
         self._read = body.read
         self._place = {one.name: number for number, one in enumerate(skillsets)}
         self._managers: list[Managers] = []
@@ -237,8 +237,8 @@ class System:
     def _observed(self, state: State, question: Question) -> Answer:
         return self.answer(state.managers[self.place_of(question)], question)
 
-    def _told_end(self, leaf: int, end: End) -> End:
-        """Return an end that is the same to the tree: of those that nothing tells apart always the same one."""
+    def told_end(self, leaf: int, end: End) -> End:
+        """Return an end (state and result) that is the same to the tree: of those that nothing tells apart always the same one."""
         node = self.leaves[leaf]
         state, result = end
         success = state == TERMINATED and result in node.leaf.success
