@@ -10,12 +10,21 @@ from alula.common.located_yaml import Located
 
 Read = Callable[[Located], Any]
 
-WORDS = {"departure": "departure", "away": "under way", "back": "back", "moved": "travelled", "stop": "stop", "controller": "controller"}
-"""What pages call the departure, being away, having come back, the way covered, the act that ends a mission, and what else commands."""
+WORDS = {
+    "departure": "departure",
+    "away": "under way",
+    "back": "back",
+    "moved": "travelled",
+    "stop": "stop",
+    "controller": "controller",
+    "tasks": "tasks",
+}
+"""What pages call the departure, being away, having come back, the way covered, the act that ends a mission, what else commands, and what
+the mission was sent out for."""
 TABLES = ("live", "modes", "glossary")
 FIELDS = ("mode", "link")
 LISTS = ("links", "charts")
-CAMERAS, FIGURES, FENCE = "cameras", "figures", "fence"
+CAMERAS, FIGURES, FENCE, FLAT = "cameras", "figures", "fence", "flat"
 FIGURE_KEYS = ("label", "unit", "digits", "factor")
 
 
@@ -27,8 +36,9 @@ def read_page(part: Located | None) -> dict[str, Any]:
     the fields of data with the controller's mode and whether it is heard of, None where there is none; ``links`` are resources that are
     links, ``charts`` fields of data that are drawn first. ``cameras`` say what each shows, ``figures`` what numbers of ``summary.json``
     are called besides those of every robot, by their path. ``fence``: ``{radius_m, z: [floor, ceiling]}``, metres, None: there is none.
+    ``flat``: it moves on a floor, so nothing is told or drawn of heights, and its map is the whole of what stands on that floor.
     """
-    said = {} if part is None else part.record("`page`", (*WORDS, *TABLES, *FIELDS, *LISTS, CAMERAS, FIGURES, FENCE))
+    said = {} if part is None else part.record("`page`", (*WORDS, *TABLES, *FIELDS, *LISTS, CAMERAS, FIGURES, FENCE, FLAT))
     readers: Mapping[str, tuple[Any, Read]] = {
         **{key: (usual, functools.partial(_text, key)) for key, usual in WORDS.items()},
         **{key: ({}, functools.partial(_table, key, functools.partial(_text, key))) for key in TABLES},
@@ -37,6 +47,7 @@ def read_page(part: Located | None) -> dict[str, Any]:
         CAMERAS: ({}, functools.partial(_table, CAMERAS, _camera)),
         FIGURES: ({}, functools.partial(_table, FIGURES, _figure)),
         FENCE: (None, _fence),
+        FLAT: (False, _flat),
     }
     return {key: read(said[key]) if key in said else usual for key, (usual, read) in readers.items()}
 
@@ -79,6 +90,12 @@ def _figure(part: Located) -> dict[str, Any]:
         "digits": int(said["digits"].number("`digits`", 0, 9)) if "digits" in said else 1,
         "factor": said["factor"].number("`factor`", 0) if "factor" in said else usual,
     }
+
+
+def _flat(part: Located) -> bool:
+    if not isinstance(part.value, bool):
+        raise part.wrong("`flat` should be true or false")
+    return part.value
 
 
 def _fence(part: Located) -> dict[str, Any]:

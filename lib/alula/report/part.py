@@ -49,12 +49,22 @@ class ReportedRun:
 
 
 @dataclass(frozen=True)
+class Task:
+    """Something that the mission was sent out for, such as a parcel; ``why`` says of one that is not done what came between."""
+
+    name: str
+    done: bool
+    why: str = ""
+
+
+@dataclass(frozen=True)
 class Findings:
     """What the parts of a report have found. ``landed``: came back as far as more is known than the skillsets tell; None: nothing more."""
 
     values: Mapping[str, Any] = field(default_factory=dict)
     """What goes into ``summary.json`` besides what every run has."""
     landed: bool | None = None
+    tasks: Sequence[Task] = ()
 
 
 class ReportPart(Protocol):

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
+from dataclasses import asdict
 from typing import Any, TypedDict
 
 from alula.common.faults import parse_fault
@@ -146,6 +147,7 @@ def summarise(
         "conformance": None if facts.conformance is None else dict(facts.conformance),
         "mock": mock,
         "lift_off": LiftOff(stamp_s=phases.zero_s, source=phases.zero_from),
+        "tasks": [asdict(task) for task in findings.tasks],
         **findings.values,
         "problems": problems.sentences,
     }

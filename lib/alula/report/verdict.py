@@ -105,6 +105,16 @@ def figure_lines(summary: Mapping[str, Any]) -> list[str]:
     return [f"  {group}: {', '.join(said) or 'none'}" for group, said in groups.items()]
 
 
+def task_lines(summary: Mapping[str, Any]) -> list[str]:
+    """Return what became of what the mission was sent out for: how much of it is done, and a line for each thing that is not."""
+    tasks = summary.get("tasks") or []
+    if not tasks:
+        return []
+    left = [task for task in tasks if not task["done"]]
+    told = [f"    {task['name']}: not done" + (f": {task['why']}" if task["why"] else "") for task in left]
+    return [f"  {page_words()['tasks']}: {len(tasks) - len(left)} of {len(tasks)} done", *told]
+
+
 def mock_lines(summary: Mapping[str, Any]) -> list[str]:
     """Return what a run over mocks was; there is no world to collide with or to map."""
     mock = summary["mock"]
@@ -141,6 +151,7 @@ def verdict_lines(summary: Mapping[str, Any], died: Sequence[Death], out: Path) 
         lines += mock_lines(summary)
     elif summary.get("landed") is not None or summary.get("distance_m") is not None:  # else nothing is known of a way
         lines += world_lines(summary)
+    lines += task_lines(summary)
     recovery = summary.get("recovery") or {}
     if recovery.get("failure_s") is not None:
         failure = recovery["failure_s"]

@@ -27,6 +27,9 @@ def test_figures_and_cameras_have_units_and_digits(tmp_path):
     rate = {"label": "rate", "unit": "kbit/s", "digits": 1, "factor": 0.001}
     assert page["cameras"] == {"front": {"about": "the way ahead", "data": "base.picture", "figures": {"bps": rate}}}
     assert (page["controller"], page["mode"], page["link"], page["links"]) == ("base computer", "base.state.mode", None, ["base.radio"])
+    assert not page["flat"]
+    (flat := tmp_path / "flat").mkdir()
+    assert page_of(flat, "page: {flat: true}\n")["flat"]
 
 
 def test_a_robot_that_says_nothing_has_the_usual_words(tmp_path):
@@ -41,6 +44,7 @@ def test_a_robot_that_says_nothing_has_the_usual_words(tmp_path):
         ("page:\n  cameras: {front: {data: a.b}}\n", r"robot.yaml:3: a camera needs `about`"),
         ("page:\n  charts: [[a]]\n", r"robot.yaml:3: an entry of `charts`"),
         ("page:\n  figures: {a.b: {label: x, digits: -1}}\n", r"robot.yaml:3: `digits` should be a number from 0 to 9"),
+        ("page:\n  flat: 1\n", r"robot.yaml:3: `flat` should be true or false"),
         ("page:\n  chart: []\n", r"robot.yaml:3: `page` has no `chart`"),
     ],
 )

@@ -3,11 +3,13 @@
 from __future__ import annotations
 
 import json
+from collections.abc import Sequence
 from pathlib import Path
 from typing import Any
 
 from console_records import LIFT_OFF_S, Story, failing_story, write_record
 
+from alula.console.entries import Wire
 from alula.console.page import REPORT, write_report
 
 OTHER_RECORDINGS = ("/fault", "/path")
@@ -20,13 +22,13 @@ SUMMARY = {
 }  # fmt: skip
 
 
-def make_report(folder: Path, story: Story | None = None, *, world: str = "yard.yaml") -> str:
+def make_report(folder: Path, story: Story | None = None, *, world: str = "yard.yaml", recordings: Sequence[Wire] = ()) -> str:
     write_record(folder, failing_story() if story is None else story)
     (folder / "summary.json").write_text(json.dumps(SUMMARY), encoding="utf-8")
     (folder / "run.json").write_text(json.dumps({"scenario": "mapping", "seed": 1, "faults": ["zed@30"], "world": world}), encoding="utf-8")
     fault = ("/fault", LIFT_OFF_S + 29.9, {"sensor": "zed", "mode": "dead"})
     health = ("/health", LIFT_OFF_S + 30.0, {"sensor": "zed", "ok": False, "fault": "silent", "reason": "no image for 0.4 s"})
-    write_report(folder, [fault, health], title="mapping")
+    write_report(folder, [fault, health, *recordings], title="mapping")
     return f"file://{folder / REPORT}"
 
 

@@ -9,7 +9,7 @@ from typing import Any
 import pytest
 from console_page import DRAWN, SIZES, UNNAMED, Page
 from console_records import HOSTILE, LIFT_OFF_S, Story, execution, failing_story, lost_video, transition, tree
-from console_reports import make_report, make_story_report
+from console_reports import SUMMARY, make_report, make_story_report
 
 from alula.common.record import EVENTS, MISSION, OPERATOR, TREE
 from alula.console.page import REPORT, write_report
@@ -82,6 +82,52 @@ def test_the_map_shows_zones_of_the_radio_and_the_fence(browser: Any, tmp_path: 
     legend = page.text("#map-legend li").split(" | ")
     assert [text for text in legend if "radio" in text or "fence" in text] == ["radio critical", "radio degraded", "fence"]
     page.run("document.querySelector('#map-3d').click()")
+    assert page.complaints() == []
+
+
+EDGES = """(() => {
+  const [canvas, wanted] = [document.querySelector('#map'), document.createElement('canvas').getContext('2d')];
+  wanted.fillStyle = getComputedStyle(document.documentElement).getPropertyValue('--edge').trim();
+  wanted.fillRect(0, 0, 1, 1);
+  const edge = wanted.getImageData(0, 0, 1, 1).data;
+  const { data, width } = canvas.getContext('2d').getImageData(0, 0, canvas.width, canvas.height);
+  const found = [];
+  for (let at = 0; at < data.length; at += 4) {
+    if (data[at + 3] > 99 && [0, 1, 2].every((i) => Math.abs(data[at + i] - edge[i]) < 9)) found.push((at / 4) % width);
+  }
+  return [Math.min(...found), Math.max(...found), width];
+})()"""
+"""The first and the last column of the map in which there is a surface, and how many columns it has."""
+
+
+def test_a_flat_robot_has_a_map_of_its_whole_floor_and_no_heights(browser: Any, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    (tmp_path / "robot.yaml").write_text("name: rover\npage: {flat: true}\n", encoding="utf-8")
+    monkeypatch.setenv("ALULA_ROBOT", str(tmp_path))
+    wall = ("/world", None, [[-40.0, -2.0, 0.0, 90.0, -2.0, 0.0]])
+    page = Page(browser, make_report(tmp_path, recordings=[wall]))
+    page.wait(DRAWN)
+    page.choose(10.0)
+    first, last, columns = page.run(EDGES)
+    assert 0 < first < last < columns - 1
+    assert last - first > 0.8 * columns
+    assert "height" not in page.text("#map-words") + page.text("#charts figcaption") + page.text("#readings dt") + page.text("#map-legend")
+    assert "ground speed" in page.text("#charts figcaption")
+    assert not page.run("document.querySelector('#map-3d').checkVisibility()")
+    drawn = page.run("document.querySelector('#map').toDataURL()")
+    page.run("document.querySelector('#map').dispatchEvent(new KeyboardEvent('keydown', { key: 'ArrowDown' }))")
+    assert page.run("document.querySelector('#map').toDataURL()") == drawn
+    assert page.complaints() == []
+
+
+def test_what_the_mission_was_sent_out_for_is_told_at_its_end(browser: Any, tmp_path: Path) -> None:
+    tasks = [{"name": "a-b", "done": True, "why": ""}, {"name": HOSTILE, "done": False, "why": "the door is shut"}]
+    page = Page(browser, make_story_report(tmp_path, failing_story(), {**SUMMARY, "tasks": tasks}))
+    page.wait(DRAWN)
+    assert page.text("#tasks li") == f"a-bdone | {HOSTILE}not done: the door is shut"
+    assert "tasks done1 of 2" in page.text("#figures-row div")
+    assert "1 of 2 tasks were not done" in page.text("#answers td")
+    page.choose(10.0)  # under way
+    assert page.run("document.querySelector('#tasks').hidden")
     assert page.complaints() == []
 
 

@@ -76,6 +76,16 @@ def test_of_a_robot_without_a_state_of_departure_nothing_is_said_of_coming_back(
     assert verdict_lines(through_a_world, [], OUT)[2] == "  duration 9.0 s, travelled 4.0 m"
 
 
+def test_what_was_done_of_what_the_mission_was_sent_out_for_is_told_with_why_not() -> None:
+    tasks = [
+        {"name": "a-b", "done": True, "why": ""},
+        {"name": "b-c", "done": False, "why": "the door is shut"},
+        {"name": "c", "done": False, "why": ""},
+    ]
+    lines = verdict_lines({"outcome": "degraded", "landed": True, "tasks": tasks}, [], OUT)
+    assert lines[-3:] == ["  tasks: 1 of 3 done", "    b-c: not done: the door is shut", "    c: not done"]
+
+
 def test_a_crash_is_no_landing() -> None:
     summary = {"outcome": "given_up", "landed": False, "crash": "it met the ground at 7.6 m/s", "duration_s": 9.0}
     assert verdict_lines(summary, [], OUT)[2].startswith("  landed: no, it crashed: it met the ground at 7.6 m/s, duration 9.0 s")

@@ -55,6 +55,8 @@ function keyFigures(run) {
   add(robotWords(run).moved, summary.distance_m, "m");
   const reached = last(run.blackboard.get("waypoints_reached")?.v ?? []) ?? mission.waypoints_reached;
   if (mission.waypoints) add("waypoints reached", `${reached} of ${mission.waypoints}`);
+  const tasks = tasksOf(run);
+  if (tasks.length) add(`${robotWords(run).tasks} done`, `${tasks.filter(({ done }) => done).length} of ${tasks.length}`);
   add("collisions", summary.collisions, "", 0);
   add("nearest surface", summary.min_clearance_m, "m", 2);
   for (const [path, { label, unit, digits, factor }] of Object.entries(robotWords(run).figures)) {
@@ -63,6 +65,9 @@ function keyFigures(run) {
   }
   return figures;
 }
+
+/** What the mission was sent out for, and what became of it: [{name, done, why}]; known at the end. */
+const tasksOf = (run) => run.facts["/summary"]?.tasks ?? [];
 
 /** The pauses of the mission: [{from, to}]; `to` is null in one that lasts. */
 function pauses(run) {
@@ -216,6 +221,8 @@ function costs(run) {
     const missed = mission.waypoints - mission.waypoints_reached;
     lines.push(missed ? `${missed} of ${mission.waypoints} waypoints were not reached` : "no waypoint was missed");
   }
+  const left = tasksOf(run).filter(({ done }) => !done).length;
+  if (left) lines.push(`${left} of ${tasksOf(run).length} ${robotWords(run).tasks} were not done`);
   if (summary?.collisions === 0) lines.push("nothing was hit");
   if (summary?.collisions > 0) lines.push(`${summary.collisions} collisions`);
   return lines;

@@ -32,7 +32,7 @@ class FiguresView {
   names() {
     const all = this.all();
     const wanted = robotWords(this.run).charts.filter((name) => all.includes(name));
-    const path = this.run.path.t.length ? ["height", "ground speed"] : [];
+    const path = this.run.path.t.length ? [...(robotWords(this.run).flat ? [] : ["height"]), "ground speed"] : [];
     return [...new Set([...this.added.filter((name) => all.includes(name)), ...path, ...wanted])].slice(0, MAX_CHARTS);
   }
 

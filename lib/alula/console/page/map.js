@@ -33,11 +33,12 @@ class MapView {
     const line = (colour, dashes = "") => svg("svg", { width: 22, height: 10 }, svg("line", { x2: 22, y1: 5, y2: 5, stroke: colour, "stroke-width": 2.5, "stroke-dasharray": dashes }));
     const dot = (colour) => svg("svg", { width: 10, height: 10 }, svg("circle", { cx: 5, cy: 5, r: 4.5, fill: colour }));
     const place = (letter) => svg("svg", { width: 16, height: 16 }, svg("circle", { cx: 8, cy: 8, r: 7, fill: "var(--card)", stroke: "var(--ink)", "stroke-width": 1.5 }), svg("text", { x: 8, y: 12, "text-anchor": "middle", "font-size": 10, "font-weight": 700, fill: "var(--ink)" }, letter));
-    const legend = [[line("var(--path)"), "way"], [line("var(--route)", "5 4"), "route"], [dot("var(--place)"), "robot"], [place("H"), "home: where it departed"], [place("L"), "where it came to rest"], [line("var(--bad)", "2 2"), "obstacle ahead"], [line("var(--edge)"), "true surfaces"], [dot("rgb(33,145,140)"), "map, coloured by height"]];
+    const legend = [[line("var(--path)"), "way"], [line("var(--route)", "5 4"), "route"], [dot("var(--place)"), "robot"], [place("H"), "home: where it departed"], [place("L"), "where it came to rest"], [line("var(--bad)", "2 2"), "obstacle ahead"], [line("var(--edge)"), "true surfaces"]];
+    const coloured = [dot("rgb(33,145,140)"), "map, coloured by height"];
     /** Signs of what every map may show, and of the areas of this one. */
-    this.explain = (areas, fence) => {
+    this.explain = (areas, { fence, flat }) => {
       const told = new Map(areas.map(({ tone, told: text }) => [text, line(`var(${TONES[tone][0]})`, TONES[tone][1].join(" "))]));
-      const signs = [...legend, ...[...told].map(([text, sign]) => [sign, text]), ...(fence ? [[line("var(--ink)", "1 4"), "fence"]] : [])];
+      const signs = [...legend, ...(flat ? [] : [coloured]), ...[...told].map(([text, sign]) => [sign, text]), ...(fence ? [[line("var(--ink)", "1 4"), "fence"]] : [])];
       byId("map-legend").replaceChildren(...signs.map(([sign, text]) => el("li", {}, sign, text)));
     };
   }
@@ -69,7 +70,7 @@ class MapView {
     const turns = { ArrowLeft: [-0.1, 0], ArrowRight: [0.1, 0], ArrowUp: [0, 0.1], ArrowDown: [0, -0.1] };
     if (event.key === "+") this.enlarge(1.18);
     else if (event.key === "-") this.enlarge(0.85);
-    else if (turns[event.key]) {
+    else if (turns[event.key] && !robotWords(this.run).flat) {
       this.view.yaw += turns[event.key][0];
       this.view.pitch = Math.min(Math.PI / 2, Math.max(0.05, this.view.pitch + turns[event.key][1]));
       this.draw(this.run, this.t, true);
@@ -79,8 +80,9 @@ class MapView {
 
   draw(run, t, redrawn = false) {
     [this.run, this.t] = [run, t];
-    const [areas, { fence }] = [run.facts["/areas"] ?? [], robotWords(run)];
+    const [areas, { fence, flat }] = [run.facts["/areas"] ?? [], robotWords(run)];
     byId("map-card").hidden = !run.path.t.length && !areas.length && !fence && !["/map", "/world", "/route"].some((topic) => run.facts[topic]?.length !== 0 && run.facts[topic]);
+    byId("map-3d").parentElement.hidden = flat;
     const ratio = Math.min(window.devicePixelRatio || 1, 2);
     this.size ??= [this.canvas.clientWidth, this.canvas.clientHeight]; // asking at each drawing would have the browser lay out the page each time
     const [width, height] = this.size;
@@ -89,7 +91,7 @@ class MapView {
     if (sized) for (const canvas of [this.canvas, this.cloud]) [canvas.width, canvas.height] = [Math.round(width * ratio), Math.round(height * ratio)];
     const facts = [run.facts["/map"], run.facts["/world"], run.facts["/route"], run.facts["/areas"], run.facts["/run"]];
     const changed = facts.some((fact, index) => fact !== this.facts?.[index]);
-    if (changed) this.explain(areas, fence);
+    if (changed) this.explain(areas, robotWords(run));
     if (facts[0] !== this.facts?.[0]) this.points = unpack(facts[0]);
     this.facts = facts;
     const box = this.box(changed);
@@ -114,6 +116,7 @@ class MapView {
     if (!this.boxedPlaces) {
       for (const place of this.run.facts["/route"] ?? []) stretchBy(...place);
       for (const [ring] of (this.run.facts["/areas"] ?? []).map(rings)) for (const place of ring) stretchBy(...place);
+      if (robotWords(this.run).flat) for (const [x1, y1, z1, x2, y2, z2] of this.run.facts["/world"] ?? []) [[x1, y1, z1], [x2, y2, z2]].forEach((place) => stretchBy(...place));
       for (let at = 0; at < (this.points?.length ?? 0); at += 30) stretchBy(this.points[at], this.points[at + 1], this.points[at + 2]);
     }
     for (; this.boxedPlaces < path.v.length; this.boxedPlaces += 1) stretchBy(...path.v[this.boxedPlaces]);
@@ -353,7 +356,7 @@ class MapView {
     const map = this.run.facts["/map"];
     const ahead = this.obstacle();
     const old = index >= 0 && this.t - path.t[index] > STALE_S ? `No position since ${seconds(path.t[index] - origin(this.run))}; the last one: ` : "";
-    const parts = [index < 0 ? "Nothing is recorded of the robot's place." : `${old}Robot at east ${fixed(path.v[index][0], 1)} m, north ${fixed(path.v[index][1], 1)} m, height ${fixed(path.v[index][2], 1)} m.`];
+    const parts = [index < 0 ? "Nothing is recorded of the robot's place." : `${old}Robot at east ${fixed(path.v[index][0], 1)} m, north ${fixed(path.v[index][1], 1)} m${robotWords(this.run).flat ? "" : `, height ${fixed(path.v[index][2], 1)} m`}.`];
     if (ahead) parts.push(`Obstacle ${Number.isFinite(ahead.distance) ? `${fixed(ahead.distance, 1)} m ` : ""}ahead (${ahead.name}).`);
     const [back, where] = [comingBack(this.run), restWhere(this.run)];
     if (where && this.t >= back) parts.push(`${sentence(cameBack(this.run))} ${where}.`);

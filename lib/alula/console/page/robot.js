@@ -2,7 +2,7 @@
 
 const AT_PLACE_M = 1; // so near counts as at home, or at a waypoint
 // Before the run is known; what a robot says otherwise comes with it (alula.common.robot_page).
-const WORDS = { departure: "departure", away: "under way", back: "back", moved: "travelled", stop: "stop", controller: "controller", live: {}, modes: {}, glossary: {}, mode: null, link: null, links: [], charts: [], cameras: {}, figures: {}, fence: null };
+const WORDS = { departure: "departure", away: "under way", back: "back", moved: "travelled", stop: "stop", controller: "controller", tasks: "tasks", live: {}, modes: {}, glossary: {}, mode: null, link: null, links: [], charts: [], cameras: {}, figures: {}, fence: null, flat: false };
 
 /** What the robot says of its pages: `page` in its robot.yaml. */
 const robotWords = (run) => run.facts["/run"]?.words ?? WORDS;

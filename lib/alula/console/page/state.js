@@ -44,7 +44,7 @@ function readings(run, t) {
   const reached = valueAt(run.blackboard.get("waypoints_reached") ?? newTrack(), t) ?? 0;
   const of = last(run.mission.v)?.waypoints;
   const shown = [
-    told("height", [height], (z) => ({ text: `${fixed(z, 1)} m` })),
+    robotWords(run).flat ? null : told("height", [height], (z) => ({ text: `${fixed(z, 1)} m` })),
     told("speed", numbers([/velocity_enu_m_s\.x$/, /velocity_enu_m_s\.y$/, /velocity_enu_m_s\.z$/]), (...v) => ({ text: `${fixed(Math.hypot(...v), 1)} m/s` })),
     told("battery", [battery], (value) => batteryTold(battery.name, value)),
     linkAt(run, t, told),
@@ -132,6 +132,9 @@ function showState(t) {
   rewrite(byId("readings"), readings(run, t), ({ label, text, tone }) => el("div", { class: tone ?? "" }, el("dt", {}, label), el("dd", {}, text)));
   const whole = Boolean(run.facts["/summary"]) && cursor === null; // at the end of a run that is over, what it came to
   [byId("readings").hidden, byId("figures-row").hidden] = [whole, !whole];
+  const tasks = whole ? tasksOf(run) : [];
+  byId("tasks").hidden = !tasks.length;
+  rewrite(byId("tasks"), tasks, ({ name, done, why }) => el("li", { class: done ? "good" : "bad" }, el("b", {}, name), el("span", {}, done ? "done" : `not done${why && `: ${why}`}`)));
   const wrong = wrongAt(run, t);
   rewrite(byId("wrong"), wrong.length ? wrong : [null], (one) => (one ? el("li", { class: one.tone }, `${one.text}${ago(one.since)}`) : el("li", { class: "good" }, "Nothing is known to be wrong.")));
   const upTo = currentEvent(t) + 1;

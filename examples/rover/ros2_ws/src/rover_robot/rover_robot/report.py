@@ -1,21 +1,27 @@
-"""The rover's part of a report: the floor and the way it went, for the page's map, and how long that was."""
+"""The rover's part of a report: the floor and the way it went, for the page's map; how long that was; what became of the parcels."""
 
 from __future__ import annotations
 
+import json
 import math
 from typing import TYPE_CHECKING, Any
 
-from alula.report.part import Findings, NoPart
+from alula.common.record import BLACKBOARD, MISSION, read_record
+from alula.common.record import Entry as RecordEntry
+from alula.report.part import Findings, NoPart, Task
 
 if TYPE_CHECKING:
-    from collections.abc import Iterator
+    from collections.abc import Iterator, Sequence
 
+    from alula.report.history import RecordedExecution
     from alula.report.part import Entry, ReportedRun
     from alula.report.phases import Phases
 
-BAG, TRUTH = "functional.bag", "/truth/odom"
+BAG, TRUTH, STATE = "functional.bag", "/truth/odom", "/truth/state"
 PERIOD_S = 0.2
 """Between two places of the way on the page."""
+DONE = {"drive_to": "ARRIVED", "open_door": "OPEN", "load": "LOADED", "unload": "UNLOADED"}
+"""What a parcel needs of skills; what ends otherwise may be why it was not delivered."""
 Place = tuple[float, float, float]
 """Seconds of mission clock, x and y in metres, frame map."""
 
@@ -28,14 +34,19 @@ class RoverReport(NoPart):
         self._way: list[Place] = []
 
     def measure(self, phases: Phases, *_: object) -> Findings:
-        """Read where the rover truly was; ``distance_m``: how far it went since it left its dock."""
+        """Read where the rover truly was; ``distance_m``: how far it went since it left its dock; ``collisions``: how often it hit something."""
+        tasks: list[Task] = []
+        with self._run.problems.survive("the parcels"):
+            tasks = list(parcels(read_record(self._run.folder), self._run.history.executions))
         if self._run.facts.mock:
-            return Findings({"distance_m": None})
+            return Findings({"distance_m": None}, tasks=tasks)
+        collisions: int | None = None
         with self._run.problems.survive(BAG):
-            self._way = list(_places(str(self._run.folder / BAG)))
+            self._way, collisions = _truth(str(self._run.folder / BAG))
         since = phases.zero_s
         away = [place[1:] for place in self._way if place[0] >= since]
-        return Findings({"distance_m": round(sum(map(math.dist, away, away[1:])), 2) if away else None})
+        driven_m = round(sum(map(math.dist, away, away[1:])), 2) if away else None
+        return Findings({"distance_m": driven_m, "collisions": collisions}, tasks=tasks)
 
     def entries(self) -> Iterator[Entry]:
         """Return the outlines of what stands on the floor, and the way."""
@@ -50,13 +61,46 @@ class RoverReport(NoPart):
                 yield "/path", round(t_s, 3), [round(x, 3), round(y, 3), 0.0]
 
 
-def _places(bag: str) -> Iterator[Place]:
+def parcels(entries: Sequence[RecordEntry], executions: Sequence[RecordedExecution]) -> Iterator[Task]:
+    """Return what became of each parcel that the mission was given, by what it counted; none for a mission that was given none."""
+    given = [entry.value.get("inputs") for entry in entries if entry.topic == MISSION]
+    names = [parcel["name"] for parcel in given[0].get("parcels", ())] if given and isinstance(given[0], dict) else []
+    dealt: list[tuple[float, bool]] = []  # by parcel: until when it was the one that was dealt with, and whether it was delivered
+    handled = delivered = 0
+    for entry in entries:
+        if entry.topic == BLACKBOARD:
+            before, delivered = delivered, int(entry.value.get("delivered", delivered))
+            if (handled := int(entry.value.get("handled", handled))) > len(dealt):
+                dealt.append((entry.stamp_s, delivered > before))
+    since_s = -math.inf
+    for name, (until_s, done) in zip(names, dealt, strict=False):
+        yield Task(name, done, "" if done else _why(executions, since_s, until_s))
+        since_s = until_s
+    for name in names[len(dealt) :]:
+        moved = [one.result for one in executions if one.inputs.get("parcel") == name and one.result in {"LOADED", "UNLOADED"}]
+        yield Task(name, done=False, why="the mission ended with it in the box" if moved[-1:] == ["LOADED"] else "the mission ended before")
+
+
+def _why(executions: Sequence[RecordedExecution], since_s: float, until_s: float) -> str:
+    """Return what ended otherwise than it should, the last of these, while a parcel was dealt with."""
+    ended = [one for one in executions if one.end_s is not None and since_s < one.end_s <= until_s and one.skill in DONE]
+    failed = [one for one in ended if one.outcome == "TERMINATED" and one.result != DONE[one.skill]]
+    return f"{failed[-1].skill} {failed[-1].result}: {failed[-1].message}".removesuffix(": ") if failed else ""
+
+
+def _truth(bag: str) -> tuple[list[Place], int | None]:
     import rosbag  # late: runs over mocks have no ROS 1
 
+    way: list[Place] = []
+    collisions: int | None = None
     with rosbag.Bag(bag) as file:
-        for _, message, _ in file.read_messages(TRUTH):
-            at = message.pose.pose.position
-            yield message.header.stamp.to_sec(), at.x, at.y
+        for topic, message, _ in file.read_messages([TRUTH, STATE]):
+            if topic == STATE:
+                collisions = int(json.loads(message.data)["collisions"])
+            else:
+                at = message.pose.pose.position
+                way.append((message.header.stamp.to_sec(), at.x, at.y))
+    return way, collisions
 
 
 def _edges(run: ReportedRun) -> list[list[float]]:

@@ -88,19 +88,23 @@ class SimulatorNode:
 
     def run(self) -> None:
         """Step until ``stop`` or until ROS shuts down."""
-        self._begin()
         due_s = time.monotonic()
         while not self._ended:
             while not self._inbox.empty():
                 self._inbox.get()()
             self._simulation.step()
+            if self._steps == 0:
+                self._begin()
             self._publish()
             if self._rate > 0.0:
                 due_s = max(due_s + self._simulation.floor.period_s / self._rate, time.monotonic() - 0.25)
             self._wait(due_s)
 
     def _begin(self) -> None:
-        """Hold time at its beginning until all that work for it are there: how long nodes take to start changes no drive."""
+        """Hold time at its first step until all that work for it are there: how long nodes take to start changes no drive.
+
+        Not at zero, which is no time yet to ROS: a node whose timers begin later than the clock has no tick, and time waits for it.
+        """
         end_s = time.monotonic() + self._start_timeout_s
         while (missing := [*self._absent(), *unconnected()]) and time.monotonic() < end_s and not self._ended:
             self._clock.publish(Clock(clock=messages.ros_time(self._simulation.now_ns)))
@@ -115,6 +119,7 @@ class SimulatorNode:
 
     def _wait(self, due_s: float) -> None:
         """Wait until wall clock and followers have come far enough."""
+        again_s = time.monotonic() + START_CLOCK_S
         while not self._ended:
             now_s = time.monotonic()
             lagging = self._lockstep.lagging(self._simulation.now_s, now_s)
@@ -122,6 +127,9 @@ class SimulatorNode:
                 return
             for topic in set(lagging) & set(self._absent()):
                 self._lockstep.gone(topic)
+            if now_s >= again_s:  # who has missed the last clock would wait for it, and time for them
+                again_s = now_s + START_CLOCK_S
+                self._clock.publish(Clock(clock=messages.ros_time(self._simulation.now_ns)))
             time.sleep(WAIT_S if lagging else due_s - now_s)
 
     def _publish(self) -> None:
