@@ -14,7 +14,7 @@ import sys
 from collections.abc import Collection
 from pathlib import Path
 
-from workspace import WORKSPACES, Built, Workspace, digest
+from workspace import WORKSPACES, Built, Workspace, digest, prefixes_below
 
 TOOLS = ("catkin", "genmsg", "genpy", "genaction", "actionlib_msgs")
 # The interpreter of the environment goes into the shebangs of the nodes' relay scripts; newer catkin looks for it under the second name.
@@ -26,7 +26,7 @@ LEFT_OUT = "gencpp:geneus:genlisp:gennodejs"
 
 def toolchain() -> str:
     """Return what decides how everything is built."""
-    manifests = (Path("/usr/share") / name / "package.xml" for name in TOOLS)
+    manifests = (place / "share" / name / "package.xml" for name in TOOLS for place in (*prefixes_below(), Path("/usr")))
     return digest(sys.version, *CMAKE_ARGUMENTS, LEFT_OUT, *(path.read_bytes() for path in manifests if path.exists()))
 
 

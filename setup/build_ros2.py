@@ -14,7 +14,7 @@ import sys
 from importlib.metadata import distributions
 from pathlib import Path
 
-from workspace import ROOT, WORKSPACES, Built, Package, Workspace, build_files, digest
+from workspace import ROOT, WORKSPACES, Built, Package, Workspace, build_files, digest, prefixes_below
 
 TOOLS = re.compile(r"(ros-|colcon-|empy|catkin-pkg|numpy)", re.IGNORECASE)
 CMAKE_ARGUMENTS = (
@@ -34,9 +34,10 @@ COLCON = (sys.executable, "-c", "import sys; from colcon_core.command import mai
 def toolchain() -> str:
     """Return what decides how everything is built."""
     tools = sorted({f"{d.metadata['Name']}=={d.version}" for d in distributions() if TOOLS.match(d.metadata["Name"])})
+    given = [path.read_bytes() for place in prefixes_below() for path in sorted(place.glob("share/rosidl_*/package.xml"))]
     compiler = subprocess.run(["c++", "--version"], capture_output=True, text=True, check=True).stdout
     sources = [(ROOT / "setup" / name).read_bytes() for name in ("interfaces.cmake", "repair_wheels.py")]
-    return digest(sys.version, compiler, *CMAKE_ARGUMENTS, *tools, *sources)
+    return digest(sys.version, compiler, *CMAKE_ARGUMENTS, *tools, *given, *sources)
 
 
 def read_built(workspace: Workspace, states: dict[str, str], tools: str) -> Built:

@@ -17,7 +17,9 @@ fi
 good "free disk" "$(df -Pm "$ALULA_ROOT" | awk 'NR==2{print $4}') MB; an installation takes about 3000 MB"
 
 echo "Debian packages"
-needed=$(awk -v sealed="$([ -f "$ALULA_STATE/sealed" ] && echo 1)" '/^# Only to build/ && sealed {exit} !/^#/' "$ALULA_ROOT/setup/apt.txt")
+list=$ALULA_STATE/debian.txt   # what was to be installed; before the first set-up all of it
+[ -f "$list" ] || list=$ALULA_ROOT/setup/apt.txt
+needed=$(awk -v sealed="$([ -f "$ALULA_STATE/sealed" ] && echo 1)" '/^# Only to build/ && sealed {exit} !/^#/ {print $1}' "$list")
 wanted=$(wc -w <<<"$needed")
 absent=$(comm -23 <(sort <<<"$needed") \
   <(dpkg-query -W -f '${db:Status-Status} ${binary:Package}\n' 2>/dev/null | awk '$1=="installed"{sub(/:.*/,"",$2);print $2}' | sort))
@@ -38,7 +40,7 @@ look 1 "Open3D, OpenCV, MAVLink" "import open3d, cv2, pymavlink; print(open3d.__
 look 1 "message packages (catkin_make)" "import skillset_interfaces.srv; print('skillset_interfaces')"
 
 echo "ROS 2 world"
-look 2 "rclpy (Jazzy)" "import rclpy, importlib.metadata as m; print(m.version('ros-jazzy-rclpy'))"
+look 2 "rclpy" "import os, rclpy; print(os.environ['ROS_DISTRO'], rclpy.__file__)"
 look 2 "message packages (colcon)" "import skillset_interfaces.srv, tf2_msgs.msg; print('skillset_interfaces, tf2_msgs')"
 look 2 "proofs and language server" "import z3, dd.cudd, pygls; print('z3', z3.get_version_string())"
 look 2 "bridge" "import ros_bridge, rosbags; print('ros_bridge')"

@@ -2,7 +2,7 @@
 # ALULA_ROOT must be set. It is the robot's where its overlay has been built, else Alula's alone.
 # The caller's ROS_MASTER_URI, ROS_DOMAIN_ID, ROS_LOG_DIR and display settings are kept.
 unset PYTHONHOME AMENT_PREFIX_PATH COLCON_PREFIX_PATH CMAKE_PREFIX_PATH PYTHONPATH LD_LIBRARY_PATH ROS_PACKAGE_PATH ROS_ROOT ROS_DISTRO VIRTUAL_ENV
-unset ALULA_UNDERLAYS ALULA_UNDERLAY_PYTHON ALULA_UNDERLAY_LIBRARIES ALULA_UNDERLAY_PACKAGES
+unset ${!ALULA_UNDERLAY@} ROS_ETC_DIR
 . "$ALULA_ROOT/setup/places.sh"
 export PYTHONUNBUFFERED=1 PYTHONNOUSERSITE=1
 # Numeric libraries: many small processes share few cores, a pool of threads in each only makes them wait for one another.
@@ -10,16 +10,18 @@ export OMP_NUM_THREADS="${OMP_NUM_THREADS:-1}" OPENBLAS_NUM_THREADS="${OPENBLAS_
 export MPLBACKEND=Agg
 _path=/usr/local/sbin:/usr/local/bin:/usr/sbin:/usr/bin:/sbin:/bin _robot=""
 robot_packages1=""
+# The ROS that this installation stands on, where it has none of its own; what a robot names below itself begins with that.
+[ ! -f "$ALULA_STATE/given$1.env" ] || . "$ALULA_STATE/given$1.env"
 if [ -n "$ALULA_ROBOT_STATE" ] && [ -x "$ALULA_ROBOT_STATE/venv$1/bin/python3" ]; then
   _robot=$ALULA_ROBOT_STATE
   . "$_robot/robot.env"
   [ ! -f "$_robot/underlays$1.env" ] || . "$_robot/underlays$1.env"
 fi
 _below="${ALULA_UNDERLAYS:+$ALULA_UNDERLAYS:}"
-export PATH="${_robot:+$_robot/venv$1/bin:}$ALULA_STATE/venv$1/bin:$_path"
+export PATH="${_robot:+$_robot/venv$1/bin:}$ALULA_STATE/venv$1/bin:${ALULA_UNDERLAY_PROGRAMS:+$ALULA_UNDERLAY_PROGRAMS:}$_path"
 case "$1" in
   1)
-    export ROS_VERSION=1 ROS_PYTHON_VERSION=3 ROS_ETC_DIR=/etc/ros
+    export ROS_VERSION=1 ROS_PYTHON_VERSION=3 ROS_ETC_DIR="${ROS_ETC_DIR:-/etc/ros}"
     export ROS_PACKAGE_PATH="${robot_packages1:+$robot_packages1:}$ALULA_STATE/ros1/src:${ALULA_UNDERLAY_PACKAGES:+$ALULA_UNDERLAY_PACKAGES:}/usr/share"
     export CMAKE_PREFIX_PATH="${_robot:+$_robot/ros1/devel:}$ALULA_STATE/ros1/devel:$_below/usr"
     export ROS_MASTER_URI="${ROS_MASTER_URI:-http://127.0.0.1:11311}"
@@ -27,7 +29,7 @@ case "$1" in
     [ -n "${ROS_HOSTNAME:-}" ] || export ROS_IP="${ROS_IP:-127.0.0.1}"
     ;;
   2)
-    export ROS_VERSION=2 ROS_DISTRO=jazzy ROS_PYTHON_VERSION=3
+    export ROS_VERSION=2 ROS_DISTRO="${ROS_DISTRO:-jazzy}" ROS_PYTHON_VERSION=3
     export AMENT_PREFIX_PATH="${_robot:+$_robot/ros2/install:}$ALULA_STATE/ros2/install:$_below$ALULA_STATE/venv2"
     export CMAKE_PREFIX_PATH="$AMENT_PREFIX_PATH"
     # The wheels would start Python a second time to set the loader's path, and look for their libraries in the robot's environment.

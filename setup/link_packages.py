@@ -34,10 +34,15 @@ def sources(workspace: Workspace) -> list[Path]:
     return [package.folder for package in workspace.packages.values() if (package.folder / "setup.cfg").exists()]
 
 
+def python_below() -> list[Path]:
+    """Return where the Python packages of underlays are."""
+    return [Path(place) for place in os.environ.get("ALULA_UNDERLAY_PYTHON", "").split(os.pathsep) if place]
+
+
 def alulas_lines(world: str) -> list[str]:
     """Return the lines of Alula's path file in the order in which they are looked into."""
     workspace = alulas_workspace(world)
-    places = [built(workspace, world), *(ROOT / place for place in LIBRARY_TOOLS_AND_TESTS), *sources(workspace)]
+    places = [built(workspace, world), *(ROOT / place for place in LIBRARY_TOOLS_AND_TESTS), *sources(workspace), *python_below()]
     return [str(place.resolve()) for place in places]
 
 
@@ -46,8 +51,7 @@ def robots_lines(world: str) -> list[str]:
     workspace, generated = robots_workspace(world), Path(os.environ["ALULA_ROBOT_STATE"]) / "generated"
     # Managers run over rospy, too.
     managers = [package.folder for name, package in find_packages([generated]).items() if world == "1" and name.endswith("_managers")]
-    below = [Path(place) for place in os.environ.get("ALULA_UNDERLAY_PYTHON", "").split(os.pathsep) if place]
-    places = [built(workspace, world), *sources(workspace), *managers, *below]
+    places = [built(workspace, world), *sources(workspace), *managers, *python_below()]
     return [*(str(place.resolve()) for place in places), f"import site; site.addsitedir({str(site_packages(STATE, world))!r})"]
 
 

@@ -28,13 +28,21 @@ make_robot() {
 }
 
 title_underlays="what lies below Alula"
-key_underlays() {
+key_underlays() { # of which packages there are: a whole ROS has too many files to read them each time
   echo "${robot_underlays1[*]} / ${robot_underlays2[*]}"
-  digest "$ALULA_ROOT/setup/underlays.sh"
-  local folder; for folder in "${robot_underlays1[@]}" "${robot_underlays2[@]}"; do tree_digest "$folder"; done
+  digest "$ALULA_ROOT"/setup/{underlays.sh,given_ros.py}
+  [ -z "${robot_underlays1[*]}${robot_underlays2[*]}" ] ||
+    find -L "${robot_underlays1[@]}" "${robot_underlays2[@]}" -maxdepth 4 \( -name 'setup.*' -o -name package.xml \) -printf '%p %T@\n' | LC_ALL=C sort | digest -
 }
-make_underlays() {
-  "$ALULA_ROOT/setup/underlays.sh" "${robot_underlays1[@]}" >"$state/underlays1.env" && "$ALULA_ROOT/setup/underlays.sh" "${robot_underlays2[@]}" >"$state/underlays2.env"
+make_underlays() { sourced 1 "${robot_underlays1[@]}" && sourced 2 "${robot_underlays2[@]}"; }
+sourced() { # WORLD FOLDER...: all of them, and the first ones that hold a whole ROS between them, on which Alula can stand
+  local world=$1 count found; shift
+  "$ALULA_ROOT/setup/underlays.sh" "$@" >"$state/underlays$world.env" && : >"$state/whole$world.env" || return 1
+  for ((count = 1; count <= $#; count++)); do
+    "$ALULA_ROOT/setup/underlays.sh" "${@:1:count}" >"$state/first.env" && found=$(beside "$state/first.env" "$world") || return 1
+    [ -z "$found" ] || { printf '%s\n' "$found" >>"$state/first.env" && mv "$state/first.env" "$state/whole$world.env"; return; }
+  done
+  rm -f "$state/first.env"
 }
 
 missing_packages() { [ -z "$robot_debian1$robot_debian2" ] || missing_of $robot_debian1 $robot_debian2; }

@@ -33,6 +33,12 @@ install_packages() { # MISSING
   as_root env DEBIAN_FRONTEND=noninteractive apt-get install -q -y --no-install-recommends $missing
 }
 
+# beside ENV WORLD [LIST]: what given_ros.py says, in the environment that underlays.sh has printed into a file.
+beside() {
+  local place=$1; shift
+  env -i PATH=/usr/bin:/bin "$BASH" -c '. "$1"; shift; exec python3 "$@"' beside "$place" "$ALULA_ROOT/setup/given_ros.py" "$@"
+}
+
 # The environment of a world; one that is there already, of the same Python and in the same place, gets the differences only.
 # A virtual environment of the user's own must not leak into it.
 clean() { env -u VIRTUAL_ENV -u PYTHONPATH -u PYTHONHOME "$@"; }

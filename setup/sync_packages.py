@@ -1,7 +1,8 @@
 """Make this interpreter's environment hold exactly the pinned packages of a file: install and uninstall the differences only.
 
-usage: python sync_packages.py REQUIREMENTS [--runtime]
+usage: python sync_packages.py REQUIREMENTS [--runtime] [--beside REQUIREMENTS]
 
+``--beside`` names a file whose packages stay as they are, there or not.
 ``--runtime`` leaves out the pins below the line ``# Only to build and to test``.
 A package counts as installed when its version is the pinned one and none of its files is missing. What no pin
 names is removed, but for pip and setuptools. An environment that sees another one by a path file has what is pinned there, too.
@@ -9,6 +10,7 @@ names is removed, but for pip and setuptools. An environment that sees another o
 
 from __future__ import annotations
 
+import argparse
 import csv
 import re
 import subprocess
@@ -73,10 +75,11 @@ def pip(*words: str) -> None:
         sys.exit(done.returncode)
 
 
-def sync(requirements: Path, *, runtime: bool) -> None:
+def sync(requirements: Path, *, runtime: bool, beside: Path | None) -> None:
     """Remove what is not pinned, then install what is missing, damaged or of another version."""
     pins = read_pins(requirements, runtime=runtime)
-    extra = removable(pins, Path(sysconfig.get_path("purelib")))
+    stays = read_pins(beside, runtime=runtime) if beside else {}
+    extra = removable({**stays, **pins}, Path(sysconfig.get_path("purelib")))
     if extra:
         pip("uninstall", "--yes", *extra)
     present = installed()
@@ -88,4 +91,9 @@ def sync(requirements: Path, *, runtime: bool) -> None:
 
 
 if __name__ == "__main__":
-    sync(Path(sys.argv[1]), runtime="--runtime" in sys.argv[2:])
+    parser = argparse.ArgumentParser()
+    parser.add_argument("requirements", type=Path)
+    parser.add_argument("--runtime", action="store_true")
+    parser.add_argument("--beside", type=Path)
+    options = parser.parse_args()
+    sync(options.requirements, runtime=options.runtime, beside=options.beside)

@@ -3,7 +3,8 @@
 # Each is sourced as its own tools have written it, one after the other, in a shell that knows nothing of Alula.
 set -u
 [ $# -gt 0 ] || exit 0
-if [ "${1:-}" != --sourced ]; then exec env -i PATH=/usr/bin:/bin HOME="${HOME:-/}" "$BASH" "$0" --sourced "$@"; fi
+plain=/usr/bin:/bin
+if [ "${1:-}" != --sourced ]; then exec env -i PATH=$plain HOME="${HOME:-/}" "$BASH" "$0" --sourced "$@"; fi
 shift
 for folder in "$@"; do
   found=""
@@ -19,6 +20,8 @@ without() { # LIST PATH...: what is in a list between colons, but for some
   printf '%q' "${kept#:}"
 }
 echo "export ALULA_UNDERLAYS=$(without "${AMENT_PREFIX_PATH:-}:${CMAKE_PREFIX_PATH:-}" /usr)"
+echo "export ALULA_UNDERLAY_PROGRAMS=$(without "$PATH" ${plain//:/ })"
 echo "export ALULA_UNDERLAY_PYTHON=$(without "${PYTHONPATH:-}" /usr/lib/python3/dist-packages)"
 echo "export ALULA_UNDERLAY_LIBRARIES=$(without "${LD_LIBRARY_PATH:-}")"
 echo "export ALULA_UNDERLAY_PACKAGES=$(without "${ROS_PACKAGE_PATH:-}" /usr/share)"
+for name in ROS_DISTRO ROS_ETC_DIR ROS_ROOT; do [ -z "${!name:-}" ] || printf 'export %s=%q\n' "$name" "${!name}"; done

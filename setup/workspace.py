@@ -117,8 +117,14 @@ class Workspace:
 def alulas_workspace(world: str) -> Workspace:
     """Return the workspace of the general packages."""
     found = find_packages(ROOT / place for place in PLACES[world])
-    ros = Path("/usr") if world == "1" else STATE / "venv2"
-    return Workspace(STATE / f"ros{world}", {name: found[name] for name in found if name in GENERAL[world]}, {}, (ros,))
+    own = Path("/usr") if world == "1" else STATE / "venv2"
+    packages = {name: found[name] for name in found if name in GENERAL[world]}
+    return Workspace(STATE / f"ros{world}", packages, {}, (*prefixes_below(), own))
+
+
+def prefixes_below() -> list[Path]:
+    """Return where the packages of underlays are: the robot's, or the ROS that Alula's installation stands on."""
+    return [Path(place) for place in os.environ.get("ALULA_UNDERLAYS", "").split(os.pathsep) if place]
 
 
 def robots_workspace(world: str) -> Workspace:
@@ -132,8 +138,7 @@ def robots_workspace(world: str) -> Workspace:
     found |= {name: package for name, package in generated.items() if world == "2" or name.endswith("_interfaces")}
     own = {name: package for name, package in found.items() if name not in below.packages}
     prefix = below.folder / ("devel" if world == "1" else "install")
-    underlays = [Path(place) for place in os.environ.get("ALULA_UNDERLAYS", "").split(os.pathsep) if place]
-    return Workspace(state / f"ros{world}", own, below.packages, (prefix, *underlays, *below.prefixes))
+    return Workspace(state / f"ros{world}", own, below.packages, (prefix, *below.prefixes))
 
 
 WORKSPACES = {"alula": alulas_workspace, "robot": robots_workspace}

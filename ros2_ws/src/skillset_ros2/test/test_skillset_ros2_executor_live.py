@@ -429,5 +429,5 @@ def test_with_another_rclpy_than_the_pinned_one_its_own_loop_and_handlers_are_ta
 
 
 def test_the_pinned_rclpy_is_the_one_that_the_executor_knows():
-    pins = (Path(__file__).resolve().parents[4] / "setup/ros2.txt").read_text(encoding="utf-8").split()
+    pins = (Path(__file__).resolve().parents[4] / "setup/jazzy.txt").read_text(encoding="utf-8").split()
     assert f"ros-rclpy=={RCLPY}" in pins
