@@ -177,6 +177,8 @@ def test_names_and_outline(editor):
     # References and a new name: of the resource, and of a state where another resource has one of that name.
     found = editor.at("textDocument/references", 12, "axes", context={"includeDeclaration": True})
     assert [(one["range"]["start"]["line"], one["range"]["start"]["character"]) for one in found] == [(4, 11), (11, 17), (12, 23), (14, 24)]
+    used = editor.at("textDocument/references", 12, "axes", context={"includeDeclaration": False})
+    assert used == found[1:], "without the place where it is declared"
     edit = editor.at("textDocument/rename", 12, "FREE", newName="IDLE")
     places = [(one["range"]["start"]["line"], one["newText"]) for one in edit["changes"][URI]]
     assert places == [(5, "IDLE"), (6, "IDLE"), (7, "IDLE"), (7, "IDLE"), (12, "IDLE"), (14, "IDLE")]
