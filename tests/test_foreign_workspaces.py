@@ -18,17 +18,15 @@ ALULA_ROOT = Path(__file__).resolve().parents[1]
 STATE = Path(os.environ["ALULA_STATE"])
 VENV2 = STATE / "venv2"
 INTERFACES, LIBRARY = ALULA_ROOT / "bridge/interfaces/skillset_interfaces", ALULA_ROOT / "lib"
-DEBIAN = {"yaml": "yaml", "cv2": "opencv", "PIL": "pil", "tf2_ros": "tf2-ros"}
+DEBIAN = {"yaml": "yaml", "cv2": "opencv", "PIL": "pil", "tf2_ros": "tf2-ros", "irsim": "ir-sim"}
 """Debian's packages by module, where they are called otherwise; `python3-` comes before."""
-PIP = {"aiortc", "av", "gtsam", "mcap", "plyfile", "py_trees", "pymavlink", "rosbags", "textual"}
+PIP = {"aiortc", "av", "gtsam", "irsim", "mcap", "plyfile", "py_trees", "pymavlink", "rosbags", "textual"}
 """What set-up has from PyPI; rosdep's names of such end in `-pip`."""
 OF_PYPI = {"yaml": "PyYAML", "z3": "z3-solver", "py_trees": "py-trees", "lsprotocol": "pygls", "zmq": "pyzmq"}
 ROS = re.compile(r"rclpy|rospy|roslib|rosgraph|rosbag|genpy|actionlib|alula|dynamic_reconfigure|\w+_(msgs|srvs|interfaces|managers)")
 STUBS = {"_typeshed"}
 """What only a type checker imports."""
 LAUNCHED = re.compile(r"\$\(find (\w+)\)|pkg=\"(\w+)\"")
-ROBOTS = "examples"
-"""Robots of their own have their own folder, and manifests."""
 
 
 def copy(workspace: Path, *packages: Path) -> Path:
@@ -93,9 +91,9 @@ def depends(manifest: Path) -> set[str]:
 
 
 def manifests() -> dict[str, Path]:
-    """Return the manifests of the checkout by the package's name; robots of their own are not of it."""
+    """Return the manifests of the checkout, its example robots included, by the package's name."""
     listed = subprocess.run(["git", "ls-files", "*package.xml"], cwd=ALULA_ROOT, capture_output=True, text=True, check=True).stdout
-    found = [ALULA_ROOT / line for line in listed.split() if not line.startswith(ROBOTS)]
+    found = [ALULA_ROOT / line for line in listed.split()]
     return {str(ET.parse(path).getroot().findtext("name")): path for path in found}  # noqa: S314 - our own
 
 

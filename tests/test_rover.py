@@ -11,10 +11,13 @@ from pathlib import Path
 
 import pytest
 
+from alula.common.network import claim_domain, free_port
 from alula_testing.cover import read_only
+from alula_testing.ros1 import end_process
 
 ALULA_ROOT = Path(__file__).resolve().parents[1]
 IN_ROS2 = str(ALULA_ROOT / "setup/in_ros2")
+CLIENTS = str(ALULA_ROOT / "tests/support/alula_testing/rover_clients.py")
 
 
 @pytest.fixture(scope="module")
@@ -56,3 +59,93 @@ def test_no_line_of_the_framework_names_it() -> None:
     command = ["grep", "-rlE", "--include=*.py", "--include=*.yaml", "--include=*.launch", "--include=*.sh", pattern, *places]
     found = subprocess.run(command, cwd=ALULA_ROOT, capture_output=True, text=True, check=False).stdout.splitlines()
     assert [line for line in found if "/test/" not in line] == []
+
+
+# --- live ------------------------------------------------------------------------------------------------------------
+
+
+@pytest.fixture(scope="module")
+def ready(rover: Path) -> Path:
+    """Return the copy, set up, with a world in which there is one parcel to be delivered."""
+    office = (rover / "worlds/office.yaml").read_text(encoding="utf-8")
+    before, _, after = office.partition("parcels:\n")
+    first, rest = after.partition("\n")[0], after.partition("rounds:")[2]
+    (rover / "worlds/one.yaml").write_text(f"{before}parcels:\n{first}\nrounds:{rest}", encoding="utf-8")
+    done = alula(rover, "setup")
+    assert done.returncode == 0, done.stdout[-4000:] + done.stderr[-2000:]
+    return rover
+
+
+def alula(rover: Path, *words: str) -> subprocess.CompletedProcess[str]:
+    kept = {k: v for k, v in os.environ.items() if not k.startswith(("ALULA_ROBOT", "PYTHONPATH", "PYTEST_ADDOPTS", "ROS_DOMAIN_ID"))}
+    command = [*read_only(), str(ALULA_ROOT / "alula"), "--robot", str(rover), *words]
+    return subprocess.run(command, cwd=rover, capture_output=True, text=True, check=False, env=kept)
+
+
+@pytest.mark.flight
+@pytest.mark.timeout(0)  # builds a robot's packages: as long as the machine needs
+def test_carried_into_a_room_that_is_shut_and_its_navigation_killed_it_delivers_its_parcel(ready: Path, tmp_path: Path) -> None:
+    faults = ["--fail", "pose:lost@14", "--fail", "navigation:killed@35-36"]
+    done = alula(ready, "run", "deliver", "--world", "one", "--rate", "0", *faults, "--out", str(tmp_path / "run"))
+    assert done.returncode == 0, done.stdout[-4000:] + done.stderr[-2000:]
+    assert "parcels: 1 of 1 done" in done.stdout
+    summary = json.loads((tmp_path / "run/summary.json").read_text(encoding="utf-8"))
+    assert (summary["outcome"], summary["landed"], summary["problems"]) == ("degraded", True, [])
+    assert (summary["collisions"], summary["tasks"]) == (0, [{"name": "store-kitchen", "done": True, "why": ""}])
+    assert [(one["name"], one["how"]) for one in summary["died"]] == [("navigation", "signal SIGKILL")]
+    ended = [(one["skill"], one["result"]) for one in summary["skills"]]
+    answer = ended[ended.index(("drive_to", "keeps_pose")) :]
+    order = [one for one in answer if one[0] in {"stop_here", "localise", "open_door", "load", "unload", "dock"}]
+    assert order[:7] == [("stop_here", "STANDING"), ("localise", "FOUND"), *[("open_door", "OPEN")] * 5]
+    assert [one for one in order[7:] if one[0] != "open_door"] == [("load", "LOADED"), ("unload", "UNLOADED"), ("dock", "DOCKED")]
+    assert {one[1] for one in answer if one[0] == "drive_to"} & {"BLOCKED", "ABORTED"}  # of the navigation's death
+    assert (tmp_path / "run/report.html").is_file()
+
+
+@pytest.mark.timeout(0)
+def test_its_hooks_work_over_faked_functions(ready: Path) -> None:
+    done = alula(ready, "test", "ros2_ws/src/rover_robot/test")
+    assert done.returncode == 0, done.stdout[-4000:] + done.stderr[-2000:]
+    assert re.search(r"^\d+ passed", done.stdout, re.MULTILINE)
+
+
+LAYER = """<launch>
+  <include file="$(find rover_navigation)/launch/functional.launch">
+    <arg name="world" value="$(env ALULA_ROBOT)/worlds/office.yaml"/>
+    <arg name="rate" value="4"/>
+  </include>
+  <node pkg="skillset_ros1" type="in_ros2" name="base" args="python -m rover_robot.serve base --ros-args -p use_sim_time:=true"/>
+  <node pkg="skillset_ros1" type="in_ros2" name="ros_bridge"
+        args="python -m ros_bridge --config $(env ALULA_ROBOT_STATE)/generated/rover_bridge.yaml"/>
+</launch>
+"""
+"""The functional layer, the bridge, and the managers of one skillset: no mission."""
+
+
+@pytest.mark.flight
+@pytest.mark.timeout(0)
+def test_stock_clients_drive_it_by_its_navigation_and_by_its_skills(ready: Path, tmp_path: Path) -> None:
+    (tmp_path / "layer.launch").write_text(LAYER, encoding="utf-8")
+    port, domain = free_port(), claim_domain()
+    kept = {k: v for k, v in os.environ.items() if not k.startswith(("PYTHONPATH", "PYTEST_ADDOPTS"))}
+    graph = {"ALULA_ROBOT": str(ready), "ROS_MASTER_URI": f"http://127.0.0.1:{port}", "ROS_IP": "127.0.0.1"}
+    environment = {**kept, **graph, "ROS_DOMAIN_ID": str(domain.domain), "ROS_LOG_DIR": str(tmp_path)}
+
+    def client(world: int) -> dict[str, object]:
+        command = [str(ALULA_ROOT / f"setup/in_ros{world}"), "python", CLIENTS, f"ros{world}"]
+        done = subprocess.run(command, capture_output=True, text=True, check=False, env=environment)
+        assert done.returncode == 0, done.stderr[-3000:]
+        return dict(json.loads(done.stdout.splitlines()[-1]))
+
+    launch = [str(ALULA_ROOT / "setup/in_ros1"), "roslaunch", "-p", str(port), str(tmp_path / "layer.launch")]
+    with (tmp_path / "launch.log").open("w") as log:
+        layer = subprocess.Popen(launch, env=environment, stdout=log, stderr=log, start_new_session=True)
+        try:
+            by_skills, by_navigation = client(2), client(1)
+        finally:
+            end_process(layer, timeout_s=60.0)
+            domain.release()
+    assert (by_skills["driven"], by_skills["stopped"]) == (["TERMINATED", "ARRIVED"], "INTERRUPTED")
+    assert (by_navigation["state"], by_navigation["text"]) == (3, "arrived")  # actionlib's SUCCEEDED
+    assert by_skills["heard"]
+    assert by_navigation["heard"]

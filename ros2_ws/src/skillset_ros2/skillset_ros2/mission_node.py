@@ -106,6 +106,7 @@ class MissionNode(Node):  # type: ignore[misc]  # rclpy is not typed
         if self._heartbeat is None and all(client.ready for client in self._skillset_clients):
             # Latched: time waits for the first heartbeats, which may be sent before a bridge has connected.
             self._heartbeat = self.create_publisher(Header, "mission/heartbeat", LATCHED)
+            self.driver.wake()  # the first one at once: the clock may stand still until it comes
 
     def _parameter(self, name: str, default: float) -> Any:
         return self.declare_parameter(name, default).value

@@ -21,6 +21,7 @@ from uav_skills_rig import Rig
 
 from alula.common.record import EVENTS, OPERATOR, TREE, read_record
 from alula.trees.groot.address import Address
+from alula_testing.waits import until
 
 CLOCKS_APART_S = 0.1
 """Managers under load stamp by a clock message that is some ticks old."""
@@ -59,6 +60,10 @@ class Mission:
 
     def _hear(self, heartbeat: Header) -> None:
         self._ticked_s, self._heard_at_s = heartbeat.stamp.sec + heartbeat.stamp.nanosec * 1e-9, time.monotonic()
+
+    def has_told(self) -> bool:
+        """Tell whether a heartbeat has come."""
+        return self._heard_at_s > 0.0
 
     def _heard_s(self) -> float:
         """Return the mission clock of the last tick, infinite where none is to be waited for."""
@@ -248,6 +253,20 @@ def test_a_mission_that_is_told_to_end_before_the_start_does_not_start(whole_rig
     assert mission.exit_code() == 1
     assert mission.read("mission.json")["outcome"] == "aborted"
     assert whole_rig.functional.names() == []
+
+
+def test_the_first_heartbeat_comes_while_the_clock_stands_still(whole_rig, tmp_path):
+    whole_rig.prepare()
+    whole_rig.set("navigation", "homepoint_status", "INVALID")
+    stands = whole_rig.functional.now_s
+    hold = lambda: stands  # noqa: E731
+    whole_rig.followers.append(hold)
+    mission = Mission(whole_rig, tmp_path / "run")
+    try:
+        until(mission.has_told, "a heartbeat", 120.0)
+    finally:
+        whole_rig.followers.remove(hold)
+        mission.close()
 
 
 def test_an_unreadable_route_can_not_start(tmp_path):

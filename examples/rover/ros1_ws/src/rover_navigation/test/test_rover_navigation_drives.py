@@ -89,6 +89,17 @@ def test_it_gets_away_from_who_stands_next_to_it(bearing):
     assert rig.simulation.truth.collisions == 0
 
 
+@pytest.mark.parametrize(
+    ("pose", "person"), [((14.05, 5.56, 2.77), (13.61, 5.89)), ((8.0, 5.3, math.pi), (7.2, 5.2)), ((9.0, 5.4, 0.0), (9.8, 5.6))]
+)
+def test_along_a_corridor_it_gets_around_who_stands_there(pose, person):
+    rig = Rig(doors=())
+    rig.stand(pose, person=person)
+    goal = (3.0, 5.4, math.pi) if abs(pose[2]) > 1.0 else (14.5, 5.4, 0.0)
+    assert rig.run(Corridor(goal)) == ARRIVED
+    assert rig.simulation.truth.collisions == 0
+
+
 def test_a_rover_that_turns_is_found_on_the_whole_map():
     rig = Rig("pose:lost@3")
     rig.run(Drive(rig.around, OFFICE), 8.0)

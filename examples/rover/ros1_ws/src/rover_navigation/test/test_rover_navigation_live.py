@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import json
 import math
-import time
 from pathlib import Path
 
 import actionlib
@@ -15,7 +14,7 @@ from alula_testing.ros1 import wait_until
 from move_base_msgs.msg import MoveBaseAction, MoveBaseGoal
 from nav_msgs.msg import OccupancyGrid, Odometry
 from std_msgs.msg import String
-from std_srvs.srv import SetBool, Trigger
+from std_srvs.srv import SetBool
 
 WORLD = Path(__file__).parents[4] / "worlds/office.yaml"
 LAUNCH = Path(__file__).parents[1] / "launch/functional.launch"
@@ -77,11 +76,13 @@ def test_stock_clients_drive_it_through_doors_and_onto_the_dock(start_layer):
     grid = rospy.wait_for_message("/map", OccupancyGrid, timeout=UP_S)
     assert (grid.info.width, grid.info.height) == (328, 224)
 
-    # A preempted goal: the rover stands, and takes the next one.
-    client = layer.send("move_base", 14.5, 5.4, math.pi)
+    # The newest goal counts, also of another action; a goal that is cancelled stops the rover.
+    first = layer.send("move_base", 14.5, 5.4, math.pi)
     wait_until(lambda: layer.distance_m(0.57, 5.4) > 1.0, timeout_s=DRIVE_S, what="a metre driven")
-    busy = layer.drive("creep", 3.0, 5.4, 0.0)
-    assert busy == (GoalStatus.ABORTED, "busy: drive is under way")
+    client = layer.send("follow_corridor", 14.5, 5.4, math.pi)
+    wait_until(lambda: first.get_state() == GoalStatus.PREEMPTED, timeout_s=DRIVE_S, what="preempted by another goal")
+    assert first.get_goal_status_text() == "another goal has come"
+    assert client.get_state() in {GoalStatus.PENDING, GoalStatus.ACTIVE}
     client.cancel_goal()
     wait_until(lambda: client.get_state() == GoalStatus.PREEMPTED, timeout_s=DRIVE_S, what="preempted")
     from_m = layer.distance_m(0.57, 5.4)
@@ -111,11 +112,15 @@ def test_carried_away_it_notices_and_finds_itself_by_turning(start_layer):
     client = layer.send("move_base", 14.5, 5.4, math.pi)
     wait_until(lambda: health and health[-1]["pose"] == "LOST", timeout_s=DRIVE_S, what="LOST")
     client.cancel_goal()
-    localize = rospy.ServiceProxy("/localize", Trigger)
-    end = time.monotonic() + UP_S
-    answer = localize()
-    assert time.monotonic() < end
-    assert answer.success, answer.message
+
+    # A search that is stopped leaves the rover standing; the next one finds it.
+    turning = lambda: abs(layer.truth.twist.twist.angular.z) > 0.3
+    stopped = layer.send("localize")
+    wait_until(turning, timeout_s=DRIVE_S, what="it turns")
+    stopped.cancel_goal()
+    wait_until(lambda: stopped.get_state() == GoalStatus.PREEMPTED and not turning(), timeout_s=DRIVE_S, what="it stands")
+    status, told = layer.drive("localize")
+    assert status == GoalStatus.SUCCEEDED, told
     wait_until(lambda: health[-1]["pose"] == "GOOD", timeout_s=UP_S, what="GOOD")
     assert rospy.ServiceProxy("/door/office/open", SetBool)(True).success
     assert layer.drive("move_base", 13.4, 8.8, 0.0) == (GoalStatus.SUCCEEDED, "arrived")

@@ -121,7 +121,10 @@ def test_time_waits_for_those_that_lag_and_not_for_the_dead():
     assert lockstep.lagging(5.15, 0.0) == ["/a"]
     assert lockstep.lagging(5.35, 0.0) == ["/a", "/b"]
     lockstep.gone("/b")
+    assert lockstep.left_out == ["/b"]
     assert lockstep.lagging(5.35, 9.0) == ["/a"]
     assert lockstep.lagging(5.35, 11.0) == []  # it hangs
+    assert lockstep.left_out == ["/a", "/b"]
     lockstep.heard("/a", 5.3)
+    assert lockstep.left_out == ["/b"]
     assert lockstep.lagging(5.45, 11.0) == ["/a"]

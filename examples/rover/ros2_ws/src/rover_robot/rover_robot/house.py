@@ -15,7 +15,7 @@ Pose = dict[str, float]
 
 
 def inputs_of(path: Path) -> Inputs:
-    """Read what the missions are given from a world: ``parcels`` with the rooms of both ends, ``rounds``.
+    """Read what the missions are given from a world: ``parcels`` with the rooms of both ends, ``rounds``, all doors of the ``house``.
 
     A room is ``{name, inside, ways}``, a way a list of doors ``{door, at, safe}``; all poses as `Pose`.
 
@@ -26,7 +26,8 @@ def inputs_of(path: Path) -> Inputs:
         said = yaml.safe_load(path.read_text(encoding="utf-8"))
         house = House(said)
         parcels = [{"name": f"{p['from']}-{p['to']}", "from": house.room(p["from"]), "to": house.room(p["to"])} for p in said["parcels"]]
-        return {"parcels": parcels, "rounds": [house.place(name) for name in said["rounds"]], "safe": house.place(said["rounds"][-1])}
+        rounds = [house.place(name) for name in said["rounds"]]
+        return {"parcels": parcels, "rounds": rounds, "safe": rounds[-1], "house": house.doors()}
     except OSError as error:
         raise InputError(f"{path}: {error.strerror}") from error
     except KeyError as error:
@@ -48,6 +49,10 @@ class House:
     def room(self, name: str) -> dict[str, Any]:
         """Return a room with its ways; raises KeyError, ValueError."""
         return {"name": name, "inside": self.place(name), "ways": [[self._door(door) for door in way] for way in self._ways[name]]}
+
+    def doors(self) -> list[dict[str, Any]]:
+        """Return every door once; raises KeyError, ValueError."""
+        return list({door["door"]: door for door in map(self._door, self._doors)}.values())
 
     def _door(self, name: str) -> dict[str, Any]:
         said = self._doors[name]

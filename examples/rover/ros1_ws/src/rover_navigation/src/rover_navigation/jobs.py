@@ -8,7 +8,7 @@ from typing import Protocol
 
 import numpy as np
 
-from rover_navigation.following import STAND, Twist, carrots, steer, towards, turn
+from rover_navigation.following import LOOK_S, STAND, Twist, carrots, free_m, steer, towards, turn
 from rover_navigation.geometry import Points, Pose, inverse, transformed, wrapped
 from rover_navigation.planning import NoWayError, Surroundings, plan, plan_anew
 
@@ -23,6 +23,8 @@ BEFORE_DOCK_M = 0.6  # where docking by scan begins
 FACE_M = 0.25  # around where the dock should be its face is looked for
 GAP_M = 0.27  # from the laser to the dock's face when it stands on the dock
 CONTACT_S = 3.0
+ASIDE_RAD = tuple(0.3 * step for step in (0, 1, -1, 2, -2, 3, -3, 4, -4))  # along a corridor: ways around what stands in it
+ASIDE_M = 0.3  # of free way is worth less than going straight, for each radian aside
 
 
 @dataclass(frozen=True)
@@ -118,7 +120,10 @@ class Drive:
 
 @dataclass
 class Corridor:
-    """Keep to the middle between two walls until the goal is beside the rover; the pose only says how far that is."""
+    """Keep to the middle between two walls, and around who stands there, until the goal is beside the rover.
+
+    The pose only says how far that is.
+    """
 
     goal: Pose
     patience: Patience = field(default_factory=Patience)
@@ -133,17 +138,25 @@ class Corridor:
         if self.patience.out(float(math.hypot(*to_go)), now.now_s):
             return Ended(arrived=False, text="something stays in the corridor")
         bearing = math.atan2(to_go[1], to_go[0])
-        if abs(bearing) > 0.7:
-            return turn(bearing)
-        return steer(np.array([[1.0, self._middle_m(now.points, bearing)]]), SPEED_M_S, now.points)
+        along = transformed((0.0, 0.0, -bearing), now.points)
+        ahead = math.atan2(self._middle_m(along), 1.0)
+        aside = max(ASIDE_RAD, key=lambda one: self._worth_m(along, ahead + one, one))
+        heading = bearing + ahead + aside
+        return steer(np.array([[math.cos(heading), math.sin(heading)]]), SPEED_M_S, now.points)
 
     @staticmethod
-    def _middle_m(points: Points, bearing: float) -> float:
-        """Return how far to the left the corridor's middle is a metre ahead; along the bearing where a side is open."""
+    def _worth_m(points: Points, heading_rad: float, aside_rad: float) -> float:
+        """Return how far it gets straight on after a turn, less what going aside costs."""
+        free = free_m((SPEED_M_S, 0.0), transformed((0.0, 0.0, -heading_rad), points))
+        return min(free, SPEED_M_S * LOOK_S) - ASIDE_M * abs(aside_rad)
+
+    @staticmethod
+    def _middle_m(points: Points) -> float:
+        """Return how far to the left the corridor's middle is a metre ahead, of points along it; straight on where a side is open."""
         beside = points[(points[:, 0] > 0.3) & (points[:, 0] < 1.5)]
         left, right = beside[beside[:, 1] > 0.0], beside[beside[:, 1] < 0.0]
         if not len(left) or not len(right) or left[:, 1].min() - right[:, 1].max() > 2.5:
-            return math.tan(bearing)
+            return 0.0
         return float(left[:, 1].min() + right[:, 1].max()) / 2.0
 
 

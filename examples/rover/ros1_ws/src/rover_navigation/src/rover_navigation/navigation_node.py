@@ -1,4 +1,4 @@
-"""Navigation's node: /move_base, /follow_corridor, /creep and /dock, each a move_base_msgs/MoveBaseAction; one at a time."""
+"""Navigation's node: /move_base, /follow_corridor, /creep and /dock, each a move_base_msgs/MoveBaseAction; the newest goal counts."""
 
 from __future__ import annotations
 
@@ -68,35 +68,29 @@ class NavigationNode:
     # --- goals, each in the thread of its server ----------------------------------------------------------------------
 
     def _execute(self, name: str, make: Callable[[Pose], Job], goal: MoveBaseGoal) -> None:
-        """Have the job done; return when it has ended or was preempted."""
-        server = self._servers[name]
-        refused = self._begin(make, goal)
-        if refused:
-            server.set_aborted(text=refused)
+        """Have the job done; return when it has ended or was preempted: by its client, or by a goal of another action."""
+        server, frame = self._servers[name], goal.target_pose.header.frame_id
+        if frame not in {"map", ""}:
+            server.set_aborted(text=f"the goal's frame is '{frame}'; give it in map")
             return
+        job = make(pose_of(goal.target_pose.pose))
+        with self._lock:
+            self._job, self._ended = job, None
         while not rospy.is_shutdown():
             with self._lock:
-                ended = self._ended
-                if ended is None and server.is_preempt_requested():
+                if self._job is not job:
+                    server.set_preempted(text="another goal has come")
+                    return
+                if self._ended is not None:
+                    self._job = None
+                    (server.set_succeeded if self._ended.arrived else server.set_aborted)(text=self._ended.text)
+                    return
+                if server.is_preempt_requested():
                     self._job = None
                     self._commands.publish(Twist())
                     server.set_preempted(text="preempted")
                     return
-            if ended is not None:
-                (server.set_succeeded if ended.arrived else server.set_aborted)(text=ended.text)
-                return
             threading.Event().wait(LOOK_S)
-
-    def _begin(self, make: Callable[[Pose], Job], goal: MoveBaseGoal) -> str:
-        """Take a goal on; return why that can't be, or nothing."""
-        frame = goal.target_pose.header.frame_id
-        if frame not in {"map", ""}:
-            return f"the goal's frame is '{frame}'; give it in map"
-        with self._lock:
-            if self._job is not None:
-                return f"busy: {type(self._job).__name__.lower()} is under way"
-            self._job, self._ended = make(pose_of(goal.target_pose.pose)), None
-        return ""
 
     # --- measurements -------------------------------------------------------------------------------------------------
 
@@ -147,7 +141,7 @@ class NavigationNode:
         done = job.step(situation)
         command = Twist()
         if isinstance(done, Ended):
-            self._ended, self._job = done, None
+            self._ended = done
         else:
             command.linear.x, command.angular.z = done
         self._commands.publish(command)

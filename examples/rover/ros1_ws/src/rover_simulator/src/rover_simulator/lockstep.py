@@ -33,6 +33,12 @@ class Lockstep:
         """The topics that time waits for."""
         return list(self._followers)
 
+    @property
+    def left_out(self) -> list[str]:
+        """Topics that time does not wait for: their nodes died, hang, or were never there."""
+        with self._lock:
+            return [topic for topic, follower in self._followers.items() if follower.stamp_s is None]
+
     def heard(self, topic: str, stamp_s: float) -> None:
         """Note how far a node has come."""
         with self._lock:

@@ -56,6 +56,7 @@ class SimulatorNode:
         self._lockstep = Lockstep(str(param("~lockstep", "")).replace(",", " ").split(), HANGS_S)
         self._steps = 0
         self._told = ""
+        self._left_out: list[str] = []
         self._stopping = StopEvent()
         self._inbox: queue.SimpleQueue[Callable[[], None]] = queue.SimpleQueue()  # what other threads want done between two steps
         self._clock = rospy.Publisher("/clock", Clock, queue_size=20)
@@ -96,9 +97,18 @@ class SimulatorNode:
             if self._steps == 0:
                 self._begin()
             self._publish()
-            if self._rate > 0.0:
-                due_s = max(due_s + self._simulation.floor.period_s / self._rate, time.monotonic() - 0.25)
+            rate = self._rate
+            if left_out := self._lockstep.left_out:  # a node that is started again takes as long as it does on a robot
+                rate = min(rate or 1.0, 1.0)
+            self._tell(left_out)
+            if rate > 0.0:
+                due_s = max(due_s + self._simulation.floor.period_s / rate, time.monotonic() - 0.25)
             self._wait(due_s)
+
+    def _tell(self, left_out: list[str]) -> None:
+        if left_out != self._left_out:
+            self._left_out = left_out
+            rospy.logwarn(f"simulated time does not wait for {', '.join(left_out)}" if left_out else "simulated time waits for all again")
 
     def _begin(self) -> None:
         """Hold time at its first step until all that work for it are there: how long nodes take to start changes no drive.

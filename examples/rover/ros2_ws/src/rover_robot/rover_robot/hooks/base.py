@@ -14,7 +14,6 @@ from base_managers.hooks import (
 )
 from geometry_msgs.msg import Twist
 from nav_msgs.msg import Odometry
-from std_srvs.srv import Trigger
 
 from rover_robot.hooks.clock import Watch
 from rover_robot.hooks.journey import Journey
@@ -25,8 +24,6 @@ if TYPE_CHECKING:
     from rclpy.node import Node
 
 STANDS_M_S, STANDS_RAD_S = 0.01, 0.02
-SEARCH_S = 45.0
-"""For one search for the pose: a turn takes 8 s, and the bridge answers after 30 s where the localisation does not."""
 
 
 class DriveTo(Journey, AbstractDriveToSkill):
@@ -47,37 +44,10 @@ class Dock(Journey, AbstractDockSkill):
     arrived = "DOCKED"
 
 
-class Localise(AbstractLocaliseSkill):
-    """Has the localisation search: it turns the rover by itself."""
+class Localise(Journey, AbstractLocaliseSkill):
+    """Where it is: the localisation turns the rover."""
 
-    def __init__(self, node: Node, watch: Watch) -> None:
-        self._watch = watch
-        self._execution: Execution | None = None
-        self._called_s = 0.0
-        self._service = node.create_client(Trigger, "localize")
-        watch.every(self._look)
-
-    def on_dispatch(self, execution: Execution) -> None:
-        """Ask for the search; the bridge answers also where nobody serves it."""
-        self._called_s, self._execution = self._watch.now_s, execution
-        self._service.call_async(Trigger.Request()).add_done_callback(lambda future: self._on_answer(execution, future.result()))
-
-    def on_interrupt(self, execution: Execution) -> None:
-        """Wait no more. The service has no way to stop the search: the rover turns on until the search ends."""
-        if execution is self._execution:
-            self._execution = None
-
-    def _on_answer(self, execution: Execution, answer: Trigger.Response) -> None:
-        if execution is self._execution:
-            self._execution = None
-            end = self.terminated_FOUND if answer.success else self.terminated_LOST
-            end(execution, answer.message)
-
-    def _look(self) -> None:
-        execution = self._execution
-        if execution is not None and self._watch.now_s - self._called_s > SEARCH_S:
-            self._execution = None
-            self.terminated_LOST(execution, f"the localisation does not answer for {SEARCH_S:g} s")
+    arrived, blocked, aborted = "FOUND", "LOST", "LOST"
 
 
 class StopHere(AbstractStopHereSkill):
@@ -118,6 +88,6 @@ def make_hooks(node: Node) -> dict[str, SkillHooks]:
         "follow_corridor": FollowCorridor(node, watch, "follow_corridor"),
         "creep": Creep(node, watch, "creep"),
         "dock": Dock(node, watch, "dock"),
-        "localise": Localise(node, watch),
+        "localise": Localise(node, watch, "localize"),
         "stop_here": StopHere(node, watch),
     }

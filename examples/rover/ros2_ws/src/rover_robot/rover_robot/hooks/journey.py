@@ -25,7 +25,8 @@ SILENT_S = 4.0
 class Journey(SkillHooks):
     """Sends a goal, follows its feedback, and says how it ended. One at a time: the model's resource `wheels` sees to that."""
 
-    arrived = "ARRIVED"
+    arrived, blocked, aborted = "ARRIVED", "BLOCKED", "ABORTED"
+    """Results: the goal was reached; the navigation gave it up; it refuses, or is silent."""
 
     def __init__(self, node: Node, watch: Watch, server: str) -> None:
         super().__init__()
@@ -106,7 +107,7 @@ class Journey(SkillHooks):
                 if handle.accepted:
                     handle.cancel_goal_async()
             elif not handle.accepted:
-                self._end("ABORTED", f"{self._server} refuses the goal")
+                self._end(self.aborted, f"{self._server} refuses the goal")
             else:
                 self._handle = handle
                 handle.get_result_async().add_done_callback(lambda future: self._on_result(number, future.result().status))
@@ -121,20 +122,21 @@ class Journey(SkillHooks):
 
     def _on_result(self, number: int, status: int) -> None:
         with self._lock:
-            if number != self._goal:
+            if number != self._goal or self._execution is None:
                 return
             if status == GoalStatus.STATUS_SUCCEEDED:
                 self._end(self.arrived, "")
             elif self._client.server_is_ready():
-                self._end("BLOCKED", f"{self._server} gave up {self._left_m:.1f} m before the target")
+                told = f" {self._left_m:.1f} m before the target" if hasattr(self._execution.inputs, "target") else ""
+                self._end(self.blocked, f"{self._server} gave up{told}")
             else:
-                self._end("ABORTED", f"{self._server} is gone")
+                self._end(self.aborted, f"{self._server} is gone")
 
     def _look(self) -> None:
         with self._lock:
             if self._execution is not None and not self._paused and self._watch.now_s - self._heard_s > SILENT_S:
                 self._cancel()
-                self._end("ABORTED", f"nothing is heard of {self._server} for {SILENT_S:g} s")
+                self._end(self.aborted, f"nothing is heard of {self._server} for {SILENT_S:g} s")
 
     def _end(self, result: str, message: str) -> None:
         execution, self._execution = self._execution, None

@@ -19,6 +19,8 @@ if TYPE_CHECKING:
 WINDOW_S = 10.0
 FALLS_FAST = 0.004
 """Of the charge, a second: driving takes a tenth of that."""
+RESERVE, HOME_S = 0.15, 45.0
+"""What is to be left at the dock (the model's 15 %), and how long the way there takes from anywhere."""
 NO_RISE_S = 30.0
 
 
@@ -49,7 +51,7 @@ class Battery:
 
 
 class Supply(AbstractSupplySkill):
-    """Runs until the battery is low, which the model says, or falls too fast."""
+    """Runs until the battery is low, which the model says, or falls so fast that it has to turn back by now."""
 
     def __init__(self, battery: Battery) -> None:
         self._battery = battery
@@ -72,9 +74,10 @@ class Supply(AbstractSupplySkill):
 
     def _look(self) -> None:
         execution, falling = self._execution, self._battery.falling(self._since_s)
-        if execution is not None and falling > FALLS_FAST:
+        level = self._battery.level or 0.0
+        if execution is not None and falling > FALLS_FAST and level - falling * HOME_S < RESERVE:
             self._execution = None
-            self.terminated_FAILING(execution, f"it falls by {100.0 * falling:.1f} % a second")
+            self.terminated_FAILING(execution, f"{100.0 * level:.0f} % are left, and it falls by {100.0 * falling:.1f} % a second")
 
 
 class Charge(AbstractChargeSkill):
