@@ -40,7 +40,7 @@ def fly(out: Path, *faults: str, scenario: str = "mapping") -> Path:
     words = [scenario, "--mock", "--out", str(out), *(word for fault in faults for word in ("--fail", fault))]
     mission, _ = over_mocks.prepare(over_mocks.parse(words))
     mission.run()
-    over_mocks.write_account(out / "mock.json", mission, [parse_fault(fault) for fault in faults])
+    over_mocks.note_account(out, mission, [parse_fault(fault) for fault in faults])
     return out
 
 

@@ -10,9 +10,9 @@ from pathlib import Path
 from typing import Any, Protocol
 
 from alula.common.faults import MENDED, FaultChange, FaultRequest, parse_fault
+from alula.common.run_log import FAULT, note
 from alula.common.scenarios import load_scenario
 from alula.live.spec import RunSpec
-from alula.report.run_log import FAULT, note
 
 KILLED, HUNG = "killed", "hung"
 WAYS = (KILLED, HUNG)

@@ -17,13 +17,13 @@ from alula.common.network import DomainClaim, NoFreeDomainError, claim_domain, f
 from alula.common.processes import RUN_ID_VARIABLE, end_run, processes_of_run
 from alula.common.record import EVENTS, RecordWriter
 from alula.common.record import FILE as RECORD
+from alula.common.run_log import FILE
 from alula.live.options import RunOption, words_of
 from alula.live.part import RunPart
 from alula.live.spec import RequestError, RunSpec
 from alula.model.execution_state import ExecutionState
 from alula.report.deaths import Death, describe_exit, note_death, read_deaths
 from alula.report.live import LiveEvents, event_line
-from alula.report.run_log import FILE
 from alula.report.verdict import conformance_lines
 from alula.runtime.core.events import ExecutionEvent, TransitionEvent
 from alula_flight.command_line import parse, with_claim

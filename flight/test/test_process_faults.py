@@ -11,7 +11,7 @@ import pytest
 
 from alula.common.faults import parse_fault
 from alula.common.processes import RUN_ID_VARIABLE
-from alula.report.run_log import FAULT, FILE, read
+from alula.common.run_log import FAULT, FILE, read
 from alula_flight.process_faults import ProcessFault, ProcessFaults
 from alula_testing.waits import until
 

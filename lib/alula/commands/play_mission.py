@@ -10,8 +10,8 @@ from pathlib import Path
 from alula.commands.check_missions import SUFFIX, check_missions, prove_missions
 from alula.commands.mission_robot import part_of
 from alula.commands.run_options import run_folder
-from alula.common.files import write_json
 from alula.common.robots import RobotError, find_robot
+from alula.common.run_log import note_mocked
 from alula.console.page import write_report
 from alula.language.errors import has_errors
 from alula.live.spec import RequestError
@@ -51,7 +51,7 @@ def _flown(path: Path, finding: MissionFinding, folder: Path, *, as_json: bool) 
     except RobotError:
         part = NO_PART
     played = play(path, finding.run, part, folder)
-    write_json(folder / "mock.json", {"simulated_s": played.simulated_s, "notes": [played.left] if played.left else []})
+    note_mocked(folder, played.simulated_s, 0.0, (), [played.left] if played.left else [])
     write_report(folder, title=f"{path.name}: {finding.code}, played")
     title = f"{finding.span}: {finding.code}: {finding.message}"
     if as_json:

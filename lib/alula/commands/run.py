@@ -20,8 +20,8 @@ from pathlib import Path
 from alula.campaign.mocked_scenarios import load_mocked_scenario
 from alula.commands.run_options import check_seed, groot_address, run_folder, run_parser, shown_at, world_file
 from alula.common.faults import MOCKED, FaultError, FaultRequest, changes_of, parse_fault, spans_of
-from alula.common.files import write_json
 from alula.common.robots import RobotError
+from alula.common.run_log import note_mocked
 from alula.common.scenarios import ScenarioError
 from alula.common.signals import Interrupts
 from alula.live.spec import FILE, RequestError, RunSpec
@@ -92,10 +92,7 @@ def run(given: argparse.Namespace) -> int:
     end = mission.run()
     monitor = Monitor(models_of(dict.fromkeys(event.skillset for event in mission.events))) if given.monitor else None
     LiveEvents(out, _say, monitor).show_new()
-    try:
-        write_account(out / "mock.json", mission, [parse_fault(text) for text in spec.faults])
-    except OSError as error:
-        _say(f"mock.json could not be written: {error.strerror}")
+    note_account(out, mission, [parse_fault(text) for text in spec.faults])
     code = EXIT_CODES[end.outcome]
     conformance = None if monitor is None else monitor.verdict.as_dict()
     summary = make_report(RunFacts(spec.scenario, spec.seed, out, spec.faults, (), code, mock=True, conformance=conformance))
@@ -116,19 +113,11 @@ def _abort_on_signals(mission: MockedMission, out: Path) -> None:
     interrupts.install()
 
 
-def write_account(path: Path, mission: MockedMission, faults: Sequence[FaultRequest]) -> None:
-    """Write ``mock.json``; times are mission clock, but for ``wall_s``."""
-    simulated_s, lift_off_s = mission.world.now_s, mission.departure_s
-    spans = spans_of(faults, begun_s=0.0, lift_off_s=lift_off_s, ended_s=simulated_s, first_s=mission.robot.faults)
-    content = {
-        "simulated_s": simulated_s,
-        "wall_s": mission.wall_s,
-        "factor": simulated_s / mission.wall_s,
-        "lift_off_s": lift_off_s,
-        "faults": [vars(change) for change in changes_of(spans, simulated_s, MOCKED)],
-        "notes": mission.notes,
-    }
-    write_json(path, content)
+def note_account(out: Path, mission: MockedMission, faults: Sequence[FaultRequest]) -> None:
+    """Note what failed and when, and how fast the mocks were."""
+    simulated_s = mission.world.now_s
+    spans = spans_of(faults, begun_s=0.0, lift_off_s=mission.departure_s, ended_s=simulated_s, first_s=mission.robot.faults)
+    note_mocked(out, simulated_s, mission.wall_s, changes_of(spans, simulated_s, MOCKED), mission.notes)
 
 
 def _say(line: str) -> None:

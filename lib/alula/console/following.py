@@ -7,9 +7,9 @@ from collections.abc import Callable, Iterator
 from pathlib import Path
 from typing import Any
 
+from alula.common import run_log
 from alula.common.record import FILE, OPERATOR, Entry, RecordError, RecordFollower
 from alula.common.robots import page_words
-from alula.console import journal
 from alula.console.areas import areas_of
 from alula.console.causes import Causes
 from alula.console.clouds import CloudError, packed, read_points
@@ -30,7 +30,7 @@ class RunFollower:
         self._converter = Converter()
         self._causes = Causes()
         self._record = RecordFollower(folder / FILE)
-        self._lines = [LinesFollower(folder / journal.FILE, OPERATOR), LinesFollower(folder / PICTURES_FILE, PICTURE)]
+        self._lines = [LinesFollower(folder / run_log.FILE, OPERATOR, kind=run_log.ACT), LinesFollower(folder / PICTURES_FILE, PICTURE)]
         self._files: list[tuple[Path, str, Callable[[Path], Any]]] = [
             (folder / "run.json", RUN, self._run),
             (folder / "run.json", AREAS, lambda path: areas_of(str(_json(path).get("world") or ""))),

@@ -9,11 +9,15 @@ from alula.common.record import Entry
 
 
 class LinesFollower:
-    """Reads the lines of a file as entries of a topic; ``stamp_s`` is mission clock, and lines without one are of before that was heard."""
+    """Reads the lines of a file, or those of a ``kind``, as entries of a topic.
 
-    def __init__(self, path: Path, topic: str) -> None:
+    ``stamp_s`` is mission clock, and lines without one are of before that was heard.
+    """
+
+    def __init__(self, path: Path, topic: str, kind: str | None = None) -> None:
         self._path = path
         self._topic = topic
+        self._kind = kind
         self._offset = 0
 
     def poll(self) -> list[Entry]:
@@ -29,6 +33,8 @@ class LinesFollower:
     def _entries(self, line: bytes) -> list[Entry]:
         try:
             value = json.loads(line)
+            if value.pop("kind", None) != self._kind:
+                return []
             return [Entry(self._topic, round(float(value.get("stamp_s", 0.0)) * 1e9), value)]
         except (ValueError, AttributeError, TypeError, OverflowError):
             return []

@@ -131,7 +131,12 @@ def _skill(row: SkillRow, last: ExecutionRecord | None, inputs: list[Field]) -> 
 
 
 def _end(last: ExecutionRecord) -> dict[str, Any]:
-    end = {"state": last.state.value, "result": last.result, "message": last.message, "t_s": round(last.ended_ns / 1e9, 3)}
+    end = {
+        "state": last.state.value,
+        "result": last.result,
+        "message": last.message,
+        "t_s": None if last.ended_s is None else round(last.ended_s, 3),
+    }
     return {**end, "inputs": to_plain(last.inputs), "outputs": to_plain(last.outputs)}
 
 

@@ -26,9 +26,10 @@ from websockets.http11 import Request, Response
 from websockets.protocol import State
 
 from alula.common.robots import RobotFolder
+from alula.common.run_log import note_act
 from alula.common.runs import runs_folder
 from alula.common.scenarios import scenario_names
-from alula.console import acts, commands, journal
+from alula.console import acts, commands
 from alula.console.admission import Admission
 from alula.console.feed import Feed, place_of
 from alula.console.link import ActError, Link
@@ -395,8 +396,7 @@ class Console:
         if run is None or not run.is_dir():
             return
         stamp_s = self._feed(run).last_s
-        with contextlib.suppress(OSError):  # a disk that is full ends the record, not the command
-            journal.note(run, stamp_s, {"command": command, "by": viewer.name, "answer": answer})
+        note_act(run, stamp_s, {"command": command, "by": viewer.name, "answer": answer})
 
 
 def _object(message: str | bytes) -> dict[str, Any]:

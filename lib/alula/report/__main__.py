@@ -1,7 +1,7 @@
 """``python3 -m alula.report FOLDER --scenario NAME``: the report of a run that no supervisor has watched.
 
 The folder holds what a flight leaves whose worlds ran apart; with ``--of RUN`` what a replay leaves: ``skills.mcap``, ``mission.json``,
-``mock.json``. The verdict is on stdout. Ends with 0; what can't be made is named in the summary's ``problems``.
+``run_log.jsonl``. The verdict is on stdout. Ends with 0; what can't be made is named in the summary's ``problems``.
 """
 
 from __future__ import annotations

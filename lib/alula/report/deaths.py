@@ -7,7 +7,7 @@ import signal
 from dataclasses import asdict, dataclass
 from pathlib import Path
 
-from alula.report.run_log import DEATH, note, read
+from alula.common.run_log import DEATH, note, read
 
 
 @dataclass(frozen=True)

@@ -7,7 +7,7 @@ import signal
 from dataclasses import asdict, dataclass
 from pathlib import Path
 
-from alula.report.run_log import END, note, read
+from alula.common.run_log import END, note, read
 
 OPERATOR, SUPERVISOR, FRONT, SIGNAL = "operator", "supervisor", "front", "signal"
 """Who ends a run; SIGNAL: a program or a person outside of it."""

@@ -7,42 +7,22 @@ since lift-off only when they are shown: here they are absolute seconds of missi
 from __future__ import annotations
 
 from collections.abc import Iterable, Iterator, Sequence
-from dataclasses import dataclass, field, replace
+from dataclasses import dataclass, field
 from pathlib import Path
 
 from alula.common.record import EVENTS, Entry, RecordFollower
-from alula.model.execution_state import ExecutionState
 from alula.records.causes.told_ends import with_told_ends
 from alula.records.tree import Places, places_in
-from alula.report.files import Problems, mapping
-from alula.runtime.core.events import EngineEvent, ExecutionEvent, TransitionEvent, kind_record, read_event
-
-
-@dataclass(frozen=True)
-class RecordedExecution:
-    """A skill's execution from request to end; ``outcome`` is the last state seen, so RUNNING or REQUESTED if no end was.
-
-    ``result_kind`` is as in the record of an event.
-    """
-
-    skillset: str
-    skill: str
-    id: str
-    inputs: dict[str, object]
-    start_s: float
-    running_s: float | None
-    end_s: float | None
-    outcome: str
-    result: str
-    message: str
-    result_kind: str = ""
+from alula.report.files import Problems
+from alula.runtime.core.events import EngineEvent, TransitionEvent, read_event
+from alula.runtime.core.records import ExecutionRecord
 
 
 @dataclass(frozen=True)
 class History:
     """Everything that happened in the skillsets, in the order of time."""
 
-    executions: tuple[RecordedExecution, ...] = ()
+    executions: tuple[ExecutionRecord, ...] = ()
     transitions: tuple[TransitionEvent, ...] = ()
     events: tuple[EngineEvent, ...] = ()
     places: Places = field(default_factory=Places)
@@ -50,7 +30,7 @@ class History:
     first_s: float | None = None
     last_s: float | None = None
 
-    def of_skill(self, skill: str) -> list[RecordedExecution]:
+    def of_skill(self, skill: str) -> list[ExecutionRecord]:
         """Return the executions of a skill, whatever skillset it belongs to."""
         return [execution for execution in self.executions if execution.skill == skill]
 
@@ -115,7 +95,7 @@ def gaps(events: Sequence[EngineEvent]) -> Iterator[str]:
 
 def fold(events: Sequence[EngineEvent], problems: Problems, places: Places | None = None) -> History:
     """Put the events of each execution together. The first terminal state counts; another one is noted as a problem."""
-    executions: dict[tuple[str, str, str], RecordedExecution] = {}
+    executions: dict[tuple[str, str, str], ExecutionRecord] = {}
     transitions: list[TransitionEvent] = []
     stamps: list[float] = []
     for event in events:
@@ -125,10 +105,10 @@ def fold(events: Sequence[EngineEvent], problems: Problems, places: Places | Non
             continue
         key = (event.skillset, event.skill, event.id)
         before = executions.get(key)
-        if before is not None and before.end_s is not None:
-            problems.note(f"{event.skillset}.{event.skill} {event.id}: {event.state.value} after its end as {before.outcome}")
+        if before is not None and before.state.terminal:
+            problems.note(f"{event.skillset}.{event.skill} {event.id}: {event.state.value} after its end as {before.state.value}")
             continue
-        executions[key] = _advance(before or _begin(event), event)
+        executions[key] = before.then(event) if before else ExecutionRecord.begun(event)
     return History(
         executions=tuple(executions.values()),
         transitions=tuple(transitions),
@@ -136,23 +116,4 @@ def fold(events: Sequence[EngineEvent], problems: Problems, places: Places | Non
         places=places or Places(),
         first_s=min(stamps, default=None),
         last_s=max(stamps, default=None),
-    )
-
-
-def _begin(event: ExecutionEvent) -> RecordedExecution:
-    return RecordedExecution(
-        event.skillset, event.skill, event.id, mapping(event.inputs), event.stamp_s, None, None, event.state.value, "", ""
-    )
-
-
-def _advance(execution: RecordedExecution, event: ExecutionEvent) -> RecordedExecution:
-    return replace(
-        execution,
-        inputs=execution.inputs or mapping(event.inputs),
-        running_s=event.stamp_s if event.state is ExecutionState.RUNNING and execution.running_s is None else execution.running_s,
-        end_s=event.stamp_s if event.state.terminal else None,
-        outcome=event.state.value,
-        result=event.result or execution.result,
-        message=event.message or execution.message,
-        result_kind=kind_record(event.result_kind),
     )

@@ -6,11 +6,11 @@ from collections.abc import Callable, Mapping
 from pathlib import Path
 
 from alula.common.record import EVENTS, FILE, RecordFollower
+from alula.common.run_log import read_waits
 from alula.model.execution_state import ExecutionState
 from alula.records.conformance import Monitor
 from alula.records.run import departure
 from alula.report.deaths import read_deaths
-from alula.report.run_log import read_waits
 from alula.runtime.core.events import EngineEvent, TransitionEvent, read_event
 
 

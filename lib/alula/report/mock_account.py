@@ -2,14 +2,12 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator
-from dataclasses import replace
 from pathlib import Path
 from typing import TypedDict
 
-from alula.common.faults import FaultChange
-from alula.report.files import Problems, finite, mapping, read_json, sequence
-from alula.report.observed import Observed, fault_changes
+from alula.common import run_log
+from alula.report.files import Problems, finite, mapping, sequence
+from alula.report.observed import Observed, read_faults
 
 
 class MockSummary(TypedDict):
@@ -21,24 +19,13 @@ class MockSummary(TypedDict):
 
 
 def read_mock(folder: Path, problems: Problems) -> tuple[Observed, MockSummary]:
-    """Return what ``mock.json`` of a run over mocks says: lift-off and faults, and how fast it ran."""
-    values: dict[str, object] = {}
-    with problems.survive("mock.json"):
-        values = mapping(read_json(folder / "mock.json"))
-    observed = Observed(
-        departed_s=finite(values.get("lift_off_s")),
-        departed_by="simulator",
-        faults=tuple(_changes(values.get("faults"))),
-        tells_faults=True,
-    )
+    """Return what a run over mocks says of itself: faults, and how fast it ran."""
+    told = run_log.read(folder, run_log.MOCKED)
+    if not told:
+        problems.note(f"{run_log.FILE} does not say how the mocks ran")
+    values = mapping(told[-1] if told else {})
     notes = [str(note) for note in sequence(values.get("notes"))]
     for note in notes:
         problems.note(f"mocks: {note}")
+    observed = Observed(faults=read_faults(folder), tells_faults=True)
     return observed, MockSummary(wall_s=finite(values.get("wall_s")), factor=finite(values.get("factor")), notes=notes)
-
-
-def _changes(value: object) -> Iterator[FaultChange]:
-    """Yield what failed and what worked again; older files have the first time of each alone, with the way in its name: ``zed:dark``."""
-    for change in fault_changes(value):
-        sensor, _, mode = change.sensor.partition(":")
-        yield replace(change, sensor=sensor, mode=mode or change.mode)

@@ -7,8 +7,8 @@ from dataclasses import dataclass
 from pathlib import Path
 
 from alula.common.faults import FaultChange
+from alula.common.run_log import FAULT, read
 from alula.report.files import finite, mapping, sequence
-from alula.report.run_log import FAULT, read
 
 
 @dataclass(frozen=True)
@@ -42,8 +42,8 @@ class Observed:
         return tuple(sorted((*self.faults, *self.processes), key=lambda change: change.t_s))
 
 
-def read_process_faults(folder: Path) -> tuple[FaultChange, ...]:
-    """Return what the supervisor did to processes."""
+def read_faults(folder: Path) -> tuple[FaultChange, ...]:
+    """Return what the supervisor did to processes; of a run over mocks, all that was made to fail."""
     return tuple(fault_changes(read(folder, FAULT)))
 
 

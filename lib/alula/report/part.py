@@ -15,7 +15,7 @@ from alula.records.causes.faults import Fault
 from alula.report.facts import RunFacts
 from alula.report.files import Problems
 from alula.report.history import History
-from alula.report.observed import Observed, read_process_faults
+from alula.report.observed import Observed, read_faults
 from alula.report.phases import Phases
 from alula.report.recovery import Recovery
 from alula.report.timeline import Timeline
@@ -92,7 +92,7 @@ class NoPart:
 
     def observe(self, run: ReportedRun) -> Observed:
         """Know what the supervisor did."""
-        return Observed(processes=read_process_faults(run.folder))
+        return Observed(processes=read_faults(run.folder))
 
     def failures(self, phases: Phases, known: Sequence[Fault], effects: EffectsByFault) -> Iterable[tuple[FaultChange, Fault]]:  # noqa: ARG002
         """Return no further faults."""

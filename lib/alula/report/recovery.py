@@ -12,10 +12,11 @@ from alula.model.execution_state import ExecutionState
 from alula.records.causes.alarms import Alarm, Alarms
 from alula.records.causes.failures import skill_failures
 from alula.records.causes.faults import EARLY_S
-from alula.report.history import History, RecordedExecution
+from alula.report.history import History
 from alula.report.observed import Observed
 from alula.report.phases import Phases
 from alula.report.responses import FaultResponse
+from alula.runtime.core.records import ExecutionRecord
 
 ENDED_BY_ITSELF = frozenset({ExecutionState.RESOURCE_INVARIANT_VIOLATED, ExecutionState.TERMINATED, ExecutionState.FAILED})
 """How what ran can fail: all other failures are refusals to start."""
@@ -51,7 +52,7 @@ def find_recovery(
         return _recovery(one, fallback_s, _moving(scenario, history, observed, fallback_s))
     noticed_s = _unexplained(history, responses, alarms)
     if noticed_s is not None:
-        fallback_s = _first([e.running_s for e in history.executions if e.skill == scenario.fallback], noticed_s)
+        fallback_s = _first([e.started_s for e in history.executions if e.skill == scenario.fallback], noticed_s)
         return Recovery(None, noticed_s, fallback_s, _moving(scenario, history, observed, fallback_s))
     broken = [one for one in flown if one.mode != DIED]  # the death of a process that nothing hung on interrupts no flight
     unfollowed = [one for one in broken if one.traced.detected_s is not None] or broken
@@ -74,11 +75,11 @@ def _fallback(skill: str, history: History, one: FaultResponse) -> float | None:
     others = [failure for failure in skill_failures(history.events) if failure.at > first.at and failure not in one.traced.failures]
     other_s = min((failure.end.stamp_s for failure in others), default=math.inf)
 
-    def responds(execution: RecordedExecution) -> bool:
+    def responds(execution: ExecutionRecord) -> bool:
         in_branch = one.response.branch in history.places.started.get(execution.id, ())
-        return execution.running_s is not None and (in_branch or execution.running_s < other_s)
+        return execution.started_s is not None and (in_branch or execution.started_s < other_s)
 
-    runs = [execution.running_s for execution in history.executions if execution.skill == skill and responds(execution)]
+    runs = [execution.started_s for execution in history.executions if execution.skill == skill and responds(execution)]
     return _first(runs, first.end.stamp_s - EARLY_S)
 
 
@@ -100,7 +101,7 @@ def _moving(scenario: Scenario, history: History, observed: Observed, fallback_s
     """Return when the robot moves on: when it is first seen to move since a skill of motion runs again."""
     if fallback_s is None or observed.moving_again is None:
         return None
-    motion_s = _first([e.running_s for e in history.executions if e.skill in scenario.motion], fallback_s)
+    motion_s = _first([e.started_s for e in history.executions if e.skill in scenario.motion], fallback_s)
     return None if motion_s is None else observed.moving_again(motion_s)
 
 

@@ -4,8 +4,10 @@ from __future__ import annotations
 
 from typing import TypedDict
 
+from alula.report.files import mapping
 from alula.report.history import History
 from alula.report.phases import Phases
+from alula.runtime.core.events import kind_record
 
 
 class SkillSummary(TypedDict):
@@ -37,13 +39,13 @@ def skills(history: History, phases: Phases) -> list[SkillSummary]:
             skillset=execution.skillset,
             skill=execution.skill,
             id=execution.id,
-            inputs=execution.inputs,
-            start_s=phases.since(execution.start_s),
-            running_s=phases.since(execution.running_s),
-            end_s=phases.since(execution.end_s),
-            outcome=execution.outcome,
+            inputs=mapping(execution.inputs),
+            start_s=phases.since(execution.requested_s),
+            running_s=phases.since(execution.started_s),
+            end_s=phases.since(execution.ended_s),
+            outcome=execution.state.value,
             result=execution.result,
-            result_kind=execution.result_kind,
+            result_kind=kind_record(execution.result_kind),
             message=execution.message,
         )
         for execution in history.executions

@@ -7,10 +7,10 @@ from pathlib import Path
 from typing import Any
 
 from alula.common.robots import page_words
+from alula.common.run_log import read_waits
 from alula.report.deaths import Death
 from alula.report.ends import SIGNAL, ReportedEnd, read_end
 from alula.report.phases import home
-from alula.report.run_log import read_waits
 
 MEANING = {
     "accomplished": "mission accomplished",

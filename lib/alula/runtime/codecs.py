@@ -75,6 +75,11 @@ def _encode_data(reading: DataReading, response: Any) -> None:
     response.stamp_ns, response.value_json = reading.stamp_ns, reading.value_json
 
 
+def _stamp(number: int) -> int | None:
+    """Return a stamp of a message, where a number below 0 says that it has not happened."""
+    return None if number < 0 else number
+
+
 def _record_of(skill: str, message: Any) -> ExecutionRecord:
     return ExecutionRecord(
         message.id,
@@ -85,8 +90,8 @@ def _record_of(skill: str, message: Any) -> ExecutionRecord:
         json.loads(message.inputs_json or "null"),
         json.loads(message.outputs_json or "{}"),
         message.requested_ns,
-        message.started_ns,
-        message.ended_ns,
+        _stamp(message.started_ns),
+        _stamp(message.ended_ns),
     )
 
 
@@ -260,8 +265,8 @@ class Codecs:
             inputs_json=json.dumps(to_plain(record.inputs)),
             outputs_json=json.dumps(to_plain(record.outputs) if record.state.terminal else {}),
             requested_ns=record.requested_ns,
-            started_ns=record.started_ns,
-            ended_ns=record.ended_ns,
+            started_ns=-1 if record.started_ns is None else record.started_ns,
+            ended_ns=-1 if record.ended_ns is None else record.ended_ns,
         )
 
     # --- services ----------------------------------------------------------------------------------------------------

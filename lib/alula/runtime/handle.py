@@ -61,7 +61,7 @@ class Ended(Generic[OutputsT, ResultT]):
 
 
 @dataclass(frozen=True)
-class ExecutionReport(Generic[OutputsT]):
+class HandleReport(Generic[OutputsT]):
     """An execution at one moment; the last report of one has a terminal state."""
 
     state: ExecutionState
@@ -100,7 +100,7 @@ class Handle(Waitable, Generic[OutputsT, ResultT]):
         self.progress = 0.0
         self._interrupt = interrupt
         self._pause = pause
-        self._listeners: list[Callable[[ExecutionReport[OutputsT]], None]] = []
+        self._listeners: list[Callable[[HandleReport[OutputsT]], None]] = []
         self._request_listeners: list[Callable[[str], None]] = []
 
     @property
@@ -147,7 +147,7 @@ class Handle(Waitable, Generic[OutputsT, ResultT]):
         """Call ``callback(handle)`` once at the end, on the thread that brings it; at once when it has ended."""
         self.call_at_end(lambda: callback(self))
 
-    def on_report(self, callback: Callable[[ExecutionReport[OutputsT]], None]) -> None:
+    def on_report(self, callback: Callable[[HandleReport[OutputsT]], None]) -> None:
         """Call ``callback(report)`` at each change of state, progress or outputs, on the thread that brings it."""
         with self._lock:
             self._listeners.append(callback)
@@ -179,8 +179,8 @@ class Handle(Waitable, Generic[OutputsT, ResultT]):
         assert ended is not None  # noqa: S101 - the end was waited for
         return ended
 
-    def _report(self) -> ExecutionReport[OutputsT]:
-        return ExecutionReport(self.state, self.progress, self.outputs)
+    def _report(self) -> HandleReport[OutputsT]:
+        return HandleReport(self.state, self.progress, self.outputs)
 
     # --- for the client ----------------------------------------------------------------------------------------------
 
@@ -249,19 +249,19 @@ class Reports(Generic[OutputsT]):
     def __init__(self, handle: Handle[OutputsT, Any], waiter: Waiter) -> None:
         self._handle = handle
         self._waiter = waiter
-        self._waiting: deque[ExecutionReport[OutputsT]] = deque(maxlen=REPORTS_KEPT)
+        self._waiting: deque[HandleReport[OutputsT]] = deque(maxlen=REPORTS_KEPT)
         self._news = Moment(waiter)
         self._over = False
         handle.on_report(self._take)
         if not self._waiting:
-            self._take(ExecutionReport(handle.state, handle.progress, handle.outputs))
+            self._take(HandleReport(handle.state, handle.progress, handle.outputs))
 
-    def _take(self, report: ExecutionReport[OutputsT]) -> None:
+    def _take(self, report: HandleReport[OutputsT]) -> None:
         self._waiting.append(report)
         news, self._news = self._news, Moment(self._waiter)
         news.come()
 
-    def _next(self) -> ExecutionReport[OutputsT] | None:
+    def _next(self) -> HandleReport[OutputsT] | None:
         """Return the next report if it is here; skip what comes after the end."""
         if self._over or not self._waiting:
             return None
@@ -272,7 +272,7 @@ class Reports(Generic[OutputsT]):
     def __iter__(self) -> Self:
         return self
 
-    def __next__(self) -> ExecutionReport[OutputsT]:
+    def __next__(self) -> HandleReport[OutputsT]:
         """Wait for the next report; raise as ``Handle.wait`` does."""
         while not self._over:
             news = self._news
@@ -285,7 +285,7 @@ class Reports(Generic[OutputsT]):
     def __aiter__(self) -> Self:
         return self
 
-    async def __anext__(self) -> ExecutionReport[OutputsT]:
+    async def __anext__(self) -> HandleReport[OutputsT]:
         while not self._over:
             news = self._news
             report = self._next()

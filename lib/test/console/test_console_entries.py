@@ -31,12 +31,12 @@ from hypothesis.extra import numpy as stn
 
 from alula.common.record import DATA, EVENTS, FILE, MISSION, OPERATOR, REPORTS, TICKS, TREE, Entry
 from alula.common.robots import RobotError, load_robot_folder
+from alula.common.run_log import note_act
 from alula.console.areas import areas_of
 from alula.console.clouds import MAX_POINTS, CloudError, packed, read_points, thinned
 from alula.console.entries import AREAS, CAUSES, MAP, NODES, PICTURE, PICTURES_FILE, ROUTE, RUN, Converter
 from alula.console.feed import CHUNK_BYTES, Feed, Place, place_of
 from alula.console.following import RunFollower
-from alula.console.journal import note
 from alula.console.page import MAX_PICTURES, PARTS, REPORT, make_page, write_report
 
 
@@ -150,7 +150,7 @@ def test_a_run_is_followed_while_it_grows(tmp_path: Path) -> None:
     assert (first[0][1], first[0][2]["world"], "run_id" in first[0][2]) == (None, "yard", False)  # type: ignore[index, operator]
     assert follower.poll() == []
     writer.write(EVENTS, 1, {"kind": "x"})
-    note(tmp_path, 20.0, {"command": "abort", "by": "me"})
+    note_act(tmp_path, 20.0, {"command": "abort", "by": "me"})
     assert [(wire[0], wire[1]) for wire in follower.poll()] == [(EVENTS, 0.0), (OPERATOR, 20.0)]
     writer.close()
     assert follower.problems == []
@@ -221,7 +221,7 @@ def test_files_that_are_damaged_are_told_and_the_rest_is_read(tmp_path: Path) ->
     for name, content in (
         ("run.json", "[1]"),
         ("map.ply", "ply"),
-        ("operator.jsonl", "{\n[]\n1\n"),
+        ("run_log.jsonl", "{\n[]\n1\n"),
     ):
         (tmp_path / name).write_text(content, encoding="utf-8")
     follower = RunFollower(tmp_path)
@@ -357,7 +357,7 @@ def test_a_viewer_is_sent_what_it_lacks(tmp_path: Path) -> None:
     first = json.loads(feed.message(place) or "")
     assert (first["reset"], first["upTo"], first["session"]) == (True, first["of"], feed.session)
     assert feed.message(place) is None
-    note(tmp_path, 99.0, {"command": "abort"})
+    note_act(tmp_path, 99.0, {"command": "abort"})
     feed.add(feed.read())
     second = json.loads(feed.message(place) or "")
     assert (second["reset"], second["entries"]) == (False, [[OPERATOR, 99.0, {"stamp_s": 99.0, "command": "abort"}]])

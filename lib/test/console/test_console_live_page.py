@@ -17,6 +17,7 @@ from console_reports import SUMMARY
 from console_serving import OPTIONS, WAIT_S, Robot, served
 
 from alula.common.record import EVENTS, MISSION, OPERATOR, TICKS, TREE
+from alula.common.run_log import note_act
 from alula.console.acts import ActError, WantedRun
 from alula.console.entries import FAULT, HEALTH, PATH
 from alula.console.page import write_report
@@ -326,9 +327,8 @@ def test_what_came_before_the_mission_clock_has_no_time(browser: Any, make_run: 
     story[-1][2]["end_s"] += begin_s
     early = {"scenario": "mapping", "outcome": "running", "reason": "", "waypoints": 5, "waypoints_reached": 0}
     folder = make_run("live", story=[(0.0, MISSION, early), (0.0, TREE, story[1][2]), *story])
-    (folder / "operator.jsonl").write_text(
-        '{"stamp_s": 0.0, "command": "take", "by": "me"}\n{"command": "start", "by": "me"}\n', encoding="utf-8"
-    )
+    for stamp_s, command in ((0.0, "take"), (None, "start")):
+        note_act(folder, stamp_s, {"command": command, "by": "me"})
     with served(folder) as console:
         page = Page(browser, console.address)
         page.wait("document.querySelectorAll('.chain').length === 1")

@@ -19,6 +19,7 @@ pytest.importorskip("navigation_interfaces.action")
 
 from console_serving import WAIT_S, Bench, answer_to, heard, serve
 
+from alula.common import run_log
 from alula.console import commands, manual_control
 from alula.console.acts import ActError
 from alula.console.manual_control import ManualControl
@@ -96,7 +97,7 @@ def test_skills_are_shown_started_paused_interrupted_and_the_record_says_so(run_
         assert await ask("interrupt") == "nothing runs of it"
 
     serve(play, fixed=run_of, link=RosLink())
-    acts = [json.loads(line) for line in (run_of / "operator.jsonl").read_text(encoding="utf-8").splitlines()]
+    acts = run_log.read(run_of, run_log.ACT)
     done = [(act["command"], act["answer"]) for act in acts if "takeoff" in act["command"]]
     assert ("start navigation.takeoff, height 3.0, speed 1.5", "takeoff is RUNNING") in done
     assert ("interrupt navigation.takeoff", "1 execution told to end") in done

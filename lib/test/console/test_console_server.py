@@ -20,6 +20,7 @@ from console_serving import OPTIONS, WAIT_S, Bench, Robot, answer_to, heard, ser
 from websockets.asyncio.client import ClientConnection, connect
 from websockets.exceptions import ConnectionClosed, InvalidStatus
 
+from alula.common import run_log
 from alula.common.record import EVENTS, MISSION, OPERATOR
 from alula.common.robots import load_robot_folder
 from alula.common.runs import Run
@@ -106,7 +107,7 @@ def test_one_commands_the_others_watch(make_run: Callable[..., Path], monkeypatc
         assert await answer_to(two, command="reboot") == "refused: there is no command reboot"
 
     serve(play, fixed=folder, link=link)
-    acts_done = [json.loads(line) for line in (folder / "operator.jsonl").read_text().splitlines()]
+    acts_done = run_log.read(folder, run_log.ACT)
     assert [(act["command"], act["by"]) for act in acts_done] == [("take", "two"), ("abort", "two")]
     assert acts_done[1]["stamp_s"] == pytest.approx(73.0)
 
@@ -148,7 +149,7 @@ def test_pressing_again_asks_for_nothing_new_and_every_press_is_answered(
         assert told == ["abort", "abort"]
 
     serve(play, fixed=folder, link=link)
-    assert len((folder / "operator.jsonl").read_text(encoding="utf-8").splitlines()) == 2
+    assert len(run_log.read(folder, run_log.ACT)) == 2
 
 
 def test_a_mission_is_connected_to_once_ahead_of_commands_and_left_when_its_run_is_over(
@@ -400,7 +401,7 @@ def test_an_act_before_the_mission_clock_is_heard_carries_no_stamp(make_run: Cal
         assert [t_s for topic, t_s, _ in told["entries"] if topic == OPERATOR] == [None]
 
     serve(play, fixed=folder)
-    assert [sorted(json.loads(line)) for line in (folder / "operator.jsonl").read_text().splitlines()] == [["answer", "by", "command"]]
+    assert [sorted(act) for act in run_log.read(folder, run_log.ACT)] == [["answer", "by", "command"]]
 
 
 # --- admission --------------------------------------------------------------------------------------------------------------

@@ -8,6 +8,7 @@ from pathlib import Path
 
 import pytest
 
+from alula.common import run_log
 from alula.common.faults import parse_fault
 from alula.common.record import DECISIONS, FILE, RecordWriter, read_record
 from alula.records.replay.comparison import alike
@@ -31,14 +32,14 @@ def test_a_flight_is_decided_as_it_was_and_leaves_its_own_record(recorded, tmp_p
     assert len(trace_of(result, recorded.zero_s)) == len(recorded.decisions)
     assert {entry.topic for entry in read_record(tmp_path / "again")} >= {"/mission", "/decisions", "/events"}
     assert json.loads((tmp_path / "again/replay.json").read_text())["same"] is True
-    assert json.loads((tmp_path / "again/mock.json").read_text())["faults"] == []
+    assert run_log.read(tmp_path / "again", run_log.FAULT) == []
 
 
 def account(recorded, out: Path, fail: list[str], spoiled: list[str]) -> list[tuple]:
     """Return the faults that the account of a replay tells of, seconds after the recorded lift-off."""
     result = decide(read_mission(recorded), Conditions(fail=fail, go_on=True, out=out))
     write_out(out, recorded, result, [parse_fault(text) for text in spoiled])
-    told = json.loads((out / "mock.json").read_text())["faults"]
+    told = run_log.read(out, run_log.FAULT)
     return [(one["sensor"], one["mode"], pytest.approx(one["t_s"] - recorded.zero_s, abs=0.05)) for one in told]
 
 

@@ -80,8 +80,8 @@ def test_an_execution_from_request_to_end():
     log.skill(7.5, "navigation.goto", "g1", "TERMINATED", result="ARRIVED", message="0.1 m off")
     history = fold([read_event(event) for event in log.events], Problems())
     (goto,) = history.executions
-    assert (goto.start_s, goto.running_s, goto.end_s) == (LIFT_OFF_S + 1.0, LIFT_OFF_S + 1.25, LIFT_OFF_S + 7.5)
-    assert (goto.outcome, goto.result, goto.message, goto.inputs) == ("TERMINATED", "ARRIVED", "0.1 m off", {"speed": 1.0})
+    assert (goto.requested_s, goto.started_s, goto.ended_s) == (LIFT_OFF_S + 1.0, LIFT_OFF_S + 1.25, LIFT_OFF_S + 7.5)
+    assert (goto.state.value, goto.result, goto.message, goto.inputs) == ("TERMINATED", "ARRIVED", "0.1 m off", {"speed": 1.0})
     assert (history.first_s, history.last_s) == (LIFT_OFF_S + 1.0, LIFT_OFF_S + 7.5)
 
 
@@ -90,7 +90,7 @@ def test_the_first_end_counts_and_a_second_is_a_problem():
     states = ["REQUESTED", "RUNNING", "INTERRUPTED", "TERMINATED"]
     events = [read_event(started(sequence=n + 1, stamp_s=float(n), skill="goto", id="g1", state=state)) for n, state in enumerate(states)]
     (goto,) = fold(events, problems).executions
-    assert (goto.outcome, goto.end_s) == ("INTERRUPTED", 2.0)
+    assert (goto.state.value, goto.ended_s) == ("INTERRUPTED", 2.0)
     assert problems.sentences == ["navigation.goto g1: TERMINATED after its end as INTERRUPTED"]
 
 
@@ -172,11 +172,11 @@ def test_any_interleaving_folds_to_the_same_executions(drawn):
     assert len(history.executions) == len(chosen)
     for execution in history.executions:
         k = int(execution.id)
-        assert execution.outcome == chosen[k][-1]
-        assert execution.start_s == stamps[k]["REQUESTED"]
-        assert execution.running_s == stamps[k].get("RUNNING")
-        assert execution.end_s == (stamps[k][chosen[k][-1]] if chosen[k][-1] in TERMINAL_STATES else None)
-    assert [e.start_s for e in history.executions] == sorted(e.start_s for e in history.executions)
+        assert execution.state.value == chosen[k][-1]
+        assert execution.requested_s == stamps[k]["REQUESTED"]
+        assert execution.started_s == stamps[k].get("RUNNING")
+        assert execution.ended_s == (stamps[k][chosen[k][-1]] if chosen[k][-1] in TERMINAL_STATES else None)
+    assert [e.requested_s for e in history.executions] == sorted(e.requested_s for e in history.executions)
 
 
 @pytest.mark.parametrize("name", ["UNLOCKED", "BLOCKING", "UNBLOCKED", "FAILSAFE_OFF", "ABORTED", "ARRIVED"])

@@ -7,9 +7,9 @@ from pathlib import Path
 
 import pytest
 
+from alula.common.run_log import FILE, note_wait
 from alula.report.deaths import Death
 from alula.report.ends import FRONT, OPERATOR, SIGNAL, SUPERVISOR, ReportedEnd, ended_by_signal, note_end, read_end
-from alula.report.run_log import FILE, note_wait
 from alula.report.verdict import verdict_lines
 
 LATER = {"detected_s": 40.5, "fallback_running_s": None, "moving_again_s": None}

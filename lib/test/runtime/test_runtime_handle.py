@@ -10,7 +10,7 @@ from typing import Any
 import pytest
 
 from alula.model.execution_state import ExecutionState
-from alula.runtime.handle import ExecutionReport, SkillFailedError, SkillHandle, StillRunningError
+from alula.runtime.handle import HandleReport, SkillFailedError, SkillHandle, StillRunningError
 from alula.runtime.waiting import Moment, NoResponseError, Pending
 
 S = ExecutionState
@@ -31,10 +31,10 @@ def follow(one: SkillHandle) -> None:
 
 
 REPORTS = [
-    ExecutionReport(S.REQUESTED, 0.0, {}),
-    ExecutionReport(S.RUNNING, 0.25, {"height": 1.0}),
-    ExecutionReport(S.RUNNING, 0.5, {"height": 2.0}),
-    ExecutionReport(S.TERMINATED, 0.5, {"height": 3.0}),
+    HandleReport(S.REQUESTED, 0.0, {}),
+    HandleReport(S.RUNNING, 0.25, {"height": 1.0}),
+    HandleReport(S.RUNNING, 0.5, {"height": 2.0}),
+    HandleReport(S.TERMINATED, 0.5, {"height": 3.0}),
 ]
 
 
@@ -75,7 +75,7 @@ def test_time_that_is_up_says_where_the_execution_is():
 
 def test_readers_in_threads_see_every_change_and_stop_at_the_end():
     one = handle()
-    seen: list[list[ExecutionReport]] = [[], []]
+    seen: list[list[HandleReport]] = [[], []]
     readers = [one.reports(), iter(one)]
     threads = [threading.Thread(target=lambda i=i: seen[i].extend(readers[i])) for i in range(2)]
     for thread in threads:
@@ -102,7 +102,7 @@ def test_asyncio_awaits_and_iterates():
         gate = threading.Event()
         thread.start()
 
-        async def read() -> list[ExecutionReport]:
+        async def read() -> list[HandleReport]:
             return [report async for report in one]
 
         reading = asyncio.create_task(read())

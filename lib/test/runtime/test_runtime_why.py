@@ -100,7 +100,7 @@ def test_each_skill_keeps_its_last_result_and_what_is_open():
     assert bench.engine.skills["takeoff"].last is None
     first = bench.run(height=1.0)
     record = bench.engine.skills["takeoff"].open[0]
-    assert (record.id, record.state, record.ended_ns) == (first.id, S.RUNNING, 0)
+    assert (record.id, record.state, record.ended_ns) == (first.id, S.RUNNING, None)
     first.terminate("DONE", "there", {"reached": 0.9})
     bench.run("land")
     last = bench.engine.skills["takeoff"].last
@@ -109,6 +109,19 @@ def test_each_skill_keeps_its_last_result_and_what_is_open():
     assert last.requested_ns < last.started_ns < last.ended_ns
     assert bench.engine.skills["takeoff"].open == ()
     assert [record.state for record in bench.engine.skills["land"].open] == [S.RUNNING]
+
+
+def test_what_happens_at_the_first_moment_of_mission_time_has_happened(monkeypatch):
+    """Virtual time begins at 0, which is a stamp like any other: also for one that pauses and goes on later."""
+    now_ns = 0
+    monkeypatch.setattr(Bench, "clock", lambda _: now_ns)
+    bench = Bench()
+    execution = bench.run()
+    now_ns = 5_000_000_000
+    assert bench.engine.pause(execution.id).accepted
+    assert bench.engine.resume(execution.id).accepted
+    record = bench.engine.skills["takeoff"].open[0]
+    assert (record.requested_ns, record.started_ns, record.ended_ns) == (0, 0, None)
 
 
 def test_a_hook_that_stays_silent_is_answered_for_and_its_late_answer_is_dropped(monkeypatch):

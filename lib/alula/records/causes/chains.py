@@ -13,6 +13,7 @@ from alula.records.causes.failures import SkillFailure
 from alula.records.causes.faults import EARLY_S
 from alula.records.causes.wording import in_words, state_text, why_of
 from alula.runtime.core.events import EngineEvent, ExecutionEvent, TransitionEvent
+from alula.runtime.core.records import ExecutionRecord
 
 REACTION_S = 3.0
 """For so long after a failure the mission's reaction is looked for; in a pause, after its end."""
@@ -141,15 +142,6 @@ def _branch(end: ExecutionEvent, fault: KnownFault | None, scene: Scene) -> Iter
         yield Step("decision", end.stamp_s, "nothing was left to try")
 
 
-@dataclass
-class _Course:
-    skillset: str
-    skill: str
-    start_s: float
-    running_s: float | None = None
-    interrupted_s: float | None = None
-
-
 def _reaction(failure: SkillFailure, scene: Scene, failures: Sequence[SkillFailure]) -> Iterator[Step]:
     """Yield the skills that were interrupted for a failure's sake, and those that were started."""
     end, end_s = failure.end, failure.end.stamp_s
@@ -157,29 +149,25 @@ def _reaction(failure: SkillFailure, scene: Scene, failures: Sequence[SkillFailu
     earlier_s = max((one.end.stamp_s for one in failures if one.end.stamp_s < end_s), default=-math.inf)
     # What came shortly before this failure belongs to one before it, if there was one.
     from_s = end_s if earlier_s >= end_s - REACTION_S else end_s - EARLY_S
-    courses = _courses(scene.events, failure)
-    stopped = [one for one in courses if one.interrupted_s is not None and from_s <= one.interrupted_s <= until_s and one.start_s < end_s]
-    started = [one for one in courses if one.running_s is not None and from_s <= one.running_s <= until_s]
-    started = [one for one in started if one.start_s >= end_s - EARLY_S]
-    if stopped and stopped[0].interrupted_s is not None:
-        yield Step("stopped", stopped[0].interrupted_s, f"interrupted: {', '.join(one.skill for one in stopped)}")
-    if started and started[0].running_s is not None:
+    others = _others(scene.events, failure)
+    interrupted = [one for one in others if one.state is S.INTERRUPTED and one.requested_s < end_s]
+    stopped = [one for one in interrupted if one.ended_s is not None and from_s <= one.ended_s <= until_s]
+    started = [one for one in others if one.started_s is not None and from_s <= one.started_s <= until_s]
+    started = [one for one in started if one.requested_s >= end_s - EARLY_S]
+    if stopped and stopped[0].ended_s is not None:
+        yield Step("stopped", stopped[0].ended_s, f"interrupted: {', '.join(one.skill for one in stopped)}")
+    if started and started[0].started_s is not None:
         own = (end.skillset, end.skill)
         names = dict.fromkeys(f"{one.skill} again" if (one.skillset, one.skill) == own else one.skill for one in started)
-        yield Step("started", started[0].running_s, f"started: {', '.join(names)}")
+        yield Step("started", started[0].started_s, f"started: {', '.join(names)}")
 
 
-def _courses(events: Sequence[EngineEvent], failure: SkillFailure) -> list[_Course]:
+def _others(events: Sequence[EngineEvent], failure: SkillFailure) -> list[ExecutionRecord]:
     """Return the executions of a run but for the one that failed."""
-    found: dict[tuple[str, str, str], _Course] = {}
+    found: dict[tuple[str, str, str], ExecutionRecord] = {}
     for event in events:
-        if not isinstance(event, ExecutionEvent):
-            continue
-        key = (event.skillset, event.skill, event.id)
-        one = found.setdefault(key, _Course(event.skillset, event.skill, event.stamp_s))
-        if event.state is S.RUNNING and one.running_s is None:
-            one.running_s = event.stamp_s
-        if event.state is S.INTERRUPTED:
-            one.interrupted_s = event.stamp_s
+        if isinstance(event, ExecutionEvent):
+            key = (event.skillset, event.skill, event.id)
+            found[key] = found[key].then(event) if key in found else ExecutionRecord.begun(event)
     found.pop((failure.end.skillset, failure.end.skill, failure.end.id), None)
     return list(found.values())

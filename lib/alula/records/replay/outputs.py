@@ -8,6 +8,7 @@ from pathlib import Path
 
 from alula.common.faults import MOCKED, FaultRequest, changes_of, spans_of
 from alula.common.files import write_json, write_text
+from alula.common.run_log import note_mocked
 from alula.records.replay.recorded import Recorded
 from alula.records.replay.replay import Result
 
@@ -41,25 +42,17 @@ def verdict(recorded: Recorded, result: Result) -> list[str]:
 def write_out(out: Path, recorded: Recorded, result: Result, spoiled: Sequence[FaultRequest] = ()) -> None:
     """Write what is not in the replay's own record; ``spoiled``: faults of measurements, which no mock has had."""
     write_text(out / "trace.jsonl", "".join(json.dumps(line) + "\n" for line in trace_of(result, recorded.zero_s)))
-    write_json(out / "mock.json", account_of(recorded, result, spoiled))
+    _note_account(out, recorded, result, spoiled)
     difference = None if result.difference is None else result.difference.as_dict()
     write_json(
         out / "replay.json", {"of": str(recorded.path), "same": same(recorded, result), "difference": difference, "notes": result.notes}
     )
 
 
-def account_of(recorded: Recorded, result: Result, spoiled: Sequence[FaultRequest]) -> dict[str, object]:
-    """Return ``mock.json``, as of a flight over mocks; times are mission clock, but for ``wall_s``."""
+def _note_account(out: Path, recorded: Recorded, result: Result, spoiled: Sequence[FaultRequest]) -> None:
     ended_s = result.simulated_s
     spans = [
         *spans_of(result.faults, begun_s=recorded.begun_s, lift_off_s=result.lift_off_s, ended_s=ended_s, first_s=result.first_s),
         *spans_of(spoiled, begun_s=recorded.begun_s, lift_off_s=recorded.lift_off_s, ended_s=ended_s),
     ]
-    return {
-        "simulated_s": ended_s,
-        "wall_s": result.wall_s,
-        "factor": ended_s / result.wall_s if result.wall_s else None,
-        "lift_off_s": result.lift_off_s,
-        "faults": [vars(change) for change in changes_of(spans, ended_s, MOCKED)],
-        "notes": list(result.notes),
-    }
+    note_mocked(out, ended_s, result.wall_s, changes_of(spans, ended_s, MOCKED), result.notes)

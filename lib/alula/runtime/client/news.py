@@ -167,7 +167,7 @@ class ClientNews:
             return
         self.skills = dict(states.skills)
         for name, skill in states.skills.items():
-            if skill.last is not None:
+            if skill.last is not None and skill.last.ended_ns is not None:
                 self._keep_last(name, skill.last.ended_ns, skill.last)
         for callback in self.on_skills:
             callback(dict(self.skills))

@@ -1,4 +1,4 @@
-"""The execution context of a skillset: its situation, its resources, its executions; every change comes out as an event.
+"""The context of a skillset's executions: its situation, its resources, its executions; every change comes out as an event.
 
 Not safe for threads: the engine calls it with its lock held.
 """
@@ -41,7 +41,7 @@ class Entry:
         return self.execution.state is ExecutionState.RUNNING and not (self.asking or self.dispatching or self.stop_hook)
 
 
-class ExecutionContext:
+class SkillsetContext:
     """Records steps; ``publish`` gets the events of each, numbered from 1 without gaps."""
 
     def __init__(self, skillset: Skillset, clock_ns: Callable[[], int], publish: Callable[[Sequence[EngineEvent]], None]) -> None:

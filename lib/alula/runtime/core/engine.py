@@ -25,7 +25,7 @@ from alula.model.errors import UnsupportedModelError
 from alula.model.execution_state import ExecutionState
 from alula.model.model import Skillset
 from alula.model.situation import Running
-from alula.runtime.core.context import Entry, ExecutionContext
+from alula.runtime.core.context import Entry, SkillsetContext
 from alula.runtime.core.errors import SkillRuntimeError
 from alula.runtime.core.events import Listener
 from alula.runtime.core.execution import Execution
@@ -113,7 +113,7 @@ class SkillsetEngine:
         self._closed = ""
         self._lock = threading.Lock()
         self._outbox = Outbox(listener, on_error)
-        self._context = ExecutionContext(skillset, clock_ns, self._outbox.put)
+        self._context = SkillsetContext(skillset, clock_ns, self._outbox.put)
 
     # --- requests: validated, started in one step, dispatched (paper, Figure 5) --------------------------------------------
 

@@ -7,8 +7,8 @@ from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass, replace
 
 from alula.model.execution_state import ExecutionState
-from alula.model.model import Skillset
-from alula.runtime.core.events import EngineEvent, ExecutionEvent, TransitionEvent
+from alula.model.model import ResultKind, Skillset
+from alula.runtime.core.events import NANOSECONDS, EngineEvent, ExecutionEvent, TransitionEvent
 
 HISTORY = 20
 """Transitions that are kept of each resource."""
@@ -29,7 +29,10 @@ class ResourceStatus:
 
 @dataclass(frozen=True)
 class ExecutionRecord:
-    """One execution, open or ended. Stamps are mission clock, nanoseconds; 0: that has not happened."""
+    """One execution, open or ended, by its events. Stamps are mission clock; None: that has not happened.
+
+    ``result_kind`` is as in ``ExecutionEvent``.
+    """
 
     id: str
     skill: str
@@ -39,8 +42,44 @@ class ExecutionRecord:
     inputs: object
     outputs: Mapping[str, object]
     requested_ns: int
-    started_ns: int = 0
-    ended_ns: int = 0
+    started_ns: int | None = None
+    ended_ns: int | None = None
+    skillset: str = ""
+    result_kind: ResultKind | None = None
+
+    @property
+    def requested_s(self) -> float:
+        """When it was asked for, in seconds."""
+        return self.requested_ns / NANOSECONDS
+
+    @property
+    def started_s(self) -> float | None:
+        """When it was RUNNING for the first time, in seconds."""
+        return None if self.started_ns is None else self.started_ns / NANOSECONDS
+
+    @property
+    def ended_s(self) -> float | None:
+        """When it came to its terminal state, in seconds."""
+        return None if self.ended_ns is None else self.ended_ns / NANOSECONDS
+
+    @classmethod
+    def begun(cls, event: ExecutionEvent) -> ExecutionRecord:
+        """Return the record of an execution whose first event this is."""
+        return cls(event.id, event.skill, event.state, "", "", event.inputs, {}, event.stamp_ns, skillset=event.skillset).then(event)
+
+    def then(self, event: ExecutionEvent) -> ExecutionRecord:
+        """Return the record after one more event."""
+        starts = event.state is ExecutionState.RUNNING and self.started_ns is None
+        return replace(
+            self,
+            state=event.state,
+            result=event.result,
+            result_kind=event.result_kind,
+            message=event.message,
+            outputs=event.outputs,
+            started_ns=event.stamp_ns if starts else self.started_ns,
+            ended_ns=event.stamp_ns if event.state.terminal else None,
+        )
 
 
 @dataclass(frozen=True)
@@ -73,12 +112,8 @@ class Records:
 
 def _followed(skill: SkillRecord, event: ExecutionEvent) -> SkillRecord:
     known = {record.id: record for record in skill.open}
-    stamp_ns = event.stamp_ns
-    record = known.get(event.id) or ExecutionRecord(event.id, event.skill, event.state, "", "", event.inputs, {}, stamp_ns)
-    record = replace(record, state=event.state, result=event.result, message=event.message, outputs=event.outputs)
-    if event.state is ExecutionState.RUNNING and not record.started_ns:
-        record = replace(record, started_ns=stamp_ns)
+    record = known[event.id].then(event) if event.id in known else ExecutionRecord.begun(event)
     if not event.state.terminal:
         return replace(skill, open=tuple((known | {event.id: record}).values()))
     known.pop(event.id, None)
-    return SkillRecord(tuple(known.values()), replace(record, ended_ns=stamp_ns))
+    return SkillRecord(tuple(known.values()), record)

@@ -41,8 +41,8 @@ class Choice:
 
 
 @dataclass(eq=False)
-class MockExecution:
-    """One execution: seconds of mission clock, and where it moves parts of the memory from and to."""
+class PlayedScript:
+    """A script that is being played for an execution: seconds of mission clock, and where it moves parts of the memory from and to."""
 
     execution: Execution
     choice: Choice
@@ -64,7 +64,7 @@ class MockSkill(SkillHooks):
         self._default = default_script(skill)
         self._chance = chance
         self._calls = 0
-        self._runs: dict[str, MockExecution] = {}
+        self._runs: dict[str, PlayedScript] = {}
         self._unattached = Choice(self._default, "")
 
     # --- hooks -------------------------------------------------------------------------------------------------------
@@ -162,16 +162,16 @@ class MockSkill(SkillHooks):
             return False
         return rule.when is None or bool(self._state.value(rule.when, names, self._chance))
 
-    def _begin(self, execution: Execution, choice: Choice) -> MockExecution:
+    def _begin(self, execution: Execution, choice: Choice) -> PlayedScript:
         state, names = self._state, self._names(execution.inputs)
         delay_s = max(0.0, state.number(choice.script.delay, names, self._chance))
         with state.lock:
             targets = {name: state.value(value, names, self._chance) for name, value in choice.script.moves.items()}
             moves = {name: (state.memory.get(name), _plain(target)) for name, target in targets.items()}
-            run = self._runs[execution.id] = MockExecution(execution, choice, {**names, "delay": delay_s}, state.host.now_s, delay_s, moves)
+            run = self._runs[execution.id] = PlayedScript(execution, choice, {**names, "delay": delay_s}, state.host.now_s, delay_s, moves)
         return run
 
-    def _finish(self, run: MockExecution) -> None:
+    def _finish(self, run: PlayedScript) -> None:
         """End an execution as it was chosen."""
         with self._state.lock:
             if self._runs.pop(run.execution.id, None) is None:
@@ -188,7 +188,7 @@ class MockSkill(SkillHooks):
             return
         run.execution.terminate(run.choice.result, run.choice.script.ending.message, outputs)
 
-    def _move(self, run: MockExecution, part: float) -> None:
+    def _move(self, run: PlayedScript, part: float) -> None:
         for name, (source, target) in run.moves.items():
             self._state.memory[name] = _towards(source, target, part)
 

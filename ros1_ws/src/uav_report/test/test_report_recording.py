@@ -9,10 +9,10 @@ from pathlib import Path
 import numpy as np
 import pytest
 
+from alula.common import run_log
 from alula.common.faults import FaultChange
 from alula.common.scenarios import load_scenario
 from alula.console.entries import FAULT, HEALTH, PATH
-from alula.report import run_log
 from alula.report.facts import RunFacts
 from alula.report.files import Problems
 from alula.report.history import History

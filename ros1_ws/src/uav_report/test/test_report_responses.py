@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import json
 import sys
 from pathlib import Path
 from typing import Any
@@ -10,9 +9,10 @@ from typing import Any
 import numpy as np
 import pytest
 
+from alula.common import run_log
 from alula.common.record import FILE as RECORD
 from alula.records.errors import AnalysisError
-from alula.report import making, run_log
+from alula.report import making
 from alula.report.facts import RunFacts
 from alula.report.making import make_report
 
@@ -186,7 +186,8 @@ def mocked(folder: Path, asked: tuple[str, ...], *told: tuple[str, str, float]) 
     """Return the summary of a flight over mocks whose account tells of these faults."""
     flight(("zed", 20.3), ("zed", 50.3)).write(folder / RECORD)
     faults = [{"sensor": sensor, "mode": mode, "t_s": LIFT_OFF_S + at_s} for sensor, mode, at_s in told]
-    (folder / "mock.json").write_text(json.dumps({"lift_off_s": LIFT_OFF_S, "faults": faults}))
+    for fault in faults:
+        run_log.note(folder, run_log.FAULT, fault)
     return dict(make_report(RunFacts("mapping", 0, folder, asked, (), 0, mock=True)))
 
 
@@ -196,9 +197,3 @@ def test_mocks_tell_each_fault_of_a_sensor_and_when_it_ended(tmp_path):
     assert [(one["mode"], one["t_s"]) for one in summary["injected"]] == [("dark", 20.0), ("mock", 50.0)]
     assert [one["until_s"] for one in summary["answers"]] == [30.0, None]
     assert "the fault lidar@700 never happened" in summary["problems"]
-
-
-def test_older_accounts_of_mocks_with_the_first_time_alone_are_read(tmp_path):
-    summary = mocked(tmp_path, ("zed:dark@20-30", "lidar@40"), ("zed:dark", "mock", 20.0), ("lidar", "mock", 40.0))
-    assert [(one["sensor"], one["mode"], one["t_s"]) for one in summary["injected"]] == [("zed", "dark", 20.0), ("lidar", "mock", 40.0)]
-    assert summary["problems"] == ["mission.json is missing"]

@@ -14,6 +14,7 @@ from pathlib import Path
 import pytest
 
 from alula.commands import run as over_mocks
+from alula.common import run_log
 from alula.common.faults import FaultRequest
 from alula.common.record import BLACKBOARD, DECISIONS, EVENTS, MISSION, REPORTS, TREE, read_record
 from alula.common.scenarios import load_scenario
@@ -186,9 +187,9 @@ def test_a_flight_without_eyes_ends_1_and_leaves_its_record(tmp_path):
     for skillset in ("navigation", "perception", "mapping"):
         numbers = [event["sequence"] for event in events if event["skillset"] == skillset]
         assert numbers == list(range(1, len(numbers) + 1))
-    mock = json.loads((tmp_path / "run/mock.json").read_text())
-    assert [(fault["sensor"], round(fault["t_s"] - mock["lift_off_s"], 2)) for fault in mock["faults"]] == [("zed", 8.0), ("lidar", 8.0)]
-    assert mock["notes"] == []
+    told = [(fault["sensor"], round(fault["t_s"] - mission["lift_off_s"], 2)) for fault in run_log.read(tmp_path / "run", run_log.FAULT)]
+    assert told == [("zed", 8.0), ("lidar", 8.0)]
+    assert [mocked["notes"] for mocked in run_log.read(tmp_path / "run", run_log.MOCKED)] == [[]]
     assert (tmp_path / "run/tree.svg").read_text().startswith("<svg")
     assert [entry.value for entry in record if entry.topic == TREE][-1]["status"] == "FAILURE"
     assert [entry.value["outcome"] for entry in record if entry.topic == MISSION] == ["running", "given_up"]

@@ -12,7 +12,7 @@ from alula.common.faults import FaultChange
 from alula.common.files import write_aside
 from alula.records.causes.effects import EffectsByFault, FaultEffects
 from alula.records.causes.faults import Fault
-from alula.report.observed import Observed, read_process_faults
+from alula.report.observed import Observed, read_faults
 from alula.report.part import Entry, Findings, ReportedRun
 from alula.report.phases import Phases, home, status_changes
 from alula.report.recovery import Recovery
@@ -70,7 +70,7 @@ class FlightReport:
             is_back=guidance[-1].landed_state == ON_GROUND if guidance else None,
             faults=() if simulator is None else simulator.faults,
             tells_faults=simulator is not None,
-            processes=read_process_faults(run.folder),
+            processes=read_faults(run.folder),
             moving_again=None if path is None else lambda since_s: moving_again(path, since_s, self._phases.landing_s),
         )
 

@@ -45,7 +45,7 @@ def touch_down(guidance: tuple[GuidanceAccount, ...]) -> float | None:
 
 
 def _cruise(history: History, guidance: tuple[GuidanceAccount, ...], zero_s: float) -> float | None:
-    ends = [execution.end_s for execution in history.of_skill(TAKEOFF) if execution.end_s is not None and execution.end_s > zero_s]
+    ends = [execution.ended_s for execution in history.of_skill(TAKEOFF) if execution.ended_s is not None and execution.ended_s > zero_s]
     if ends:
         return ends[0]
     return next((state.t_s for state in guidance if state.t_s > zero_s and state.reference not in _BEFORE_FLIGHT), None)
@@ -57,5 +57,5 @@ def _landing(history: History, guidance: tuple[GuidanceAccount, ...], zero_s: fl
     if last is not None:
         block = list(takewhile(lambda state: state.landing, reversed(guidance[: last + 1])))
         return block[-1].t_s
-    starts = [execution.running_s for execution in history.of_skill(LAND) if execution.running_s is not None]
+    starts = [execution.started_s for execution in history.of_skill(LAND) if execution.started_s is not None]
     return starts[-1] if starts and starts[-1] > zero_s else None

@@ -160,8 +160,8 @@ def _span(frames: Sequence[FrameRecord], history: History, phases: FlightPhases)
     shown = [frame["shown"] for frame in frames if frame["shown"] is not None]
     streams = history.of_skill("stream")
     last = streams[-1] if streams else None
-    end_s = phases.since(last.end_s) if last is not None and last.end_s is not None else None
-    criterion = last.result if last is not None and last.outcome == VIOLATED else None
+    end_s = phases.since(last.ended_s) if last is not None and last.ended_s is not None else None
+    criterion = last.result if last is not None and last.state.value == VIOLATED else None
     first_s = min(shown, default=frames[0]["sent"])
     return first_s, max(first_s, frames[-1]["sent"] if end_s is None else end_s), criterion
 

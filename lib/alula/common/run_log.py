@@ -1,19 +1,23 @@
 """``run_log.jsonl`` in a run's folder: what happened to a run besides its mission, a line each, by whatever process comes to know it.
 
-Processes that died, what was done to processes, what the run waited for before it could begin, and who ended it.
+Processes that died, what was made to fail besides measurements, what the run waited for before it could begin, what the operator did, and
+who ended it; of a run over mocks, how fast it was. ``skills.mcap`` is the mission's process's: two can't write one.
 """
 
 from __future__ import annotations
 
 import contextlib
 import json
-from collections.abc import Mapping
+from collections.abc import Iterable, Mapping, Sequence
 from pathlib import Path
 from typing import Any
 
+from alula.common.faults import FaultChange
+
 FILE = "run_log.jsonl"
-DEATH, FAULT, WAIT, END = "death", "fault", "wait", "end"
-"""The kinds of lines: see ``deaths``, ``alula.common.faults.FaultChange``, ``read_waits`` and ``ends``."""
+DEATH, FAULT, WAIT, ACT, END, MOCKED = "death", "fault", "wait", "act", "end", "mocked"
+"""The kinds of lines: see ``alula.report.deaths``, ``alula.common.faults.FaultChange``, ``read_waits``, ``note_act``, ``alula.report.ends``
+and ``note_mocked``."""
 
 
 def note(out: Path, kind: str, content: Mapping[str, object]) -> None:
@@ -45,3 +49,15 @@ def note_wait(out: Path, what: str, *, over: bool) -> None:
 def read_waits(out: Path) -> dict[str, bool]:
     """Return what a run waited for, each with whether it came."""
     return {str(one.get("for")): bool(one.get("over")) for one in read(out, WAIT)}
+
+
+def note_act(out: Path, stamp_s: float | None, act: Mapping[str, object]) -> None:
+    """Note what the operator did: ``{command, by, answer}``; seconds of mission clock, None before that is heard."""
+    note(out, ACT, {**({} if stamp_s is None else {"stamp_s": round(stamp_s, 3)}), **act})
+
+
+def note_mocked(out: Path, simulated_s: float, wall_s: float, faults: Iterable[FaultChange], notes: Sequence[str]) -> None:
+    """Note what a run over mocks tells in place of recordings: its faults, seconds of mission clock, what was wrong, how fast it was."""
+    for change in faults:
+        note(out, FAULT, vars(change))
+    note(out, MOCKED, {"simulated_s": simulated_s, "wall_s": wall_s, "factor": simulated_s / wall_s if wall_s else None, "notes": [*notes]})
