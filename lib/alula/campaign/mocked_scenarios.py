@@ -16,11 +16,12 @@ from alula.missions.mocked import MockedMission
 from alula.missions.plan import InputError, Inputs, MissionPlan, inputs_of, plan_of
 from alula.model.model import Skillset
 from alula.records.errors import AnalysisError
+from alula.records.mocks import behaviour_of
 from alula.records.models import robot_skillsets
 from alula.records.tree import Places, tip_of
 from alula.runtime.core.errors import SkillRuntimeError
 from alula.runtime.core.events import EngineEvent
-from alula.runtime.mock import Behaviour, load_behaviour
+from alula.runtime.mock import Behaviour
 from alula.trees.node import Node
 
 
@@ -87,7 +88,7 @@ def load_mocked_scenario(name: str, behaviour: Sequence[Path] = (), *, world: st
     try:
         scenario, robot = load_scenario(name), find_robot()
         inputs = inputs_of(scenario, world)
-        known = load_behaviour([*robot.behaviour_files, *behaviour], robot_skillsets()).of(frozenset(scenario.skillsets))
+        known = behaviour_of(robot, behaviour).of(frozenset(scenario.skillsets))
     except (ScenarioError, RobotError, InputError, SkillRuntimeError) as error:
         raise AnalysisError(str(error)) from None
     return MockedScenario(scenario, tuple(robot_skillsets(scenario.skillsets)), known, inputs)

@@ -16,7 +16,7 @@ from functools import partial
 from time import monotonic
 
 from alula.commands.check_missions import SUFFIX, check_missions, prove_missions
-from alula.common.robots import RobotError, find_robot
+from alula.common.robots import RobotError, RobotFolder, find_robot
 from alula.language.check.fields import check_fields
 from alula.language.errors import Diagnostic, Severity, has_errors, render
 from alula.language.models import ModelFile, check_files, models_in
@@ -35,6 +35,11 @@ exit code: 0 proved, or nothing but warnings; 1 a model has errors (also of synt
 """
 
 
+def _models_of(robot: RobotFolder) -> list[str]:
+    """Return the folder of a robot's models, or those of a fleet's robots."""
+    return [str(one.skillsets) for one in robot.robots.values()] or [str(robot.skillsets)]
+
+
 def main(arguments: Sequence[str] | None = None) -> int:
     """Check the files named on the command line; return the exit code."""
     options = _parser().parse_args(arguments)
@@ -43,7 +48,7 @@ def main(arguments: Sequence[str] | None = None) -> int:
 
         return play.main(arguments)
     try:
-        given = options.files or [str(find_robot().skillsets)]
+        given = options.files or _models_of(find_robot())
     except RobotError as error:
         sys.stderr.write(f"alula check: no files are named, and {error}\n")
         return 2

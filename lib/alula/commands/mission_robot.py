@@ -6,6 +6,7 @@ import sys
 
 from alula.common.robots import RobotError, RobotFolder
 from alula.language.errors import has_errors
+from alula.language.fleet import in_fleet
 from alula.language.models import check_files, models_in
 from alula.missions.filed.part import NO_PART, MissionPart
 from alula.model.model import Skillset
@@ -13,6 +14,8 @@ from alula.model.model import Skillset
 
 def models_of(robot: RobotFolder, command: str) -> tuple[Skillset, ...]:
     """Return the models of a robot as far as they can be read; what is wrong with them is told on standard error."""
+    if robot.robots:
+        return tuple(one for name, member in robot.robots.items() for one in in_fleet(name, models_of(member, command)))
     files = check_files(models_in(str(robot.skillsets)))
     for file in files:
         if has_errors(file.findings):

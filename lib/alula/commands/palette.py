@@ -12,11 +12,12 @@ from dataclasses import replace
 from pathlib import Path
 
 from alula.commands.mission_robot import part_of
-from alula.common.robots import RobotError, find_robot
+from alula.common.robots import RobotError, RobotFolder, find_robot
 from alula.language.errors import LanguageError, has_errors
+from alula.language.fleet import load_models
 from alula.language.models import ModelFile, check_files, models_in
 from alula.missions.filed.palette import mission_palette
-from alula.missions.filed.part import NO_PART, MissionPart
+from alula.missions.filed.part import NO_PART
 from alula.trees.groot.tree_xml import model_xml
 from alula.trees.palette import NodeType
 from alula.trees.standard import standard_palette
@@ -40,12 +41,21 @@ def main(words: Sequence[str] | None = None) -> int:
 
 
 def robot_types(folder: str) -> Iterator[NodeType]:
-    """Yield the types of node that missions over a folder of models have, but for BehaviorTree.CPP's; raises LanguageError."""
-    files = check_files(models_in(folder))
+    """Yield the types of node that missions over a folder of models, or a fleet's, have, but for BehaviorTree.CPP's.
+
+    Raises:
+        LanguageError: a model has errors.
+    """
+    robot = _robot(folder)
+    part = NO_PART if robot is None else part_of(robot, COMMAND)
+    if robot is not None and robot.robots:
+        files, skillsets = [], list(load_models(robot).skillsets)
+    else:
+        files = check_files(models_in(folder))
+        skillsets = [skillset for file in files for skillset in file.skillsets]
     for file in files:
         if has_errors(file.findings):
             raise LanguageError(file.findings)
-    skillsets = [skillset for file in files for skillset in file.skillsets]
     told = {
         f"{skillset.name}.{skill.name}": told_above(file, skill.span.line)
         for file in files
@@ -53,18 +63,17 @@ def robot_types(folder: str) -> Iterator[NodeType]:
         for skill in skillset.skills
     }
     known = standard_palette().names()  # Groot2 has these itself
-    for one in mission_palette(skillsets, _part(folder)):
+    for one in mission_palette(skillsets, part):
         if one.name not in known:
             yield replace(one, doc=told.get(one.name, one.doc))
 
 
-def _part(folder: str) -> MissionPart:
-    """Return what the robot adds whose models a folder holds; nothing for models without a robot."""
+def _robot(folder: str) -> RobotFolder | None:
+    """Return the robot whose models a folder holds; None for models without a robot."""
     try:
-        robot = find_robot(Path(folder))
+        return find_robot(Path(folder))
     except RobotError:
-        return NO_PART
-    return part_of(robot, COMMAND)
+        return None
 
 
 def told_above(file: ModelFile, line: int) -> str:

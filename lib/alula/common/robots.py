@@ -28,7 +28,7 @@ BEHAVIOUR, FAULTS = "mock.yaml", "faults.yaml"
 PARTS = ("inputs", "missions", "hooks", "report", "run", "depths", "areas")
 """What a robot may add to the general commands, as ``module`` or ``module:name``; ``docs/robots.md`` says what each has to be."""
 WORLD_KEYS = ("packages", "python", "debian", "underlays")
-KEYS = ("name", "about", "skillsets", "scenarios", "worlds", "departure", "taken", "page", "python", "parts", "ros1", "ros2")
+KEYS = ("name", "about", "robots", "skillsets", "scenarios", "worlds", "departure", "taken", "page", "python", "parts", "ros1", "ros2")
 _NAME = re.compile(r"[a-z][a-z0-9_]*")
 
 
@@ -66,6 +66,7 @@ class RobotFolder:
         page: words and facts of its reports and of the operator's page, see `read_page`.
         python: folders of plain Python packages, which missions and the parts import.
         parts: what it adds to the general commands.
+        robots: of a fleet, the robots that it consists of, by their names in it; what they have is called ``ROBOT_NAME`` in it.
     """
 
     root: Path
@@ -79,6 +80,7 @@ class RobotFolder:
     page: Mapping[str, Any] = field(default_factory=lambda: dict(USUAL_PAGE))
     python: tuple[Path, ...] = ()
     parts: Mapping[str, str] = field(default_factory=dict)
+    robots: Mapping[str, RobotFolder] = field(default_factory=dict)
     ros1: RosPart = RosPart()
     ros2: RosPart = RosPart()
 
@@ -201,9 +203,29 @@ def _load(root: Path, _written_ns: int) -> RobotFolder:
         page=read_page(said.get("page")),
         python=tuple(root / one for one in _texts(said.get("python"), "`python`")),
         parts=_parts(said.get("parts")),
+        robots=_robots(root, said),
         ros1=_ros_part(root, said.get("ros1"), "ros1_ws/src"),
         ros2=_ros_part(root, said.get("ros2"), "ros2_ws/src"),
     )
+
+
+def fleet_name(robot: str, name: str) -> str:
+    """Return what a skillset or a fault of a robot is called in a fleet."""
+    return f"{robot}_{name}"
+
+
+def _robots(root: Path, said: Mapping[str, Located]) -> dict[str, RobotFolder]:
+    """Return the robots of a fleet; none of a robot."""
+    found: dict[str, RobotFolder] = {}
+    for name, entry in said["robots"].entries("`robots`").items() if "robots" in said else ():
+        if _NAME.fullmatch(name) is None:
+            raise entry.wrong(f"`{name}`: a robot's name is made of a-z, 0-9 and _, and begins with a letter")
+        found[name] = load_robot_folder((root / Path(entry.text(f"the folder of {name}")).expanduser()).resolve())
+        if found[name].robots:
+            raise entry.wrong(f"{name} is a fleet itself; name its robots")
+    if found and "skillsets" in said:
+        raise said["skillsets"].wrong("a fleet has the skillsets of its robots, and none of its own; leave `skillsets` out")
+    return found
 
 
 def _existing(said: Mapping[str, Located], key: str, path: Path) -> Path:

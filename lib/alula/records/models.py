@@ -8,6 +8,7 @@ from pathlib import Path
 
 from alula.common.robots import RobotError, RobotFolder, find_robot
 from alula.language.errors import LanguageError
+from alula.language.fleet import together
 from alula.language.load import load_robot, load_skillset
 from alula.language.robot import Robot
 from alula.model.model import Skillset
@@ -17,6 +18,8 @@ from alula.records.errors import AnalysisError
 def robot_model(folder: RobotFolder) -> Robot:
     """Return a robot's skillsets with their types and bindings; raises AnalysisError where its models have errors."""
     try:
+        if folder.robots:
+            return together(folder, {name: robot_model(one) for name, one in folder.robots.items()})
         return _loaded(folder.skillsets, tuple(path.stat().st_mtime_ns for path in sorted(folder.skillsets.glob("*"))))
     except (LanguageError, OSError) as error:
         raise AnalysisError(str(error)) from None

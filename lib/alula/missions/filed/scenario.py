@@ -7,7 +7,7 @@ from pathlib import Path
 from alula.common.robots import find_robot
 from alula.common.scenarios import Scenario
 from alula.language.errors import LanguageError
-from alula.language.load import load_robot
+from alula.language.fleet import load_models
 from alula.missions.filed.part import NO_PART
 from alula.missions.filed.plan import plan_of_file
 from alula.missions.plan import InputError, Inputs, MissionPlan
@@ -21,7 +21,7 @@ def plan_of_mission_file(path: Path, scenario: Scenario, inputs: Inputs) -> Miss
     """
     robot = find_robot()
     try:
-        models = {skillset.name: skillset for skillset in load_robot(robot.skillsets).skillsets}
+        models = {skillset.name: skillset for skillset in load_models(robot).skillsets}
     except (LanguageError, OSError) as error:
         raise InputError(str(error)) from error
     missing = [name for name in scenario.skillsets if name not in models]

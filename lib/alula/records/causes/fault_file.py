@@ -43,7 +43,8 @@ def effects_of_robot() -> EffectsByFault:
 def effects_of_models() -> EffectsByFault:
     """Return the effects that follow from the robot's models; raises AnalysisError where they have errors."""
     try:
-        there = find_robot().skillsets.is_dir()
+        robot = find_robot()
+        there = bool(robot.robots) or robot.skillsets.is_dir()
     except RobotError as error:
         raise AnalysisError(str(error)) from None
     return EffectsByFault(alarms=alarms_of(robot_skillsets() if there else ()))

@@ -17,11 +17,12 @@ from alula.missions.filed.scenario import plan_of_mission_file
 from alula.missions.plan import InputError, Inputs, MissionPlan, plan_of
 from alula.model.model import Skillset
 from alula.records.errors import AnalysisError
+from alula.records.mocks import behaviour_of
 from alula.records.models import robot_skillsets
 from alula.records.replay.fitting import fitted
 from alula.records.replay.recorded import Recorded, ReplayError
 from alula.runtime.core.errors import SkillRuntimeError
-from alula.runtime.mock import Behaviour, load_behaviour
+from alula.runtime.mock import Behaviour
 
 
 def inputs_of_record(recorded: Recorded) -> Inputs:
@@ -90,7 +91,7 @@ def behaviour_for(recorded: Recorded, skillsets: Sequence[Skillset], files: Sequ
     """Return what mocks do where the record has no answer: as the record fits, then the files, then the robot's own."""
     names = frozenset(skillset.name for skillset in skillsets)
     try:
-        own = load_behaviour([*find_robot().behaviour_files, *files], robot_skillsets()).of(names)
+        own = behaviour_of(find_robot(), files).of(names)
     except (SkillRuntimeError, RobotError, AnalysisError) as error:
         raise ReplayError(str(error)) from error
     return replace(fitted(recorded).over(own), faults=own.faults)

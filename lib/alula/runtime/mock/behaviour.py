@@ -115,13 +115,14 @@ class DataScript:
 
 @dataclass(frozen=True, kw_only=True)
 class Behaviour:
-    """All of it, for all skillsets of a robot."""
+    """All of it, for all skillsets of a robot. ``beside``: of other robots of a fleet, each with a memory of its own."""
 
     memory: Mapping[str, object] = field(default_factory=dict)
     rules: Mapping[Place, tuple[Rule, ...]] = field(default_factory=dict)
     timeline: tuple[TimelineEvent, ...] = ()
     faults: Mapping[str, MockFault] = field(default_factory=dict)
     data: Mapping[Place, DataScript] = field(default_factory=dict)
+    beside: tuple[Behaviour, ...] = ()
 
     def over(self, other: Behaviour) -> Behaviour:
         """Return both together; this one's rules come first, and its memory, faults and data replace those of the same name."""
@@ -132,7 +133,43 @@ class Behaviour:
             timeline=(*other.timeline, *self.timeline),
             faults={**other.faults, **self.faults},
             data={**other.data, **self.data},
+            beside=(*other.beside, *self.beside),
         )
+
+    def named(self, name: Callable[[str], str]) -> Behaviour:
+        """Return it for skillsets and faults that are called otherwise: ``name`` makes their names of those here."""
+
+        def states(said: Mapping[Place, str]) -> dict[Place, str]:
+            return {(name(skillset), member): state for (skillset, member), state in said.items()}
+
+        def anchor(said: tuple[Place, str] | None) -> tuple[Place, str] | None:
+            return None if said is None else ((name(said[0][0]), said[0][1]), said[1])
+
+        def changes(said: tuple[MockChange, ...]) -> tuple[MockChange, ...]:
+            return tuple(replace(change, states=states(change.states)) for change in said)
+
+        def rule(said: Rule) -> Rule:
+            return said if said.changes is None else replace(said, changes=changes(said.changes))
+
+        return Behaviour(
+            memory=self.memory,
+            rules={(name(skillset), skill): tuple(map(rule, rules)) for (skillset, skill), rules in self.rules.items()},
+            timeline=tuple(replace(one, states=states(one.states), anchor=anchor(one.anchor)) for one in self.timeline),
+            faults={
+                name(what): replace(
+                    one, states=states(one.states), anchor=anchor(one.anchor), changes=changes(one.changes), ends=states(one.ends)
+                )
+                for what, one in self.faults.items()
+            },
+            data={(name(skillset), data): script for (skillset, data), script in self.data.items()},
+            beside=tuple(one.named(name) for one in self.beside),
+        )
+
+    def about(self, skillset: str) -> bool:
+        """Tell whether anything is said of a skillset, ``beside`` aside."""
+        said = [*self.rules, *self.data, *(place for event in self.timeline for place in event.states)]
+        said += [place for fault in self.faults.values() for place in (*fault.states, *fault.ends)]
+        return any(place[0] == skillset for place in said)
 
     def fault(self, request: FaultRequest) -> tuple[str, MockFault]:
         """Return the fault that a request means, with its name: the one for the way of failing, else the one for the thing.
@@ -140,10 +177,11 @@ class Behaviour:
         Raises:
             SkillRuntimeError: there is none.
         """
-        name = next((name for name in (f"{request.what}:{request.how}", request.what) if name in self.faults), None)
+        faults = {name: fault for one in (self, *self.beside) for name, fault in one.faults.items()}
+        name = next((name for name in (f"{request.what}:{request.how}", request.what) if name in faults), None)
         if name is None:
-            raise SkillRuntimeError(f"there is no fault '{request.what}' in the behaviour; it has {', '.join(self.faults) or 'none'}")
-        return name, self.faults[name]
+            raise SkillRuntimeError(f"there is no fault '{request.what}' in the behaviour; it has {', '.join(faults) or 'none'}")
+        return name, faults[name]
 
     def of(self, skillsets: frozenset[str]) -> Behaviour:
         """Return what concerns these skillsets alone, for a process that has no others."""
@@ -160,6 +198,7 @@ class Behaviour:
             timeline=tuple(entry for entry in self.timeline if inside(entry.states, entry.anchor)),
             faults={name: fault for name, fault in self.faults.items() if inside({**fault.states, **fault.ends}, fault.anchor)},
             data={place: script for place, script in self.data.items() if place[0] in skillsets},
+            beside=tuple(one.of(skillsets) for one in self.beside),
         )
 
 

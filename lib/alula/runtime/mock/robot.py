@@ -29,7 +29,10 @@ class MockRobot(MockState):
         super().__init__(behaviour.memory, host, random.Random(f"{seed} timeline"))  # noqa: S311 - a mock, not a secret
         self.faults: dict[str, float] = {}
         """When which fault happened, seconds of mission clock."""
-        self._behaviour = behaviour
+        self._beside = [MockRobot(one, host, seed=seed) for one in behaviour.beside]
+        for other in self._beside:
+            other.faults = self.faults
+        self.behaviour = behaviour
         self._seed = seed
         self._skills: list[MockSkill] = []
         self._resources: dict[str, tuple[str, ...]] = {}
@@ -41,10 +44,13 @@ class MockRobot(MockState):
 
     def hooks_of(self, skillset: Skillset, make: MakeSkill = MockSkill) -> dict[str, MockSkill]:
         """Make the hooks of a skillset's skills; ``make`` by default makes those that follow the rules alone."""
+        other = next((one for one in self._beside if one.behaviour.about(skillset.name)), None)
+        if other is not None:
+            return other.hooks_of(skillset, make)
         made = {}
         self._resources[skillset.name] = tuple(resource.name for resource in skillset.resources)
         for skill in skillset.skills:
-            rules = self._behaviour.rules.get((skillset.name, skill.name), ())
+            rules = self.behaviour.rules.get((skillset.name, skill.name), ())
             chance = random.Random(f"{self._seed} {skillset.name}.{skill.name}")  # noqa: S311
             made[skill.name] = make(self, skillset.name, skill, rules, chance)
         self._skills += made.values()
@@ -54,10 +60,12 @@ class MockRobot(MockState):
     def begin(self) -> None:
         """Schedule the timeline and the data, from now on."""
         self._began_s = self.host.now_s
-        for event in self._behaviour.timeline:
+        for event in self.behaviour.timeline:
             self._schedule(event.anchor, self.number(event.after_s, {}), functools.partial(self.take, event.states))
-        for place, script in self._behaviour.data.items():
+        for place, script in self.behaviour.data.items():
             self._do(0.0, functools.partial(self._publish, place, script))
+        for other in self._beside:
+            other.begin()
 
     def fail(self, request: FaultRequest) -> None:
         """Have a fault of the behaviour happen, and end where the request says so; without a time it happens at the beginning.
@@ -67,7 +75,11 @@ class MockRobot(MockState):
         Raises:
             SkillRuntimeError: there is no such fault.
         """
-        name, fault = self._behaviour.fault(request)
+        name, fault = self.behaviour.fault(request)
+        other = next((one for one in self._beside if name in one.behaviour.faults), None)
+        if other is not None:
+            other.fail(request)
+            return
         anchor = None if request.begin_s is None else fault.anchor
         self._schedule(anchor, request.begin_s or 0.0, functools.partial(self._break, name, fault))
         if request.end_s is not None:
@@ -75,6 +87,8 @@ class MockRobot(MockState):
 
     def on_state(self, skillset: str, resource: str, state: str) -> None:
         """Note that a resource has entered a state; only the first time counts."""
+        for other in self._beside:
+            other.on_state(skillset, resource, state)
         entered = ((skillset, resource), state)
         if entered in self._entered_s:
             return
@@ -84,7 +98,7 @@ class MockRobot(MockState):
 
     def holds(self, skillset: str) -> bool:
         """Tell whether a fault holds a resource of this skillset."""
-        return any(place[0] == skillset for place in self._held)
+        return any(place[0] == skillset for place in self._held) or any(other.holds(skillset) for other in self._beside)
 
     # --- the clock's part --------------------------------------------------------------------------------------------
 
