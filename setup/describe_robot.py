@@ -31,6 +31,7 @@ def lines(robot: RobotFolder) -> Iterator[str]:
     """Yield the assignments."""
     yield f"robot_name={robot.name}"
     yield f"robot_skillsets={place(robot.skillsets, robot.root)}"
+    yield f"robot_fleet=({' '.join(place(one.skillsets, robot.root) for one in robot.robots.values())})"
     yield from world_lines("1", robot.ros1, robot.root)
     yield from world_lines("2", robot.ros2, robot.root)
 

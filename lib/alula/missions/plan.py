@@ -35,6 +35,7 @@ class MissionPlan:
         parameters: numbers that may be set from outside, with their defaults; on ROS 2 they are parameters of the node.
         inputs: what it was made of.
         facts: what ``mission.json`` says beyond the outcome, asked at the beginning and at the end.
+        places: of a fleet's, by skillset, the namespace of its robot and what it is called there, as ("/rover", "base").
     """
 
     scenario: str
@@ -43,6 +44,11 @@ class MissionPlan:
     parameters: Mapping[str, float] = field(default_factory=dict)
     inputs: Inputs = field(default_factory=dict)
     facts: Callable[[], Mapping[str, object]] = nothing_more
+    places: Mapping[str, tuple[str, str]] = field(default_factory=dict)
+
+    def place(self, skillset: str) -> tuple[str, str]:
+        """Return the namespace of a skillset's robot, empty for the mission's own, and the skillset's name there."""
+        return self.places.get(skillset, ("", skillset))
 
 
 class InputError(Exception):

@@ -70,12 +70,13 @@ class Recorder(Protocol):
 class MissionClient:
     """A skillset's client that has the tree ticked at once when an execution ends or a resource changes.
 
-    With a recorder it tells all that the tree asks for and is told.
+    With a recorder it tells all that the tree asks for and is told. ``name`` is what the mission calls the skillset, where that is
+    not its own name.
     """
 
-    def __init__(self, client: SkillsetClient, wake: Callable[[], None], recorder: Recorder | None = None) -> None:
+    def __init__(self, client: SkillsetClient, wake: Callable[[], None], recorder: Recorder | None = None, name: str = "") -> None:
         self.client = client
-        self.skillset = client.skillset
+        self.skillset = name or client.skillset
         self._wake = wake
         self._recorder = recorder
         self._followed: Collection[str] = ()

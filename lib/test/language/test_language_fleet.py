@@ -10,6 +10,7 @@ from alula.common.faults import parse_fault
 from alula.common.robots import RobotError, load_robot_folder
 from alula.language.errors import LanguageError
 from alula.language.fleet import load_models
+from alula.language.generate.__main__ import main as generate
 from alula.records.mocks import behaviour_of
 from alula.runtime.mock import mock_world
 
@@ -86,6 +87,21 @@ def test_types_of_one_name_have_to_be_the_same(fleet: Path) -> None:
     (fleet.parent / "right" / "skillsets" / "types.yaml").write_text("Width: float32\n", encoding="utf-8")
     with pytest.raises(LanguageError, match="type `Width` of two is float32, and that of another robot is float64"):
         load_models(load_robot_folder(fleet))
+
+
+def test_interfaces_of_a_fleet_have_the_skills_of_all_robots(fleet: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    right = fleet.parent / "right" / "skillsets"
+    (right / "arm.skill").write_text(MODEL.replace("skill shut", "skill open_up").replace("grip == OPEN", "grip != SHUT"), encoding="utf-8")
+    out, words = tmp_path / "out", [str(fleet.parent / "left" / "skillsets"), str(right), "--interfaces"]
+    assert generate([*words, "--out", str(out)]) == 0
+    assert [path.name for path in out.iterdir()] == ["arm_interfaces"]
+    assert sorted(path.name for path in (out / "arm_interfaces" / "action").iterdir()) == ["OpenUp.action", "Shut.action"]
+    assert '"action/OpenUp.action"' in (out / "arm_interfaces" / "CMakeLists.txt").read_text(encoding="utf-8")
+    (right / "arm.skill").write_text(MODEL.replace("width: Width", "far: Width"), encoding="utf-8")
+    capsys.readouterr()
+    assert generate([*words, "--out", str(tmp_path / "none")]) == 2
+    assert "`arm_interfaces/action/Shut.action` is another action for another robot" in capsys.readouterr().err
+    assert not (tmp_path / "none").exists()
 
 
 @pytest.mark.parametrize(

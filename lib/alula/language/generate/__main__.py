@@ -13,6 +13,7 @@ from dataclasses import replace
 from pathlib import Path
 
 from alula.language.errors import Diagnostic, LanguageError
+from alula.language.generate.interfaces import interface_package
 from alula.language.generate.robot_files import robot_files
 from alula.language.generate.writer import prune, write_files
 from alula.language.load import load_robot
@@ -30,11 +31,16 @@ def main(arguments: Sequence[str] | None = None) -> int:
         "--prune", action="store_true", help="remove everything else from DIR, such as packages of models that no longer exist"
     )
     parser.add_argument("--name", help="name of the robot (default: its folder's); only with one FOLDER")
+    parser.add_argument(
+        "--interfaces",
+        action="store_true",
+        help="make interfaces only, one package for all skillsets of a name",
+    )
     options = parser.parse_args(arguments)
     if options.name and len(options.robots) > 1:
         parser.error("--name: several robots can't have one name")
     try:
-        files = _all_files(options.robots, options.name)
+        files = _interfaces(options.robots) if options.interfaces else _all_files(options.robots, options.name)
         changed = write_files(files, options.out)
         if options.prune:
             prune(files, options.out)
@@ -67,6 +73,33 @@ def _all_files(folders: Sequence[Path], name: str | None) -> dict[str, str]:
         files |= made
     if findings:
         raise LanguageError(findings)
+    return files
+
+
+def _told(action: str) -> list[str]:
+    """Return what of an action goes over the wire: its fields, without the comments."""
+    return [line for line in action.splitlines() if line and not line.startswith("#")]
+
+
+def _interfaces(folders: Sequence[Path]) -> dict[str, str]:
+    """Return the interface packages of all robots: one a name of a skillset, with the skills of all that are called so.
+
+    Raises:
+        LanguageError: of skillsets of one name, skills of one name are not the same in ROS.
+    """
+    robots = [load_robot(folder) for folder in folders]
+    files: dict[str, str] = {}
+    for name in dict.fromkeys(skillset.name for robot in robots for skillset in robot.skillsets):
+        known = [(robot, one) for robot in robots for one in robot.skillsets if one.name == name]
+        skills = {skill.name: skill for _, one in known for skill in one.skills}
+        types = {kind: ros for robot, _ in known for kind, ros in robot.types.items()}
+        merged = interface_package(replace(known[0][0], types=types), replace(known[0][1], skills=tuple(skills.values())))
+        for folder, robot in zip(folders, robots, strict=True):
+            own = {p: t for r, one in known if r is robot for p, t in interface_package(r, one).items() if p.endswith(".action")}
+            for path in (path for path, text in own.items() if _told(merged[path]) != _told(text)):
+                message = f"`{path}` is another action for another robot; a process that calls both needs one, so rename one of the skills"
+                raise LanguageError([Diagnostic("ALU404", message, Span(str(folder), 0, 0, 0))])
+        files |= merged
     return files
 
 

@@ -2,9 +2,10 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
 from pathlib import Path
 
-from alula.common.robots import find_robot
+from alula.common.robots import RobotFolder, find_robot, fleet_name
 from alula.common.scenarios import Scenario
 from alula.language.errors import LanguageError
 from alula.language.fleet import load_models
@@ -28,4 +29,11 @@ def plan_of_mission_file(path: Path, scenario: Scenario, inputs: Inputs) -> Miss
     if missing:
         raise InputError(f"the robot has no skillset '{missing[0]}'")
     part = robot.part("missions") or NO_PART
-    return plan_of_file(path, scenario.name, [models[name] for name in scenario.skillsets], inputs, part)
+    plan = plan_of_file(path, scenario.name, [models[name] for name in scenario.skillsets], inputs, part)
+    return replace(plan, places=places_of(robot))
+
+
+def places_of(fleet: RobotFolder) -> dict[str, tuple[str, str]]:
+    """Return namespace and name of each skillset of a fleet's robots, by its name in the fleet; nothing for a robot."""
+    robots = [(name, one.name) for name, robot in fleet.robots.items() for one in load_models(robot).skillsets]
+    return {fleet_name(robot, skillset): (f"/{robot}", skillset) for robot, skillset in robots}

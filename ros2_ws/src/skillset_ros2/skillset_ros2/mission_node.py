@@ -10,6 +10,8 @@ import signal
 import sys
 import time
 from collections.abc import Callable, Sequence
+from dataclasses import replace
+from functools import partial
 from pathlib import Path
 from typing import Any
 
@@ -49,6 +51,7 @@ class MissionNode(Node):  # type: ignore[misc]  # rclpy is not typed
 
     def __init__(self, out: Path, plan: MissionPlan) -> None:
         super().__init__("mission")
+        self._plan = plan
         values = {name: self._parameter(name, value) for name, value in plan.parameters.items()}
         self._record = MissionRecord(out, plan, self._clock_ns, values)
         self._skillset_clients: list[MissionClient] = []
@@ -66,8 +69,9 @@ class MissionNode(Node):  # type: ignore[misc]  # rclpy is not typed
         self._heartbeat: Publisher | None = None
         self._tree = self.create_publisher(String, "mission/tree", LATCHED)
         for name in plan.skillsets:
-            hear: Callable[[Event], None] = lambda event: self.driver.event(event_of(event))  # noqa: E731
-            self.create_subscription(Event, f"{name}/events", hear, ALL_EVENTS, event_callbacks=QUIET)
+            space, skillset = plan.place(name)
+            topic = f"{space}/{skillset}/events" if space else f"{skillset}/events"
+            self.create_subscription(Event, topic, partial(self._hear, name), ALL_EVENTS, event_callbacks=QUIET)
         self.create_service(Trigger, "mission/abort", self._on_abort)
         self.create_service(SetBool, "mission/pause", self._on_pause)
         self.create_timer(TICK_PERIOD_S, self.driver.wake)
@@ -96,8 +100,16 @@ class MissionNode(Node):  # type: ignore[misc]  # rclpy is not typed
         for problem in self._record.problems:
             self.get_logger().error(problem)
 
+    def _hear(self, skillset: str, event: Event) -> None:
+        """Take an event under the mission's name of its skillset; robots of a fleet have other clocks, so their events are of now."""
+        told = event_of(event)
+        if self._plan.place(skillset)[0]:
+            told = replace(told, skillset=skillset, stamp_ns=self._clock_ns())
+        self.driver.event(told)
+
     def _make_client(self, name: str, wake: Callable[[], None]) -> MissionClient:
-        client = MissionClient(SkillsetClient(self, name), wake, self._record)
+        space, skillset = self._plan.place(name)
+        client = MissionClient(SkillsetClient(self, skillset, namespace=space), wake, self._record, name)
         self._skillset_clients.append(client)
         return client
 
