@@ -10,7 +10,7 @@ from skillset_interfaces.msg import ResourceStates
 from skillset_interfaces.srv import TransitionRequest
 
 from resource_reporter.caller import CallFailedError, TransitionCaller
-from resource_reporter.calls import tell_call
+from resource_reporter.calls import publisher, tell_call
 from resource_reporter.ledger import Call, Ledger
 
 # A latched topic may have been missed only while its publisher was away: nothing has to be polled. This bounds one wait.
@@ -30,6 +30,7 @@ class ResourceReporter:
         self._changed = threading.Condition()
         self._ended = False
         self._told_unknown: set[str] = set()
+        publisher()
         self._caller = TransitionCaller(skillset)
         self._worker = threading.Thread(target=self._work, name=f"report_{skillset}", daemon=True)
         self._worker.start()
