@@ -109,7 +109,7 @@ def alula(rover: Path, *words: str) -> subprocess.CompletedProcess[str]:
 @pytest.mark.flight
 @pytest.mark.timeout(0)  # builds a robot's packages: as long as the machine needs
 def test_carried_into_a_room_that_is_shut_and_its_navigation_killed_it_delivers_its_parcel(ready: Path, tmp_path: Path) -> None:
-    faults = ["--fail", "pose:lost@14", "--fail", "navigation:killed@35-36"]
+    faults = ["--fail", "pose:lost@14", "--fail", "navigation:killed@20-21"]
     done = alula(ready, "run", "deliver", "--world", "one", "--rate", "0", *faults, "--out", str(tmp_path / "run"))
     assert done.returncode == 0, done.stdout[-4000:] + done.stderr[-2000:]
     assert "parcels: 1 of 1 done" in done.stdout
@@ -122,8 +122,11 @@ def test_carried_into_a_room_that_is_shut_and_its_navigation_killed_it_delivers_
     order = [one for one in answer if one[0] in {"stop_here", "localise", "open_door", "load", "unload", "dock"}]
     assert order[:7] == [("stop_here", "STANDING"), ("localise", "FOUND"), *[("open_door", "OPEN")] * 5]
     assert [one for one in order[7:] if one[0] != "open_door"] == [("load", "LOADED"), ("unload", "UNLOADED"), ("dock", "DOCKED")]
-    assert {one[1] for one in answer if one[0] == "drive_to"} & {"BLOCKED", "ABORTED"}  # of the navigation's death
     assert (tmp_path / "run/report.html").is_file()
+    for depth in ("skills", "functional"):
+        again = alula(ready, "replay", str(tmp_path / "run"), "--from", depth)
+        assert again.returncode == 0, again.stdout[-2000:] + again.stderr
+        assert "decisions, all as they were" in again.stderr
 
 
 @pytest.mark.timeout(0)
