@@ -53,6 +53,30 @@ def test_the_laser_dies_and_it_reports_where_it_waits(rover: Path, tmp_path: Pat
     assert (tmp_path / "run/report.html").is_file()
 
 
+def test_a_run_is_decided_again_and_held_against_what_is_expected_of_it(rover: Path, tmp_path: Path) -> None:
+    folder = tmp_path / "run"
+    assert run(rover, "alula.commands.run", "deliver", "--mock", "--fail", "pose@20-25", "--out", str(folder)).returncode == 0
+    again = run(rover, "alula.commands.replay", str(folder))
+    assert again.returncode == 0, again.stdout + again.stderr
+    assert "decisions, all as they were" in again.stderr
+    assert "decisions differ at" in run(rover, "alula.commands.replay", str(folder), "--fail", "laser@40").stderr
+    (tmp_path / "expected.yaml").write_text(run(rover, "alula.commands.expect", str(folder)).stdout, encoding="utf-8")
+    held = run(rover, "alula.commands.expect", str(folder), "--check", str(tmp_path / "expected.yaml"))
+    assert held.returncode == 0, held.stdout + held.stderr
+    assert run(rover, "alula.commands.run", "deliver", "--mock", "--out", str(tmp_path / "other")).returncode == 0
+    assert run(rover, "alula.commands.expect", str(tmp_path / "other"), "--check", str(tmp_path / "expected.yaml")).returncode == 1
+
+
+def test_a_campaign_finds_no_trouble_in_runs_that_end_where_it_may_be_left(rover: Path, tmp_path: Path) -> None:
+    faults = "[[pose@20], [laser@30], [bumper@10, laser@20], [battery@30]]"
+    (tmp_path / "campaign.yaml").write_text(f"scenarios: [deliver]\nseeds: [0]\nfaults: {faults}\n", encoding="utf-8")
+    done = run(rover, "alula.campaign", str(tmp_path / "campaign.yaml"), "--out", str(tmp_path / "out"))
+    assert done.returncode == 0, done.stdout + done.stderr
+    rows = [json.loads(line) for line in (tmp_path / "out/runs.jsonl").read_text(encoding="utf-8").splitlines()]
+    ends = [(row["outcome"], row["landed"]) for row in sorted(rows, key=lambda row: row["run"])]
+    assert ends == [("given_up", None), ("degraded", None), ("given_up", None), ("degraded", True)]
+
+
 def test_no_line_of_the_framework_names_it() -> None:
     places = ["lib/alula", "bridge", "flight", "setup", "ros1_ws/src/skillset_ros1", "ros2_ws/src/skillset_ros2"]
     pattern = r"examples/rover|rover_(robot|navigation|simulator|bringup)|move_base"
@@ -85,7 +109,7 @@ def alula(rover: Path, *words: str) -> subprocess.CompletedProcess[str]:
 @pytest.mark.flight
 @pytest.mark.timeout(0)  # builds a robot's packages: as long as the machine needs
 def test_carried_into_a_room_that_is_shut_and_its_navigation_killed_it_delivers_its_parcel(ready: Path, tmp_path: Path) -> None:
-    faults = ["--fail", "pose:lost@14", "--fail", "navigation:killed@35-36"]
+    faults = ["--fail", "pose:lost@14", "--fail", "navigation:killed@20-21"]
     done = alula(ready, "run", "deliver", "--world", "one", "--rate", "0", *faults, "--out", str(tmp_path / "run"))
     assert done.returncode == 0, done.stdout[-4000:] + done.stderr[-2000:]
     assert "parcels: 1 of 1 done" in done.stdout
@@ -98,8 +122,11 @@ def test_carried_into_a_room_that_is_shut_and_its_navigation_killed_it_delivers_
     order = [one for one in answer if one[0] in {"stop_here", "localise", "open_door", "load", "unload", "dock"}]
     assert order[:7] == [("stop_here", "STANDING"), ("localise", "FOUND"), *[("open_door", "OPEN")] * 5]
     assert [one for one in order[7:] if one[0] != "open_door"] == [("load", "LOADED"), ("unload", "UNLOADED"), ("dock", "DOCKED")]
-    assert {one[1] for one in answer if one[0] == "drive_to"} & {"BLOCKED", "ABORTED"}  # of the navigation's death
     assert (tmp_path / "run/report.html").is_file()
+    for depth in ("skills", "functional"):
+        again = alula(ready, "replay", str(tmp_path / "run"), "--from", depth)
+        assert again.returncode == 0, again.stdout[-2000:] + again.stderr
+        assert "decisions, all as they were" in again.stderr
 
 
 @pytest.mark.timeout(0)

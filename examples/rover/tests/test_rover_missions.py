@@ -114,6 +114,14 @@ def test_a_room_that_can_not_be_reached_costs_its_parcels_only(monkeypatch, tmp_
     assert ended.count(("unload", "UNLOADED")) == 2  # one of them back at its sender
 
 
+def test_who_stands_in_the_way_home_is_asked_to_let_it_past(monkeypatch, tmp_path):
+    blocked = "memory: {tries: 0}\nskills: {base.dock: [{when: tries < 1, delay: 15, result: BLOCKED, moves: {tries: tries + 1}}]}"
+    _, end, ended, _ = drive(monkeypatch, "patrol", behaviour=blocked, tmp_path=tmp_path)
+    assert end.outcome is Outcome.ACCOMPLISHED
+    home = [one for one in ended if one[0] in {"dock", "ask"}]
+    assert home == [("dock", "BLOCKED"), ("ask", "ANSWERED"), ("dock", "DOCKED")]
+
+
 @pytest.mark.parametrize("fault", ["person@5", "navigation@5", "bridge@2"])
 def test_what_passes_is_waited_for(fault, monkeypatch):
     _, end, _, facts = drive(monkeypatch, "deliver", fault)

@@ -57,21 +57,22 @@ def _mocked(planned: PlannedRun, behaviour: tuple[str, ...]) -> Row:
 
 
 def _landed(events: Sequence[EngineEvent]) -> bool | None:
-    """Tell whether the robot came back to its state of departure; None where it never left it, or others have to bring it back.
+    """Tell whether the robot came back to its state of departure; None where it never left it, or need not be brought back by the mission.
 
-    It is theirs when it was taken from the mission while it was away.
+    Others have to when it was taken from the mission while it was away; nobody has to when it rests where it may be left.
     """
     robot = find_robot()
     resource, home = robot.departure or ("", "")
-    state, taken = "", False
+    states: dict[str, str] = {}
+    taken = False
     for event in events:
         if isinstance(event, TransitionEvent):
-            if event.resource == resource:
-                state = event.to_state
-            taken = taken or (state not in {"", home} and (event.resource, event.to_state) == robot.taken)
-    if not state:
+            states[event.resource] = event.to_state
+            taken = taken or (states.get(resource, home) != home and (event.resource, event.to_state) == robot.taken)
+    if resource not in states:
         return None
-    return state == home or (None if taken else False)
+    rests = robot.rest is not None and states.get(robot.rest[0]) == robot.rest[1]
+    return states[resource] == home or (None if taken or rests else False)
 
 
 @dataclass(frozen=True)
@@ -165,6 +166,8 @@ def _simulated(planned: PlannedRun, options: Sequence[str], out: Path) -> Row:
     names = dict.fromkeys(event.skillset for event in run.events)
     ended = {one["id"] for one in summary.get("skills") or () if one.get("end_s") is not None}
     found = {name: summary.get(name) for name in ("outcome", "reason", "landed", "collisions", "min_clearance_m")}
+    if found["landed"] is False and _landed(run.events) is None:
+        found["landed"] = None
     found |= {"open": [one["id"] for one in summary.get("skills") or () if one["id"] not in ended]}
     found |= {"problems": summary.get("problems") or [], "died": summary.get("died") or [], "exit_code": done.returncode}
     models = models_of(names)

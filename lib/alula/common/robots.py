@@ -28,7 +28,7 @@ BEHAVIOUR, FAULTS = "mock.yaml", "faults.yaml"
 PARTS = ("inputs", "missions", "hooks", "report", "run", "depths", "areas")
 """What a robot may add to the general commands, as ``module`` or ``module:name``; ``docs/robots.md`` says what each has to be."""
 WORLD_KEYS = ("packages", "python", "debian", "underlays")
-KEYS = ("name", "about", "robots", "skillsets", "scenarios", "worlds", "departure", "taken", "page", "python", "parts", "ros1", "ros2")
+KEYS = ("name", "about", "robots", "skillsets", "scenarios", "worlds", "departure", "taken", "rest", "page", "python", "parts", "ros1", "ros2")
 _NAME = re.compile(r"[a-z][a-z0-9_]*")
 
 
@@ -63,6 +63,7 @@ class RobotFolder:
         scenarios: the folder of its scenarios; ``worlds`` that of the files which scenarios name as their ``world``.
         departure: resource and state; times of a run count from when this state is left first, and a run that ends in it has come back.
         taken: resource and state; a robot that enters this state while it is away is not the mission's to bring back.
+        rest: resource and state; a robot in this state may be left where it is: nobody has to bring it back.
         page: words and facts of its reports and of the operator's page, see `read_page`.
         python: folders of plain Python packages, which missions and the parts import.
         parts: what it adds to the general commands.
@@ -77,6 +78,7 @@ class RobotFolder:
     about: str = ""
     departure: tuple[str, str] | None = None
     taken: tuple[str, str] | None = None
+    rest: tuple[str, str] | None = None
     page: Mapping[str, Any] = field(default_factory=lambda: dict(USUAL_PAGE))
     python: tuple[Path, ...] = ()
     parts: Mapping[str, str] = field(default_factory=dict)
@@ -200,6 +202,7 @@ def _load(root: Path, _written_ns: int) -> RobotFolder:
         worlds=folder("worlds", "worlds"),
         departure=_state(said, "departure"),
         taken=_state(said, "taken"),
+        rest=_state(said, "rest"),
         page=read_page(said.get("page")),
         python=tuple(root / one for one in _texts(said.get("python"), "`python`")),
         parts=_parts(said.get("parts")),

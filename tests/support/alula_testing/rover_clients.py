@@ -35,6 +35,8 @@ def skills() -> dict[str, Any]:
     import rclpy
     from base_interfaces.action import DriveTo, Localise
     from rclpy.action import ActionClient  # noqa: TID251 - a stock client, as others have it
+    from rclpy.qos import DurabilityPolicy, QoSProfile
+    from skillset_interfaces.msg import ResourceStates
 
     rclpy.init()
     node = rclpy.create_node("stock_client")
@@ -47,6 +49,13 @@ def skills() -> dict[str, Any]:
         client = ActionClient(node, kind, f"/base/skill/{name}")
         assert client.wait_for_server(timeout_sec=WAIT_S)
         return awaited(client.send_goal_async(goal, feedback_callback=heard.append))
+
+    known: list[bool] = []  # whether it knows where it is
+    latched = QoSProfile(depth=1, durability=DurabilityPolicy.TRANSIENT_LOCAL)
+    look = lambda told: known.append(any((one.name, one.state) == ("pose_status", "GOOD") for one in told.resources))  # noqa: E731
+    node.create_subscription(ResourceStates, "/base/resource_states", look, latched)
+    while not known or not known[-1]:
+        rclpy.spin_once(node, timeout_sec=0.1)
 
     heard: list[Any] = []
     goal = DriveTo.Goal()

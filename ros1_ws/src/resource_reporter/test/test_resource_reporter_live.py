@@ -15,6 +15,7 @@ from skillset_interfaces.srv import Transition, TransitionRequest, TransitionRes
 
 from alula_testing.ros1 import wait_until  # noqa: E402
 from resource_reporter import ResourceReporter  # noqa: E402
+from resource_reporter.calls import publisher  # noqa: E402
 
 SKILLSET = "reported"
 ARROWS = {("UNKNOWN", "OK"), ("UNKNOWN", "BROKEN"), ("OK", "BROKEN"), ("BROKEN", "OK")}
@@ -99,6 +100,13 @@ def test_reports_within_milliseconds_once_connected(skillset, reporter):
     # A quarter of them: on a busy machine the others tell how long a thread waits for its turn.
     assert sorted(latencies)[5] < 0.005
     assert len(skillset.calls) == 21
+
+
+def test_its_calls_are_advertised_before_the_first(ros_master):
+    publisher.cache_clear()
+    reporter = ResourceReporter(SKILLSET)
+    assert publisher.cache_info().currsize == 1  # a recorder needs a moment to connect, and would miss the first
+    reporter.close()
 
 
 def test_a_service_that_appears_late_and_a_skillset_that_restarts_are_told(skillset, reporter):

@@ -15,6 +15,11 @@ class ActionClient(RclpyActionClient):  # type: ignore[misc]  # rclpy ships no t
     ("Ignoring unexpected goal response"), and its future never ends. Here responses wait until their request is noted.
     """
 
+    def __new__(cls, node: Any, kind: type, name: str, **_: Any) -> Any:
+        """Return a client; the node of a replay makes one that the record answers."""
+        recorded = getattr(node, "create_action_client", None)
+        return super().__new__(cls) if recorded is None else recorded(kind, name)
+
     def __init__(self, *arguments: Any, **options: Any) -> None:
         self._noting = threading.RLock()
         super().__init__(*arguments, **options)

@@ -34,7 +34,7 @@ def plain(value: Any) -> Any:
 def tell_call(service: str, request: Any, response: Any, begin_s: float, error: str = "") -> None:
     """Publish a call that was answered, or failed; any thread."""
     call = {"service": service, "request": plain(request), "response": plain(response), "error": error}
-    _publisher().publish(String(data=json.dumps({**call, "begin_s": begin_s, "end_s": rospy.get_time()})))
+    publisher().publish(String(data=json.dumps({**call, "begin_s": begin_s, "end_s": rospy.get_time()})))
 
 
 class ToldService:
@@ -42,7 +42,7 @@ class ToldService:
 
     def __init__(self, name: str, kind: Any, handler: Callable[[Any], Any]) -> None:
         self._handler = handler
-        _publisher()  # before the first call: subscribers need a moment to connect
+        publisher()
         self._service = rospy.Service(name, kind, self._serve)
 
     def _serve(self, request: Any) -> Any:
@@ -57,5 +57,6 @@ class ToldService:
 
 
 @functools.cache
-def _publisher() -> rospy.Publisher:
+def publisher() -> rospy.Publisher:
+    """Return the process's own; to be made before its first call: subscribers need a moment to connect."""
     return rospy.Publisher(TOPIC, String, queue_size=DEPTH)

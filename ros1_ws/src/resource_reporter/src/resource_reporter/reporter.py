@@ -11,7 +11,7 @@ from skillset_interfaces.msg import ResourceStates
 from skillset_interfaces.srv import TransitionRequest
 
 from resource_reporter.caller import CallFailedError, TransitionCaller
-from resource_reporter.calls import tell_call
+from resource_reporter.calls import publisher, tell_call
 from resource_reporter.ledger import Call, Ledger
 
 # A latched topic may have been missed only while its publisher was away: nothing has to be polled. This bounds one wait.
@@ -35,6 +35,7 @@ class ResourceReporter:
         self._when_settled: list[Callable[[], None]] = []
         self._unsettled_since_s: float | None = None
         self._told_unknown: set[str] = set()
+        publisher()
         self._caller = TransitionCaller(skillset)
         self._worker = threading.Thread(target=self._work, name=f"report_{skillset}", daemon=True)
         self._worker.start()

@@ -30,7 +30,8 @@ from alula.runtime.local import LocalManagers
 from alula.runtime.mock import NEVER, Behaviour, Choice, MockSkill, follow
 from alula.runtime.plain import to_plain
 from skillset_ros2.convert import fill, values_of
-from skillset_ros2.replay.bag import CALLS, MESSAGE, Call, begin_of, entries_of, read_calls
+from skillset_ros2.replay.actions import RecordedActionClient
+from skillset_ros2.replay.bag import CALLS, MESSAGE, Call, begin_of, entries_of, read_bag, read_calls
 from skillset_ros2.replay.node import BagNode, RecordedFuture, Subscribers
 
 
@@ -158,6 +159,7 @@ class RecordedFunctions(ReplayedRobot):
                 f"{self._robot.root / FILE}: names no hooks; add `parts: {{hooks: PACKAGE}}` to replay from the functional layer"
             )
         self._subscribers: Subscribers = {}
+        self._bag = bag
         self._silent = False
         """What the bag tells is not, or no more, what happens: the real hooks look at it no longer."""
         self._diverged = False
@@ -180,7 +182,7 @@ class RecordedFunctions(ReplayedRobot):
 
     def _serve(self, skillset: Skillset) -> None:
         name = skillset.name
-        node = BagNode(self.world.clock, self._called, self._subscribers, lambda: self._silent)
+        node = BagNode(self.world.clock, self._called, self._subscribers, lambda: self._silent, self._action)
         real = self._robot.load(f"{self._hooks}.{name}").make_hooks(node)
         actions = importlib.import_module(f"{name}_interfaces.action")
         mocks = self.robot.hooks_of(skillset, ShadowSkill)
@@ -208,6 +210,10 @@ class RecordedFunctions(ReplayedRobot):
         """Tell whether the next call of a skill was made then, too."""
         waiting = self._recorded_next.get(name)
         return bool(waiting) and waiting.popleft() if waiting is not None else False
+
+    def _action(self, name: str) -> RecordedActionClient:
+        goals = [entry.value[MESSAGE] for entry in read_bag(self._bag, [f"{name}/goal"])]
+        return RecordedActionClient(name, goals, self._subscribers, lambda told: None if self._diverged else self.differs(told))
 
     def _called(self, service: str, request: Mapping[str, Any]) -> RecordedFuture:
         """Answer a call as it was answered then, not earlier; what was not called then is a difference."""

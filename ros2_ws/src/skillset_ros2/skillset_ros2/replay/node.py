@@ -70,13 +70,17 @@ class BagNode:
         answer: what answers calls of services.
         subscribers: the callbacks by topic, to which this node's are added.
         is_silent: whether the functional layer says nothing more, so that timers end.
+        action: makes the client of an action's server.
     """
 
-    def __init__(self, clock: VirtualClock, answer: Answer, subscribers: Subscribers, is_silent: Callable[[], bool]) -> None:
+    def __init__(
+        self, clock: VirtualClock, answer: Answer, subscribers: Subscribers, is_silent: Callable[[], bool], action: Callable[[str], Any]
+    ) -> None:
         self._clock = clock
         self._answer = answer
         self._subscribers = subscribers
         self._is_silent = is_silent
+        self._action = action
 
     def get_clock(self) -> BagNode:
         """Return what tells the time."""
@@ -99,6 +103,14 @@ class BagNode:
     def create_client(self, _kind: object, name: str, **_: object) -> RecordedService:
         """Return a client that the record answers."""
         return RecordedService(absolute(name), self._answer)
+
+    def create_action_client(self, _kind: object, name: str) -> Any:
+        """Return a client that the record answers."""
+        return self._action(name)
+
+    def create_publisher(self, _kind: object, _topic: str, _depth: object, **_: object) -> SimpleNamespace:
+        """Return what says something to nobody: what came of it then, the record tells."""
+        return SimpleNamespace(publish=lambda _message: None)
 
     def create_subscription(self, _kind: object, topic: str, callback: Callable[[Any], None], *_: object, **__: object) -> None:
         """Have the callback called with each recorded message of a topic."""
