@@ -20,6 +20,7 @@ pytest.importorskip("navigation_interfaces.action")
 from console_serving import WAIT_S, Bench, answer_to, heard, serve
 
 from alula.common import run_log
+from alula.common.runs import Run
 from alula.console import commands, manual_control
 from alula.console.acts import ActError
 from alula.console.manual_control import ManualControl
@@ -166,7 +167,7 @@ def test_progress_is_shown_of_an_execution_that_another_client_started(manual: M
     def takeoff() -> dict[str, Any]:
         return skill_of({"manual": manual.describe()}, "takeoff")
 
-    mission = ManualControl(RosLink().listen(skillset))
+    mission = ManualControl(RosLink().listen(Run(Path(), skillset)))
     try:
         assert wait_for(lambda: bool(mission.describe()["skillsets"]), WAIT_S)
         for resource, to in (("SDK_authority", "AVAILABLE"), ("homepoint_status", "VALID")):
@@ -183,7 +184,7 @@ def test_progress_is_shown_of_an_execution_that_another_client_started(manual: M
 
 @pytest.fixture(scope="module")
 def manual(skillset: int) -> Iterator[ManualControl]:
-    made = ManualControl(RosLink().listen(skillset))
+    made = ManualControl(RosLink().listen(Run(Path(), skillset)))
     assert wait_for(lambda: bool(made.describe()["skillsets"]), WAIT_S)
     yield made
     made.close()
