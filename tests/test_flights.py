@@ -14,6 +14,8 @@ import pytest
 import ruamel.yaml
 from rosbags.highlevel import AnyReader
 
+from alula.common import run_log
+from alula.common.record import read_record
 from alula.model.execution_state import ExecutionState
 from alula_testing.flights import ALULA_ROOT, Flight, start_flight, story
 
@@ -104,7 +106,7 @@ def first_stamps_s(bag: Path, topics: Iterable[str]) -> dict[str, float]:
 def test_how_long_nodes_take_to_start_changes_no_flight(pair: tuple[Flight, Flight]) -> None:
     for flight in pair:
         guided_s = guided_since_s(flight.out / "functional.bag")
-        begun_s = json.loads((flight.out / "mission.json").read_text(encoding="utf-8"))["start_s"]
+        begun_s = run_log.account(flight.out, read_record(flight.out))["start_s"]
         assert guided_s < MAX_START_S
         assert begun_s - guided_s < MAX_CHECKS_S
 

@@ -71,7 +71,7 @@ def test_the_scenario_of_the_page_flies_over_mocks(checkout: Path, tmp_path: Pat
     summary = json.loads((out / "summary.json").read_text())
     assert (summary["scenario"], summary["outcome"], summary["landed"], summary["problems"]) == ("patrol", "accomplished", True, [])
     flights = [one["result"] for one in summary["skills"] if one["skill"] == "goto"]
-    assert flights == ["ARRIVED"] * len(json.loads((out / "mission.json").read_text())["inputs"]["route"])
+    assert flights == ["ARRIVED"] * len(summary["mission"]["inputs"]["route"])
     assert {one["skillset"] for one in summary["skills"]} == {"navigation"}
 
 

@@ -25,7 +25,8 @@ from alula.common.files import strict
 FILE = "skills.mcap"
 
 MISSION = "/mission"
-"""What was asked for and how it ended: the values of ``mission.json``, once at the start, once at the end."""
+"""What was asked for and how it ended: ``{scenario, outcome, reason, start_s, lift_off_s, end_s, parameters, inputs, problems}`` and what
+the plan tells; once at the start, once at the end."""
 EVENTS = "/events"
 """Each event of each skillset, as ``alula.runtime.core.events`` writes it down."""
 DECISIONS = "/decisions"

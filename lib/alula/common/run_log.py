@@ -12,12 +12,14 @@ from collections.abc import Iterable, Mapping, Sequence
 from pathlib import Path
 from typing import Any
 
+from alula.common import record
 from alula.common.faults import FaultChange
+from alula.common.record import Entry
 
 FILE = "run_log.jsonl"
-DEATH, FAULT, WAIT, ACT, END, MOCKED = "death", "fault", "wait", "act", "end", "mocked"
-"""The kinds of lines: see ``alula.report.deaths``, ``alula.common.faults.FaultChange``, ``read_waits``, ``note_act``, ``alula.report.ends``
-and ``note_mocked``."""
+DEATH, FAULT, WAIT, ACT, END, MOCKED, MISSION = "death", "fault", "wait", "act", "end", "mocked", "mission"
+"""The kinds of lines: see ``alula.report.deaths``, ``alula.common.faults.FaultChange``, ``read_waits``, ``note_act``,
+``alula.report.ends``, ``note_mocked`` and ``account``."""
 
 
 def note(out: Path, kind: str, content: Mapping[str, object]) -> None:
@@ -61,3 +63,12 @@ def note_mocked(out: Path, simulated_s: float, wall_s: float, faults: Iterable[F
     for change in faults:
         note(out, FAULT, vars(change))
     note(out, MOCKED, {"simulated_s": simulated_s, "wall_s": wall_s, "factor": simulated_s / wall_s if wall_s else None, "notes": [*notes]})
+
+
+def account(out: Path, entries: Iterable[Entry]) -> Mapping[str, Any]:
+    """Return what is said last of what the mission was to do and how it ended, of a run with this record; empty where nothing is.
+
+    It is in the record; a mission whose record ended early, on a full disk say, notes it here.
+    """
+    told = [*(entry.value for entry in entries if entry.topic == record.MISSION), *read(out, MISSION)]
+    return told[-1] if told else {}

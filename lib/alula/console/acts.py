@@ -140,7 +140,7 @@ def start(wanted: WantedRun) -> Path:
     with said.open("wb") as log:
         process = subprocess.Popen(wanted.words(out), stdin=subprocess.DEVNULL, stdout=log, stderr=log, start_new_session=True)
     end = time.monotonic() + START_S
-    while not (out / "run.json").exists() and not (out / "mission.json").exists() and time.monotonic() < end:
+    while not (out / "run.json").exists() and time.monotonic() < end:
         if process.poll() is not None:
             words = said.read_text(encoding="utf-8", errors="replace").strip().splitlines()
             raise ActError(words[-1] if words else f"alula run ended with {process.returncode}")

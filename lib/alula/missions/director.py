@@ -21,7 +21,7 @@ START_TIMEOUT_S = 90.0
 
 
 class Outcome(Enum):
-    """How a mission can be, in ``mission.json``."""
+    """How a mission can be, in a mission's account."""
 
     RUNNING = "running"
     ACCOMPLISHED = "accomplished"

@@ -34,7 +34,7 @@ class MissionPlan:
         make: makes the tree, a new one for each run: a plan may be run many times.
         parameters: numbers that may be set from outside, with their defaults; on ROS 2 they are parameters of the node.
         inputs: what it was made of.
-        facts: what ``mission.json`` says beyond the outcome, asked at the beginning and at the end.
+        facts: what the mission's account says beyond the outcome, asked at the beginning and at the end.
         places: of a fleet's, by skillset, the namespace of its robot and what it is called there, as ("/rover", "base").
     """
 

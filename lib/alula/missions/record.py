@@ -5,7 +5,8 @@ from __future__ import annotations
 from collections.abc import Mapping
 from pathlib import Path
 
-from alula.common.files import write_json, write_text
+from alula.common import run_log
+from alula.common.files import write_text
 from alula.common.record import BLACKBOARD, DATA, DECISIONS, EVENTS, FILE, MISSION, OPERATOR, REPORTS, TICKS, TREE, RecordWriter
 from alula.common.robots import RobotError, find_robot
 from alula.missions.director import Director, End, Outcome
@@ -23,7 +24,7 @@ TREE_LOG, STOP_LOG = "mission.btlog", "stop_here.btlog"
 
 
 class MissionRecord:
-    """Writes ``skills.mcap`` and ``mission.btlog`` on the way, ``mission.json`` at once and at the end, ``tree.svg`` at the end.
+    """Writes ``skills.mcap`` and ``mission.btlog`` on the way, ``tree.svg`` at the end.
 
     A folder that can't be written to any more ends the record and not the mission; ``problems`` says so.
     """
@@ -152,10 +153,8 @@ class MissionRecord:
             **self._plan.facts(),
         }
         self._write(MISSION, content)
-        try:
-            write_json(self._out / "mission.json", content)
-        except OSError as error:
-            self.problems.append(f"mission.json could not be written: {error.strerror or error}")
+        if self._writer.error:
+            run_log.note(self._out, run_log.MISSION, {**content, "problems": list(dict.fromkeys([*self.problems, self._writer.error]))})
 
 
 def _departure() -> tuple[str, str] | None:

@@ -2,14 +2,14 @@
 
 from __future__ import annotations
 
-import json
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any
 
-from alula.common.record import FILE, MISSION, RecordError, read_record
+from alula.common.record import FILE, RecordError, read_record
 from alula.common.robots import RobotError, find_robot
+from alula.common.run_log import account
 from alula.records.errors import AnalysisError
 from alula.records.logs import read_log
 from alula.runtime.core.events import EngineEvent, TransitionEvent
@@ -25,7 +25,7 @@ def departure() -> tuple[str, str] | None:
 
 @dataclass(frozen=True)
 class RecordedRun:
-    """A run's events in their order; ``mission`` is what ``mission.json`` says, empty where that is not known."""
+    """A run's events in their order; ``mission`` is the mission's account, empty where that is not known."""
 
     path: Path
     events: Sequence[EngineEvent]
@@ -73,12 +73,8 @@ def load_recorded_run(path: Path) -> RecordedRun:
 
 def _mission(path: Path) -> Mapping[str, Any]:
     folder = path if path.is_dir() else path.parent
+    record = path if path.suffix == ".mcap" else folder / FILE
     try:
-        if (folder / "mission.json").is_file():
-            content = json.loads((folder / "mission.json").read_text(encoding="utf-8"))
-            return content if isinstance(content, dict) else {}
-        record = path if path.is_file() else path / FILE
-        told = [entry.value for entry in read_record(record) if entry.topic == MISSION] if record.suffix == ".mcap" else []
+        return account(folder, read_record(record) if record.is_file() else [])
     except (OSError, ValueError, RecursionError, RecordError) as error:
         raise AnalysisError(f"{folder}: its mission can't be read: {error}") from None
-    return told[-1] if told else {}

@@ -1,6 +1,6 @@
 """``python3 -m alula.report FOLDER --scenario NAME``: the report of a run that no supervisor has watched.
 
-The folder holds what a flight leaves whose worlds ran apart; with ``--of RUN`` what a replay leaves: ``skills.mcap``, ``mission.json``,
+The folder holds what a flight leaves whose worlds ran apart; with ``--of RUN`` what a replay leaves: ``skills.mcap`` and
 ``run_log.jsonl``. The verdict is on stdout. Ends with 0; what can't be made is named in the summary's ``problems``.
 """
 

@@ -6,11 +6,13 @@ since lift-off only when they are shown: here they are absolute seconds of missi
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Iterator, Sequence
-from dataclasses import dataclass, field
+from collections.abc import Iterable, Iterator, Mapping, Sequence
+from dataclasses import dataclass, field, replace
 from pathlib import Path
+from typing import Any
 
 from alula.common.record import EVENTS, Entry, RecordFollower
+from alula.common.run_log import account
 from alula.records.causes.told_ends import with_told_ends
 from alula.records.tree import Places, places_in
 from alula.report.files import Problems
@@ -29,6 +31,8 @@ class History:
     """Where in the tree each execution was started."""
     first_s: float | None = None
     last_s: float | None = None
+    mission: Mapping[str, Any] = field(default_factory=dict)
+    """What the mission was to do and how it ended; empty where that is not known."""
 
     def of_skill(self, skill: str) -> list[ExecutionRecord]:
         """Return the executions of a skill, whatever skillset it belongs to."""
@@ -43,7 +47,7 @@ def read_history(path: Path, problems: Problems) -> History:
     """
     if not path.exists():
         problems.note(f"{path.name} is missing: nothing is known of skills and resources")
-        return History()
+        return History(mission=account(path.parent, []))
     record = RecordFollower(path)
     entries = record.poll()
     events = read_events(path, entries, problems)
@@ -51,7 +55,7 @@ def read_history(path: Path, problems: Problems) -> History:
         problems.note(f"{path.name} was cut off{f': {record.broken}' if record.broken else ''}")
     for sentence in gaps(events):
         problems.note(f"{path.name}: {sentence}")
-    return fold(with_told_ends(events, entries), problems, places_in(entries))
+    return replace(fold(with_told_ends(events, entries), problems, places_in(entries)), mission=account(path.parent, entries))
 
 
 def read_events(path: Path, entries: Iterable[Entry], problems: Problems) -> list[EngineEvent]:

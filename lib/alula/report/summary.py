@@ -51,18 +51,19 @@ Summary = dict[str, Any]
 """The whole file: what every run has (``summarise``), and what the robot's part of the report adds."""
 
 
-def read_outcome(facts: RunFacts, problems: Problems) -> tuple[str | None, str | None]:
-    """Return the mission's outcome and its reason as ``mission.json`` gives them."""
-    outcome: str | None = None
-    reason: str | None = None
-    with problems.survive("mission.json"):
-        values = mapping(read_json(facts.out_dir / "mission.json"))
-        outcome, reason = (str(values[name]) if values.get(name) is not None else None for name in ("outcome", "reason"))
-        for problem in sequence(values.get("problems")):
-            problems.note(str(problem))
-        if outcome not in OUTCOMES:
-            problems.note(f"mission.json names no outcome that is known: {outcome}")
-            outcome = None
+TOLD_ABOVE = ("scenario", "outcome", "reason", "problems", "start_s", "lift_off_s", "end_s")
+"""What of the mission's account has a place of its own in the summary, and its stamps, which don't count from the departure."""
+
+
+def read_outcome(facts: RunFacts, history: History, problems: Problems) -> tuple[str | None, str | None]:
+    """Return the mission's outcome and its reason as its own account gives them."""
+    values = history.mission
+    outcome, reason = (str(values[name]) if values.get(name) is not None else None for name in ("outcome", "reason"))
+    for problem in sequence(values.get("problems")):
+        problems.note(str(problem))
+    if outcome not in OUTCOMES:
+        problems.note(f"the mission's account is missing: no outcome{f' that is known: {outcome}' if outcome else ''}")
+        outcome = None
     if outcome == "running":
         problems.note(
             "the replay stopped before the mission's end" if facts.replay_of else "the mission's process ended before the mission did"
@@ -134,13 +135,14 @@ def summarise(
     mock: MockSummary | None = None,
 ) -> Summary:
     """Return ``summary.json`` of a run; what could not be read becomes a sentence among the problems."""
-    outcome, reason = read_outcome(facts, problems)
+    outcome, reason = read_outcome(facts, history, problems)
     bridge = read_bridge(facts, problems)
     note_doubts(facts, observed, phases, problems)
     return {
         "scenario": facts.scenario,
         "outcome": outcome,
         "reason": reason,
+        "mission": {name: value for name, value in history.mission.items() if name not in TOLD_ABOVE} or None,
         "landed": came_back(history, observed, phases) if findings.landed is None else findings.landed,
         "seed": facts.seed,
         "duration_s": duration_s(history, observed, phases),

@@ -12,7 +12,8 @@ from pathlib import Path
 import pytest
 
 from alula.commands import run
-from alula.common.record import FILE
+from alula.common import run_log
+from alula.common.record import FILE, read_record
 from alula.report.ends import OPERATOR, ReportedEnd, read_end
 
 
@@ -67,4 +68,4 @@ def test_ctrl_c_is_the_operators(tmp_path: Path) -> None:
     assert done.returncode == 1, done.stderr
     assert read_end(out) == ReportedEnd(OPERATOR, "Ctrl-C")
     assert "mission aborted by the operator: Ctrl-C" in done.stdout
-    assert json.loads((out / "mission.json").read_text())["reason"] == f"told to end by {signal.SIGINT.name}"
+    assert run_log.account(out, read_record(out))["reason"] == f"told to end by {signal.SIGINT.name}"

@@ -2,13 +2,14 @@
 
 from __future__ import annotations
 
-import json
 from pathlib import Path
 
 import pytest
 
 pytest.importorskip("py_trees")
 
+from alula.common import run_log
+from alula.common.record import read_record
 from alula.language.models import ModelFile, check_texts
 from alula.missions.director import Outcome
 from alula.missions.filed.part import NO_PART
@@ -43,7 +44,7 @@ class Flown:
         if abort:
             self.mission.world.clock.after(ABORT_S, lambda: self.mission.abort("told to end"))
         self.end = self.mission.run()
-        self.written = json.loads((folder / "run/mission.json").read_text(encoding="utf-8"))
+        self.written = run_log.account(folder / "run", read_record(folder / "run"))
 
     @property
     def entries(self) -> dict[str, object]:

@@ -16,6 +16,7 @@ pytest.importorskip("py_trees")
 
 from alula.campaign.mocked_scenarios import load_mocked_scenario
 from alula.commands import run
+from alula.common import run_log
 from alula.common.record import TREE, read_record
 from alula.common.scenarios import scenarios_folder
 from alula.missions.director import Outcome
@@ -125,7 +126,7 @@ def test_after_an_abort_viewers_and_a_log_have_what_stops_the_robot(tmp_path: Pa
 def test_a_log_that_can_not_be_written_is_a_problem_of_the_record_and_no_end(tmp_path: Path) -> None:
     (tmp_path / TREE_LOG).mkdir()
     assert mission("mapping", tmp_path).run().outcome is Outcome.ACCOMPLISHED
-    assert f"{TREE_LOG} could not be written: Is a directory" in (tmp_path / "mission.json").read_text(encoding="utf-8")
+    assert run_log.account(tmp_path, read_record(tmp_path))["problems"] == [f"{TREE_LOG} could not be written: Is a directory"]
 
 
 def test_btview_is_attached_to_a_mission_that_runs() -> None:

@@ -10,6 +10,7 @@ import pytest
 
 from alula.campaign.mocked_scenarios import load_mocked_scenario
 from alula.commands.compare import main
+from alula.common import run_log
 from alula.common.faults import parse_fault
 from alula.records.comparing.telling import spread
 from alula.runtime.core.events import event_record
@@ -24,7 +25,7 @@ def folders(tmp_path_factory):
         folder.mkdir()
         lines = "".join(json.dumps(event_record(event)) + "\n" for event in flown.events)
         (folder / "events.jsonl").write_text(lines, encoding="utf-8")
-        (folder / "mission.json").write_text(json.dumps({"outcome": flown.end.outcome.value}), encoding="utf-8")
+        run_log.note(folder, run_log.MISSION, {"outcome": flown.end.outcome.value})
     summary = {"duration_s": 100.0, "recovery": {"failure_s": 30.0, "detected_s": 30.5}, "map": {"coverage": 0.9}, "video": None}
     (found["zed-fails"] / "summary.json").write_text(json.dumps(summary), encoding="utf-8")
     return found

@@ -12,6 +12,7 @@ import pytest
 
 from alula.campaign.mocked_scenarios import load_mocked_scenario
 from alula.commands.expect import main
+from alula.common import run_log
 from alula.common.faults import parse_fault
 from alula.records.errors import AnalysisError
 from alula.records.expectations import check, expectations_of, junit, load_expectations
@@ -135,7 +136,7 @@ def test_junit_names_what_failed(runs, tmp_path):
 def test_the_command_writes_checks_and_refuses(runs, tmp_path, capsys):
     lines = "".join(json.dumps(event_record(event)) + "\n" for event in runs["failing"].events)
     written(tmp_path / "events.jsonl", lines)
-    written(tmp_path / "mission.json", '{"outcome": "degraded"}')
+    run_log.note(tmp_path, run_log.MISSION, {"outcome": "degraded"})
     assert load_recorded_run(tmp_path).outcome == "degraded"
     assert main([str(tmp_path)]) == 0
     path = written(tmp_path / "e.yaml", capsys.readouterr().out)

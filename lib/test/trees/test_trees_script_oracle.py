@@ -8,9 +8,10 @@ from __future__ import annotations
 import random
 
 import pytest
+from trees_script_printer import print_program
 from trees_scripts import NUMBERS, Oracle, ours, random_script, random_words
 
-from alula.trees.script import ScriptError, parse, print_program
+from alula.trees.script import ScriptError, parse
 
 SCRIPTS = 4000
 SOUPS = 6000

@@ -3,7 +3,7 @@
 What a file says of a mission besides its main tree, by names: the tree ``ready`` holds what it needs to start (<Needs>), the tree
 ``stop_here`` brings the robot to rest after an abort. Entries of the main blackboard: ``degraded`` and ``stopping``, once true, say so.
 The model of the main tree tells its parameters (input ports with a number as their default), its inputs (without), and what
-``mission.json`` tells of it (output ports, with the value at the beginning).
+the mission's account tells of it (output ports, with the value at the beginning).
 """
 
 from __future__ import annotations

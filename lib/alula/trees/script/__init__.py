@@ -5,9 +5,8 @@ Extensions of ours: dotted names (``navigation.flight_status == IN_AIR``) and ca
 
 from alula.trees.script.errors import ScriptError
 from alula.trees.script.parser import parse
-from alula.trees.script.printer import print_program
 from alula.trees.script.program import Names, Note, Program
 from alula.trees.script.scope import Reference, Scope, Value
 from alula.trees.script.values import truth
 
-__all__ = ["Names", "Note", "Program", "Reference", "Scope", "ScriptError", "Value", "parse", "print_program", "truth"]
+__all__ = ["Names", "Note", "Program", "Reference", "Scope", "ScriptError", "Value", "parse", "truth"]

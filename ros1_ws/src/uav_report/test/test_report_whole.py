@@ -14,6 +14,7 @@ import matplotlib.image as mpl_image
 import numpy as np
 import pytest
 
+from alula.common import run_log
 from alula.common.record import FILE as RECORD
 from alula.report import __main__ as report
 from alula.report.facts import RunFacts
@@ -81,7 +82,7 @@ def lay_out(folder: Path) -> None:
     ground = np.stack([xs.ravel(), ys.ravel(), np.full(xs.size, 0.04)], axis=1)
     write_map(folder / "map.ply", ground)
     mission = {"outcome": "degraded", "reason": "zed_depthmap: zed_works was violated", "inputs": {"route": ROUTE}}
-    (folder / "mission.json").write_text(json.dumps(mission))
+    run_log.note(folder, run_log.MISSION, mission)
     (folder / "logs").mkdir(exist_ok=True)
     (folder / "logs/bridge.json").write_text('{"topics": {"/clock": {"count": 5000, "p50_ms": 0.4, "p95_ms": 1.5, "dropped": 0}}}')
     t_s, position = poses()
@@ -248,7 +249,7 @@ def test_an_empty_folder(tmp_path):
     assert {key for key, value in summary.items() if value is not None} == known
     assert summary["skills"] == summary["resources"] == []
     assert set(summary["map"].values()) == {None}
-    for name in (RECORD, "functional.bag", "world.ply", "map.ply", "mission.json", "bridge.json"):
+    for name in (RECORD, "functional.bag", "world.ply", "map.ply", "the mission's account", "bridge.json"):
         assert [problem for problem in summary["problems"] if name in problem], name
     assert {path.name for path in tmp_path.iterdir()} == OUTPUTS
 
@@ -263,14 +264,15 @@ def test_a_folder_that_has_gone_is_told_in_the_verdict(tmp_path):
 
 
 def test_what_the_mission_could_not_record_is_a_problem_of_the_flight(folder):
-    (folder / "mission.json").write_text('{"outcome": "degraded", "problems": ["skills.mcap ends early: No space left on device"]}')
+    problem = "skills.mcap ends early: No space left on device"
+    run_log.note(folder, run_log.MISSION, {"outcome": "degraded", "problems": [problem]})
     assert "skills.mcap ends early: No space left on device" in make_report(facts(folder))["problems"]
 
 
 @pytest.mark.parametrize("content", [b"", b"\x00\xff\x80garbage", b"{", b"[]", b"null", b'"text"'], ids=repr)
 def test_garbage_everywhere(tmp_path, content):
     (tmp_path / "logs").mkdir()
-    for name in (RECORD, "mission.json", "functional.bag", "logs/bridge.json", "map.ply", "world.ply"):
+    for name in (RECORD, run_log.FILE, "functional.bag", "logs/bridge.json", "map.ply", "world.ply"):
         (tmp_path / name).write_bytes(content)
     summary = make_report(facts(tmp_path))
     assert summary["outcome"] is None
@@ -279,14 +281,15 @@ def test_garbage_everywhere(tmp_path, content):
     assert json.loads((tmp_path / "summary.json").read_text())["problems"] == summary["problems"]
 
 
-@pytest.mark.parametrize("missing", [RECORD, "mission.json", "functional.bag", "logs/bridge.json", "map.ply", "world.ply"])
+@pytest.mark.parametrize("missing", [RECORD, run_log.FILE, "functional.bag", "logs/bridge.json", "map.ply", "world.ply"])
 def test_each_file_may_be_missing(folder, missing):
     (folder / missing).unlink()
     summary = make_report(facts(folder))
-    assert any(Path(missing).name in problem for problem in summary["problems"])
+    told = "the mission's account" if missing == run_log.FILE else Path(missing).name
+    assert any(told in problem for problem in summary["problems"])
     unknown = {
         RECORD: summary["skills"] == [],
-        "mission.json": summary["outcome"] is None and summary["map"]["coverage"] is None and summary["map"]["rmse_m"] is not None,
+        run_log.FILE: summary["outcome"] is None and summary["map"]["coverage"] is None and summary["map"]["rmse_m"] is not None,
         "functional.bag": summary["min_clearance_m"] is None and summary["lift_off"]["source"] == "flight_status",
         "logs/bridge.json": summary["bridge"] is None,
         "map.ply": summary["map"]["points"] == 5 and summary["map"]["rmse_m"] is None,
@@ -306,7 +309,7 @@ def test_a_crash_in_flight(folder):
     state = {"lift_off_s": LIFT_OFF_S, "collisions": 0, "min_clearance_m": None, "distance_m": 30.0, "faults": []}
     told = guidance(t_s[half])
     write_bag(folder / "functional.bag.active", poses=(t_s[half], position[half]), states=[state], guidance=told, cut_at=10**9)
-    (folder / "mission.json").write_text('{"outcome": "running", "reason": ""}')
+    run_log.note(folder, run_log.MISSION, {"outcome": "running", "reason": ""})
     failing_flight().write(folder / RECORD, until_s=LIFT_OFF_S + 40.0)
     summary = make_report(facts(folder, mission_exit=None))
     assert (summary["outcome"], summary["reason"], summary["landed"]) == ("running", None, False)

@@ -56,7 +56,7 @@ def test_distance_of_a_wall_is_right_to_a_quarter_pixel(disparity_px) -> None:
     depth = depth_of(disparity(*wall_pair(disparity_px, seed=1)), ZED)
     expected_m = 28.8 / disparity_px
     assert np.isfinite(depth).mean() > 0.9
-    assert abs(float(np.nanmedian(depth)) - expected_m) < ZED.depth_error_m(expected_m, 0.25)
+    assert abs(float(np.nanmedian(depth)) - expected_m) < 0.25 * expected_m**2 / (ZED.fx * ZED.baseline_m)
 
 
 def test_the_number_of_threads_changes_no_bit_of_the_result() -> None:

@@ -43,7 +43,8 @@ class Robot:
         out = self.folder / f"run{self.runs}"
         words = [word for fault in faults for word in ("--fail", fault)]
         assert run.main(["inspection", "--mock", "--out", str(out), *words]) == 0
-        return tuple(json.loads((out / name).read_text(encoding="utf-8")) for name in ("summary.json", "mission.json"))
+        summary = json.loads((out / "summary.json").read_text(encoding="utf-8"))
+        return summary, summary["mission"]
 
 
 @pytest.fixture

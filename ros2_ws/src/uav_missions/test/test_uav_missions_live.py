@@ -9,6 +9,8 @@ import signal
 import subprocess
 import sys
 import time
+from collections.abc import Mapping
+from typing import Any
 
 import pytest
 
@@ -19,7 +21,8 @@ from std_msgs.msg import Header
 from std_srvs.srv import SetBool
 from uav_skills_rig import Rig
 
-from alula.common.record import EVENTS, OPERATOR, TREE, read_record
+from alula.common import run_log
+from alula.common.record import EVENTS, FILE, OPERATOR, TREE, RecordFollower, read_record
 from alula.trees.groot.address import Address
 from alula_testing.waits import until
 
@@ -80,13 +83,13 @@ class Mission:
     def until(self, what) -> None:
         # The clock goes on while the process starts: on a busy machine that is a minute of mission clock.
         self.rig.wait(lambda: self.process.poll() is not None or what(), timeout_s=300.0)
-        assert self.process.poll() is None, self.read("mission.json")
+        assert self.process.poll() is None, self.account()
 
     def exit_code(self) -> int:
         return self.process.wait(timeout=40.0)
 
-    def read(self, name: str) -> dict:
-        return json.loads((self.out / name).read_text())
+    def account(self) -> Mapping[str, Any]:
+        return run_log.account(self.out, RecordFollower(self.out / FILE).poll())
 
     def seen(self) -> dict[int, str]:
         """Return the status of each node by its uid, as btview sees it now."""
@@ -141,7 +144,7 @@ def starts_since(mission: Mission, start_s: float) -> list[str]:
 
 def test_a_nominal_mission_leaves_a_complete_record(mission):
     assert mission.exit_code() == 0
-    record = mission.read("mission.json")
+    record = mission.account()
     assert (record["outcome"], record["reason"]) == ("accomplished", "")
     assert record["start_s"] < record["lift_off_s"] < record["end_s"]
     assert record["waypoints_reached"] == record["waypoints"] == 3
@@ -164,7 +167,7 @@ def test_losing_the_zed_is_survived_within_a_second(mission):
     failure_s = functional.now_s
     functional.report("perception", "zed_status", "BROKEN")
     assert mission.exit_code() == 0
-    record = mission.read("mission.json")
+    record = mission.account()
     assert record["outcome"] == "degraded"
     assert "zed_ok" in record["reason"]
     after = [event for event in mission.events() if event["kind"] == "EXECUTION" and event["stamp_s"] >= failure_s - CLOCKS_APART_S]
@@ -200,7 +203,7 @@ def test_a_pause_holds_the_vehicle_on_its_way_and_the_mission_goes_on(mission):
     answer = set_paused(mission, paused=False)
     assert (answer.success, answer.message) == (True, "the mission goes on")
     assert mission.exit_code() == 0
-    record = mission.read("mission.json")
+    record = mission.account()
     assert (record["outcome"], record["waypoints_reached"]) == ("accomplished", 3)
     entries = list(read_record(mission.out))
     told = [entry.value for entry in entries if entry.topic == OPERATOR]
@@ -222,7 +225,7 @@ def test_losing_both_sensors_lands_where_it_is(mission):
     functional.report("perception", "zed_status", "BROKEN")
     functional.report("perception", "lidar_status", "BROKEN")
     assert mission.exit_code() == 1
-    record = mission.read("mission.json")
+    record = mission.account()
     assert record["outcome"] == "given_up"
     assert "zed_ok" in record["reason"]
     assert not functional.vehicle.in_air
@@ -237,7 +240,7 @@ def test_a_signal_in_the_air_lands_the_vehicle_first(mission):
     mission.process.send_signal(signal.SIGINT)
     mission.until(lambda: not main.keys() & mission.seen().keys())  # what stops it is another tree
     assert mission.exit_code() == 1
-    record = mission.read("mission.json")
+    record = mission.account()
     assert (record["outcome"], record["reason"]) == ("aborted", "told to end by SIGINT")
     assert not functional.vehicle.in_air
     assert mission.last_tree()["name"] == "aborted mission"
@@ -247,11 +250,11 @@ def test_a_mission_that_is_told_to_end_before_the_start_does_not_start(whole_rig
     whole_rig.prepare()
     whole_rig.set("navigation", "homepoint_status", "INVALID")
     mission = Mission(whole_rig, tmp_path / "run")
-    mission.until((mission.out / "mission.json").exists)
-    assert mission.read("mission.json")["outcome"] == "running"
+    mission.until(mission.account)
+    assert mission.account()["outcome"] == "running"
     mission.process.send_signal(signal.SIGTERM)
     assert mission.exit_code() == 1
-    assert mission.read("mission.json")["outcome"] == "aborted"
+    assert mission.account()["outcome"] == "aborted"
     assert whole_rig.functional.names() == []
 
 

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import json
 import os
 import random
 import shutil
@@ -180,7 +179,7 @@ def arguments(out: Path, *more: str) -> list[str]:
 
 def test_a_flight_without_eyes_ends_1_and_leaves_its_record(tmp_path):
     assert over_mocks.main(arguments(tmp_path / "run", "--fail", "zed@8", "--fail", "lidar@8")) == 1
-    mission = json.loads((tmp_path / "run/mission.json").read_text())
+    mission = run_log.account(tmp_path / "run", read_record(tmp_path / "run"))
     assert (mission["outcome"], mission["waypoints_reached"]) == ("given_up", 1)
     record = read_record(tmp_path / "run")
     events = [entry.value for entry in record if entry.topic == EVENTS]
@@ -208,7 +207,7 @@ def test_a_flight_without_eyes_ends_1_and_leaves_its_record(tmp_path):
 def test_a_full_disk_ends_the_record_and_not_the_flight(tmp_path):
     (tmp_path / "skills.mcap").symlink_to("/dev/full")
     assert MockedMission(SKILLSETS, BEHAVIOUR, PLAN, out=tmp_path).run().outcome is Outcome.ACCOMPLISHED
-    mission = json.loads((tmp_path / "mission.json").read_text())
+    mission = run_log.account(tmp_path, [])
     assert mission["outcome"] == "accomplished"
     assert mission["problems"] == ["skills.mcap ends early: No space left on device"]
 

@@ -43,10 +43,6 @@ class Route:
         lap = list(itertools.takewhile(lambda waypoint: waypoint[2] == self.waypoints[0][2], self.waypoints))
         return Route([(x, y, height_m) for height_m in heights_m for x, y, _ in lap], self._home)
 
-    def mark_reached(self) -> None:
-        """Take the next waypoint from now on."""
-        self.reached = min(self.reached + 1, len(self.waypoints))
-
     def leg_heading_rad(self) -> float:
         """Return the direction on the ground of the leg to the current waypoint.
 

@@ -82,11 +82,6 @@ class Channel:
         self.delivered += len(arrived)
         return arrived
 
-    @property
-    def next_ns(self) -> int | None:
-        """When something arrives next, as far as it is on its way by now."""
-        return self._air[0][0] if self._air else None
-
     def _advance(self, now_ns: int) -> None:
         """Let out of the queue what the tokens of the time until now pay for; each packet leaves when its last byte is paid."""
         at_ns = now_ns if self._filled_ns is None else self._filled_ns

@@ -143,8 +143,8 @@ class FlightReport:
         if "map" in self._run.scenario.report:
             with problems.survive("map.ply"):
                 points = load_map(folder / "map.ply")
-        with problems.survive("the route of mission.json"):
-            route = load_route(folder / "mission.json")
+        with problems.survive("the route of the mission"):
+            route = load_route(self._run.history.mission)
         quality = MapQuality()
         with problems.survive("the map's quality"):
             quality = judge_map(points, route, world, problems)

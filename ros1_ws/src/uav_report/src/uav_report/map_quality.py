@@ -9,6 +9,7 @@ angle, with gaps wider than the patches.
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from dataclasses import dataclass
 from itertools import pairwise
 from pathlib import Path
@@ -18,7 +19,7 @@ from numpy.typing import NDArray
 from scipy.spatial import cKDTree
 
 from alula.common.open3d_core import o3d
-from alula.report.files import Problems, ReportError, finite, mapping, read_json, sequence
+from alula.report.files import Problems, ReportError, finite, mapping, sequence
 from uav_report.world import TrueSurfaces
 
 PATCH_M = 0.25  # one sample for each square of this side
@@ -61,15 +62,15 @@ def load_map(path: Path) -> Floats:
     return points
 
 
-def load_route(path: Path) -> Floats:
+def load_route(mission: Mapping[str, object]) -> Floats:
     """Return the planned waypoints, (N, 3), frame map; raise ReportError when they are missing or unreadable.
 
-    The mission writes its inputs into its file, these under the key ``route``.
+    It is among the inputs that the mission's account tells.
     """
-    listed = mapping(mapping(read_json(path)).get("inputs")).get("route")
+    listed = mapping(mission.get("inputs")).get("route")
     waypoints = [[finite(number) for number in sequence(waypoint)] for waypoint in sequence(listed)]
     if not waypoints or any(len(waypoint) != 3 or None in waypoint for waypoint in waypoints):
-        raise ReportError(f"{path.name} is no list of [x, y, z]")
+        raise ReportError("the mission's route is no list of [x, y, z]")
     return np.asarray(waypoints, dtype=np.float64)
 
 

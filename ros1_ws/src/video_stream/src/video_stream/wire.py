@@ -23,7 +23,6 @@ CLOCK_HZ = 90_000
 NS = 1_000_000_000
 MARK_ID, TAG_ID = 1, 2  # of the elements of the header extension
 TAG_BYTES = 8
-MAX_DATAGRAM = 2048
 _MARK = struct.Struct("!IQHH")  # 16 bytes, the most that a one-byte header element can hold
 _KEY_FLAG = 0x8000
 

@@ -68,10 +68,6 @@ class StereoGeometry:
     baseline_m: float
     offset_px: float = 0.0
 
-    def depth_error_m(self, depth_m: float, disparity_error_px: float) -> float:
-        """Return the error of a depth for an error of the disparity: it grows with the square of the depth."""
-        return depth_m**2 / (self.fx * self.baseline_m) * disparity_error_px
-
     def disparity_of(self, depth_m: float) -> float:
         """Return the disparity in pixels at a depth."""
         return self.fx * self.baseline_m / depth_m + self.offset_px
