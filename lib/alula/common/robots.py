@@ -28,7 +28,22 @@ BEHAVIOUR, FAULTS = "mock.yaml", "faults.yaml"
 PARTS = ("inputs", "missions", "hooks", "report", "run", "depths", "areas")
 """What a robot may add to the general commands, as ``module`` or ``module:name``; ``docs/robots.md`` says what each has to be."""
 WORLD_KEYS = ("packages", "python", "debian", "underlays")
-KEYS = ("name", "about", "robots", "skillsets", "scenarios", "worlds", "departure", "taken", "rest", "page", "python", "parts", "ros1", "ros2")
+KEYS = (
+    "name",
+    "about",
+    "robots",
+    "skillsets",
+    "scenarios",
+    "worlds",
+    "departure",
+    "taken",
+    "rest",
+    "page",
+    "python",
+    "parts",
+    "ros1",
+    "ros2",
+)
 _NAME = re.compile(r"[a-z][a-z0-9_]*")
 
 
