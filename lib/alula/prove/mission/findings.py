@@ -9,6 +9,8 @@ from alula.model import semantics
 from alula.model.span import Span
 from alula.prove.limits import Deadline
 from alula.prove.mission.answers import GOOD, Answers, Row
+from alula.prove.mission.deciding import answers_of, never_coming, never_deciding
+from alula.prove.mission.fights import fights
 from alula.prove.mission.refusals import Refusal, failing, refusal_of
 from alula.prove.mission.regions import Regions
 from alula.prove.mission.run import MissionFinding, MissionRun, run_of
@@ -23,9 +25,9 @@ ANSWER = "put a Fallback around it with what is to be done then, or `<AlwaysFail
 
 def findings(regions: Regions, answers: Answers) -> list[Diagnostic]:
     """Return what is wrong, or can go wrong, each thing with a run that shows it."""
-    found = list(_left_taken(regions))
+    found = [*_left_taken(regions), *_fighting(regions)]
     # What never happens is known only when all runs were looked at.
-    return [*found, *_unanswered(regions, answers), *_never_ticked(regions)] if regions.complete else found
+    return [*found, *_unanswered(regions, answers), *_never(regions)] if regions.complete else found
 
 
 def _ends(regions: Regions) -> Iterator[tuple[int, str]]:
@@ -114,6 +116,31 @@ def _refused(regions: Regions, row: Row, refusal: Refusal) -> Diagnostic:
 
 def _named(skillset: str, states: Mapping[str, str]) -> tuple[tuple[str, str], ...]:
     return tuple((f"{skillset}.{name}", state) for name, state in states.items())
+
+
+def _fighting(regions: Regions) -> Iterator[Diagnostic]:
+    """Yield ALU708 for requests that are refused because of what runs, and are asked for again meanwhile."""
+    system = regions.system
+    for one in fights(regions):
+        asking, holding = (system.leaves[leaf] for leaf in (one.asking, one.holding))
+        message = (
+            f"'{asking.name}' and '{holding.name}' fight for {one.resource}: `{asking.skillset}.{asking.model.name}` is refused while "
+        )
+        message += f"`{holding.skillset}.{holding.model.name}` runs, and is asked for again meanwhile"
+        run = run_of(system, one.events, one.state)
+        cure = "have one branch wait until the other has ended, or end it first"
+        yield _finding("ALU708", message, asking, cure, told(system, one.events), run)
+
+
+def _never(regions: Regions) -> Iterator[Diagnostic]:
+    """Yield what never happens: nodes that are never ticked, conditions that never decide, ends that never come."""
+    yield from _never_ticked(regions)
+    for node, true in never_deciding(regions.system, answers_of(regions)):
+        message = f"'{node.name}' never decides: it is always {'true' if true else 'false'} when it is ticked"
+        yield _finding("ALU706", message, node, "take it away, or ask for what can be otherwise there")
+    for node, asked, whose in never_coming(regions):
+        message = f"`{asked}` is asked, but {f'{whose} never ends' if whose else 'no skill ever ends'} so"
+        yield _finding("ALU707", message, node, "ask for an end that can come there, or have it come")
 
 
 def _never_ticked(regions: Regions) -> Iterator[Diagnostic]:
