@@ -11,8 +11,10 @@ order in the file; otherwise nothing is claimed. Missions that do the same may b
 
 from __future__ import annotations
 
+import math
 from collections.abc import Hashable, Mapping, Sequence
 from dataclasses import dataclass, replace
+from itertools import product
 
 from alula.missions.filed.skills import SkillNode
 from alula.prove.mission.oracle import Answer, Question
@@ -26,6 +28,9 @@ from alula.trees.palette import Direction
 from alula.trees.script import parse
 from alula.trees.script.syntax import Assignment, Literal, Name, walk
 
+FEW = 20_000
+"""Up to so many situations are compared one by one."""
+Products = tuple[frozenset[int], ...]
 Key = tuple[str, str, int]
 """A skill, the name of the node that asks for it, and which of those of the same names."""
 
@@ -34,15 +39,16 @@ Key = tuple[str, str, int]
 class Edge:
     """A tick.
 
-    ``label`` is all that it shows, ``target`` the region after it; ``asked``: what it asks for, and how the mission has ended after it;
-    ``choices``: what nobody knows, with the answers; ``sets``: the managers of each skillset with which it is taken. ``way`` is the tick.
+    ``label`` is all that it shows but ``sets``, the managers of each skillset with which it is taken; ``target``: the region after it;
+    ``asked``: what it asks for, and how the mission has ended after it; ``choices``: what nobody knows, with the answers. ``way`` is
+    the tick itself.
     """
 
     label: int
     target: int
     asked: Hashable
     choices: Mapping[Question, Answer]
-    sets: tuple[frozenset[int], ...]
+    sets: Products
     way: tuple[Outcome, Sets]
 
     def like(self, other: Edge) -> bool:
@@ -136,7 +142,7 @@ class _Making:
         chosen = {one.question: one.answer for one in choices}
         wrote = frozenset((self._values[number], status) for number, status in touched if number in self._values)
         known = tuple(frozenset(self._one(place, number) for number in numbers) for place, numbers in enumerate(sets))
-        label = self._number(("tick", asked, frozenset(chosen.items()), wrote, known))
+        label = self._number(("tick", asked, frozenset(chosen.items()), wrote))
         return Edge(label, target, asked, chosen, known, way)
 
     def _deals(self, node: Node) -> Hashable | None:
@@ -204,16 +210,48 @@ def same(one: Graph, other: Graph) -> bool:
     labels = [*one.labels, *other.labels]
     shift = len(one.labels)
     edges = [*one.edges, *(tuple(replace(edge, target=edge.target + shift) for edge in known) for known in other.edges)]
-    blocks = _numbered(labels)
+    blocks, unions = _numbered(labels), _Unions()
     while True:
         if blocks[0] != blocks[shift]:
             return False
-        refined = _numbered(
-            [(blocks[at], frozenset((edge.label, blocks[edge.target]) for edge in known)) for at, known in enumerate(edges)]
-        )
+        refined = _numbered([(blocks[at], unions.shown(known, blocks)) for at, known in enumerate(edges)])
         if len(set(refined)) == len(set(blocks)):
             return True
         blocks = refined
+
+
+class _Unions:
+    """What the ticks out of a region show: those that show the same are one, taken with all managers of any of them."""
+
+    def __init__(self) -> None:
+        self._known: dict[frozenset[Products], Hashable] = {}
+
+    def shown(self, edges: Sequence[Edge], blocks: Sequence[int]) -> Hashable:
+        """Return it, with the blocks that the ticks lead to."""
+        found: dict[tuple[int, int], set[Products]] = {}
+        for edge in edges:
+            found.setdefault((edge.label, blocks[edge.target]), set()).add(edge.sets)
+        return frozenset((key, self._union(frozenset(sets))) for key, sets in found.items())
+
+    def _union(self, sets: frozenset[Products]) -> Hashable:
+        """Return a union of products, the same however it was divided, where it is not too large to be looked at one by one."""
+        if sets not in self._known:
+            merged = _merged(sets)
+            few = len(merged) > 1 and sum(math.prod(map(len, one)) for one in merged) <= FEW
+            self._known[sets] = frozenset(one for known in merged for one in product(*known)) if few else merged
+        return self._known[sets]
+
+
+def _merged(sets: frozenset[Products]) -> frozenset[Products]:
+    """Return the products with those that differ in one skillset only made one."""
+    found: list[Products] = []
+    for each in sorted(sets, key=lambda known: [sorted(part) for part in known]):
+        one = each
+        while (other := next((known for known in found if sum(a != b for a, b in zip(known, one, strict=True)) <= 1), None)) is not None:
+            found.remove(other)
+            one = tuple(a | b for a, b in zip(other, one, strict=True))
+        found.append(one)
+    return frozenset(found)
 
 
 def _numbered(values: Sequence[Hashable]) -> list[int]:
