@@ -11,13 +11,17 @@ import pytest
 from alula.common.robots import find_robot
 from alula.language.models import ModelFile, check_texts
 from alula.missions.check.page import whole
-from alula.missions.filed.part import NO_PART
+from alula.missions.filed.part import NO_PART, MissionPart
 from alula.model.model import Skillset
 from alula.prove.mission.page import ROBOT
 from alula.prove.mission.prover import LOOKED_AT
 from alula.prove.mission.state import State
 from alula.prove.mission.system import System
-from mission_mutations import models
+from alula.trees.node import SyncAction
+from alula.trees.palette import output_port
+from alula.trees.status import Answer
+from alula.trees.values import INT
+from mission_mutations import models, trees
 from mission_mutations.__main__ import judged, mutants
 from mission_mutations.judging import ANOTHER_RUN, ANSWERS, EQUAL, FOUND, Judge, Robot, Verdict
 from mission_mutations.mutants import KINDS, Mutant, chosen, mutants_of
@@ -75,6 +79,39 @@ def test_what_does_the_same_is_equal(tmp_path: Path) -> None:
 def test_numbers_that_the_search_does_not_know_are_not_said_to_be_equal(tmp_path: Path) -> None:
     for before, after in (("rounds += 1", "rounds += 2"), ("rounds := 0", "rounds := 1"), ("rounds &gt;= 3", "!(rounds &gt;= 3)")):
         assert verdict(tmp_path, COUNTS, COUNTS.replace(before, after)).verdict != EQUAL, after
+
+
+class Wishes(SyncAction):
+    """A node of a robot's own that says how many rounds there are."""
+
+    ports = (output_port("rounds", INT),)
+
+    def update(self) -> Answer:
+        """Not asked: the search sees its ports."""
+        raise NotImplementedError
+
+
+ROUNDS = """<Sequence>
+  <Script code="rounds := 0"/>
+  <robot.Wishes rounds="{wanted}"/>
+  <Until if="rounds &gt;= wanted">
+    <Sequence><Fallback><drone.hover/><drone.land/></Fallback><Script code="rounds += 1"/></Sequence>
+  </Until>
+</Sequence>"""
+
+
+def test_rounds_by_a_number_of_the_world_are_told_from_one_round_by_a_flight(tmp_path: Path) -> None:
+    """The flight counts: it meets 1 where the search has met a number that it did not know."""
+    (tmp_path / "example.xml").write_text(whole(ROUNDS))
+    judge = Judge(Robot(tmp_path, (DRONE,), MissionPart((("robot.Wishes", Wishes),)), {}), "example")
+    once = next(text for kind, _, text in trees.altered(whole(ROUNDS)) if kind == trees.RETRY_DROPPED)
+    one = judge.judge(Mutant("example", "by hand", "", "example.xml", once))
+    assert (one.verdict, one.by, one.flown) == (FOUND, ANOTHER_RUN, True), one
+
+
+def test_what_is_written_again_is_equal_where_it_is_a_value_of_the_file(tmp_path: Path) -> None:
+    one, again = (f'<{tag}><Script code="stopping := true"/><drone.land/></{tag}>' for tag in ("Sequence", "ReactiveSequence"))
+    assert verdict(tmp_path, *(TWO_WAYS.replace("<drone.land/>", last) for last in (one, again))).verdict == EQUAL
 
 
 def observed(folder: Path, text: str, skillset: Skillset) -> set[object]:
@@ -142,6 +179,7 @@ def test_choice_is_by_the_seed_and_even() -> None:
 
 
 @pytest.mark.long
+@pytest.mark.timeout(0)  # 40 s of processor time: as long as the machine needs
 def test_of_the_drones_a_seeded_mutant_of_each_kind_is_not_missed() -> None:
     some = chosen(list(mutants(ROOT, ["inspection"])), len(KINDS), seed=0)
     assert {one.kind for one in some} == set(KINDS)

@@ -61,6 +61,28 @@ def test_the_examples_play_to_their_end(code: str, tmp_path: Path) -> None:
         assert (played.left, played.end.outcome) == ("", Outcome.ABORTED if goes_on else Outcome.GIVEN_UP)
 
 
+KEEPING = ROBOT.replace("ours { guard control == OURS effect axes -> FREE }", "ours { guard control == OURS }")
+
+
+def test_each_end_that_leaves_something_taken_is_told_and_plays(tmp_path: Path) -> None:
+    """The managers are the same after both ends: what is accepted of one must not hide the other."""
+    assert KEEPING != ROBOT
+    (robot,) = check_texts([ModelFile("robot.rl", KEEPING)])
+    path = tmp_path / "example.xml"
+    inside = "<Sequence><drone.lift/><drone.climb/></Sequence><drone.land/>"
+    path.write_text(whole(f"<Fallback>{inside}</Fallback>"))
+    found = [one for one in prove_mission(path, robot.skillsets, NO_PART).findings if one.code == "ALU701"]
+    assert [one.message.partition(": left by ")[2] for one in found] == ["drone.lift as ours", "drone.climb as ours"]
+    for one in found:
+        assert isinstance(one, MissionFinding)
+        assert one.run is not None
+        assert play(path, one.run, NO_PART).left == ""
+    path.write_text(whole(f'<Fallback _description="accepted ALU701 (left by drone.lift as ours): so it is">{inside}</Fallback>'))
+    proved = prove_mission(path, robot.skillsets, NO_PART)
+    assert [one.message[-19:] for one in proved.findings if one.code == "ALU701"] == ["drone.climb as ours"]
+    assert len(proved.accepted) == 1
+
+
 DATA = """
 skillset rover {
   type { Float64 }

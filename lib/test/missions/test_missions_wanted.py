@@ -440,3 +440,58 @@ def test_progress_that_a_script_waits_for_is_played(tmp_path: Path) -> None:
 
 
 PARALLEL = '<Parallel success_count="1" failure_count="1">{}</Parallel>'
+
+
+# --- what never decides, what never comes, who fights -----------------------------------------------------------------
+
+
+def codes(folder: Path, tree: str) -> set[str]:
+    return {one.code for one in prove_mission(written(folder, "", tree), skillsets(), NO_PART).findings}
+
+
+FIGHT = """<Parallel success_count="2" failure_count="2">
+  <Fallback><drone.hover/><AlwaysFailure/></Fallback>
+  <Fallback>{land}<AlwaysFailure/></Fallback>
+</Parallel>"""
+AGAIN = '<RetryUntilSuccessful num_attempts="3"><drone.land/></RetryUntilSuccessful>'
+
+
+def test_who_fights_for_a_resource_is_told_and_plays(tmp_path: Path) -> None:
+    path = written(tmp_path, "", FIGHT.format(land=AGAIN))
+    (finding,) = (one for one in prove_mission(path, skillsets(), NO_PART).findings if one.code == "ALU708")
+    assert "'drone.land' and 'drone.hover' fight for drone.axes" in finding.message
+    assert [line.split(". ")[1] for line in finding.example][-2:] == [
+        "drone.land is refused: NOT_READY (free)",
+        "the tree is ticked; asks for drone.land ('drone.land')",
+    ]
+    assert isinstance(finding, MissionFinding)
+    assert finding.run is not None
+    assert not play(path, finding.run, NO_PART).left
+
+
+def test_one_refusal_is_no_fight_nor_is_asking_again_once_it_is_free(tmp_path: Path) -> None:
+    waits = '<WaitFor if="running(drone.hover)"/><WaitFor if="!running(drone.hover)"/>'  # a request under way does not run yet
+    for land in ("<drone.land/>", f"<Sequence>{waits}{AGAIN}</Sequence>"):
+        assert "ALU708" not in codes(tmp_path, FIGHT.format(land=land)), land
+
+
+def test_a_condition_decides_where_it_can_be_otherwise_in_one_of_its_places(tmp_path: Path) -> None:
+    asks = '<Sequence><ScriptCondition code="drone.axes == FREE"/><drone.lift/></Sequence>'
+    assert "ALU706" in codes(tmp_path, f"<Fallback>{asks}<drone.land/></Fallback>")
+    inside = f"<ForceSuccess><drone.climb/></ForceSuccess><Fallback>{asks}<AlwaysFailure/></Fallback>"
+    assert "ALU706" not in codes(tmp_path, f"<Sequence>{inside}</Sequence>")
+    assert "ALU706" in codes(tmp_path, '<Fallback><ScriptCondition code="drone.axes == USED"/><drone.lift/><drone.land/></Fallback>')
+    assert "ALU706" not in codes(tmp_path, '<Sequence><WaitFor if="drone.control == OURS"/><drone.lift/></Sequence>')
+
+
+def test_an_outcome_that_never_comes_is_told_of_the_skills_that_write_it(tmp_path: Path) -> None:
+    tree = """<Fallback>
+      <drone.hover outcome="{{how}}"/>
+      <Sequence><ScriptCondition code="how {asked}"/><drone.lift/></Sequence>
+      <drone.land/>
+    </Fallback>"""
+    found = prove_mission(written(tmp_path, "", tree.format(asked="== 'NOT_READY'")), skillsets(), NO_PART).findings
+    assert [one.message for one in found if one.code == "ALU707"] == ["`how == 'NOT_READY'` is asked, but 'drone.hover' never ends so"]
+    assert "ALU707" not in codes(tmp_path, tree.format(asked="== 'ABORTED'"))
+    also = "<Sequence><Script code=\"how := 'NOT_READY'\"/>" + tree.format(asked="== 'NOT_READY'") + "</Sequence>"
+    assert "ALU707" not in codes(tmp_path, also)

@@ -1,6 +1,6 @@
 """Findings that an author accepts in the mission's file, with a reason, where Groot2 shows and keeps what a node is about.
 
-    <Fallback name="mapping mission" _description="accepted ALU701 (navigation.axes_authority == USED): why that is meant">
+    <Fallback name="mapping mission" _description="accepted ALU701 (left by navigation.takeoff as keep_sdk_authority): why that is meant">
 
 What stands in parentheses must be in the finding's message; without it, each finding of the code at this node is accepted.
 """

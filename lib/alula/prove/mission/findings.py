@@ -2,17 +2,18 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Mapping
+from collections.abc import Iterator
 
 from alula.language.errors import Diagnostic, Severity
-from alula.model import semantics
 from alula.model.span import Span
 from alula.prove.limits import Deadline
 from alula.prove.mission.answers import GOOD, Answers, Row
+from alula.prove.mission.deciding import answers_of, never_coming, never_deciding
+from alula.prove.mission.fights import fights
+from alula.prove.mission.left import left_taken
 from alula.prove.mission.refusals import Refusal, failing, refusal_of
 from alula.prove.mission.regions import Regions
 from alula.prove.mission.run import MissionFinding, MissionRun, run_of
-from alula.prove.mission.state import Managers
 from alula.prove.mission.system import FAILED, System
 from alula.prove.mission.waits import Waits
 from alula.prove.mission.words import situation, told
@@ -23,64 +24,25 @@ ANSWER = "put a Fallback around it with what is to be done then, or `<AlwaysFail
 
 def findings(regions: Regions, answers: Answers) -> list[Diagnostic]:
     """Return what is wrong, or can go wrong, each thing with a run that shows it."""
-    found = list(_left_taken(regions))
+    found = [*_left_taken(regions), *_fighting(regions)]
     # What never happens is known only when all runs were looked at.
-    return [*found, *_unanswered(regions, answers), *_never_ticked(regions)] if regions.complete else found
-
-
-def _ends(regions: Regions) -> Iterator[tuple[int, str]]:
-    for number, region in enumerate(regions.regions):
-        end = regions.system.ticker.memories[region.memory].end
-        if end is not None:
-            yield number, end.value
+    return [*found, *_unanswered(regions, answers), *_never(regions)] if regions.complete else found
 
 
 def _left_taken(regions: Regions) -> Iterator[Diagnostic]:
-    """Yield ALU701 for skills that nothing but a restart makes ready again after the mission."""
+    """Yield ALU701 for skills that nothing but a restart makes ready again after the mission, for each end that leaves it so."""
     system = regions.system
-    told_already: set[tuple[int, tuple[str, ...]]] = set()
-    for number, end in _ends(regions):
-        for place, closure in enumerate(regions.regions[number].closures):
-            for one in sorted(closure.all, key=closure.depth.__getitem__):
-                managers = system.managers_of(one)
-                if any(execution.phase != "ended" for execution in managers.executions) or managers.states is None:
-                    continue
-                lost = _lost(regions, place, one)
-                if not lost or (place, lost) in told_already:
-                    continue
-                told_already.add((place, lost))
-                skillset = system.skillsets[place]
-                first = {resource.name: resource.initial for resource in skillset.resources}
-                states = dict(zip(first, managers.states, strict=True))
-                held = [f"{skillset.name}.{name} == {state}" for name, state in states.items() if state != first[name]]
-                names = ", ".join(f"`{skillset.name}.{skill}`" for skill in lost)
-                message = f"the mission can end ({end}) so that {names} can't start any more ({', '.join(held)})"
-                cure = "have the skill give back what it holds however it ends, or restart its managers before the next mission"
-                run = MissionRun(tuple(regions.run(number, {place: one})), end, _named(skillset.name, states), system.skillsets)
-                yield _finding("ALU701", message, system.nodes[0], cure, told(system, run.events), run)
-
-
-def _lost(regions: Regions, place: int, number: int) -> tuple[str, ...]:
-    """Return the skills of the mission that could start after power-up and can't after this, whatever the functional layer does."""
-    system = regions.system
-    first = system.initial().managers[place]
-    ready = [_startable(regions, place, one) for one in (first, number)]
-    return tuple(sorted(ready[0] - ready[1]))
-
-
-def _startable(regions: Regions, place: int, number: int) -> set[str]:
-    system = regions.system
-    skillset = system.skillsets[place]
-    bare = system.number(Managers(system.managers_of(number).states))
-    closure = regions.closure(place, frozenset({bare}), over=False)
-    names = [resource.name for resource in skillset.resources]
-    found: set[str] = set()
-    for one in closure.all:
-        known = system.managers_of(one).states
-        if known is not None:
-            states = dict(zip(names, known, strict=True))
-            found |= {skill.name for skill in skillset.skills if not any(semantics.unmet_preconditions(skill, states, {}))}
-    return found
+    for one in left_taken(regions):
+        skillset = system.skillsets[one.place]
+        first = {resource.name: resource.initial for resource in skillset.resources}
+        held = [f"{skillset.name}.{name} == {state}" for name, state in one.states.items() if state != first[name]]
+        names = ", ".join(f"`{skillset.name}.{skill}`" for skill in one.lost)
+        message = f"the mission can end ({one.end}) so that {names} can't start any more ({', '.join(held)})"
+        message += f": left by {one.by}" if one.by else ""
+        cure = "have the skill give back what it holds however it ends, or restart its managers before the next mission"
+        states = tuple((f"{skillset.name}.{name}", state) for name, state in one.states.items())
+        run = MissionRun(one.events, one.end, states, system.skillsets)
+        yield _finding("ALU701", message, system.nodes[0], cure, told(system, run.events), run)
 
 
 def _unanswered(regions: Regions, answers: Answers) -> Iterator[Diagnostic]:
@@ -112,8 +74,29 @@ def _refused(regions: Regions, row: Row, refusal: Refusal) -> Diagnostic:
     return _finding("ALU705", message, system.leaves[row.leaf], ANSWER, told(system, run.events), run)
 
 
-def _named(skillset: str, states: Mapping[str, str]) -> tuple[tuple[str, str], ...]:
-    return tuple((f"{skillset}.{name}", state) for name, state in states.items())
+def _fighting(regions: Regions) -> Iterator[Diagnostic]:
+    """Yield ALU708 for requests that are refused because of what runs, and are asked for again meanwhile."""
+    system = regions.system
+    for one in fights(regions):
+        asking, holding = (system.leaves[leaf] for leaf in (one.asking, one.holding))
+        message = (
+            f"'{asking.name}' and '{holding.name}' fight for {one.resource}: `{asking.skillset}.{asking.model.name}` is refused while "
+        )
+        message += f"`{holding.skillset}.{holding.model.name}` runs, and is asked for again meanwhile"
+        run = run_of(system, one.events, one.state)
+        cure = "have one branch wait until the other has ended, or end it first"
+        yield _finding("ALU708", message, asking, cure, told(system, one.events), run)
+
+
+def _never(regions: Regions) -> Iterator[Diagnostic]:
+    """Yield what never happens: nodes that are never ticked, conditions that never decide, ends that never come."""
+    yield from _never_ticked(regions)
+    for node, true in never_deciding(regions.system, answers_of(regions)):
+        message = f"'{node.name}' never decides: it is always {'true' if true else 'false'} when it is ticked"
+        yield _finding("ALU706", message, node, "take it away, or ask for what can be otherwise there")
+    for node, asked, whose in never_coming(regions):
+        message = f"`{asked}` is asked, but {f'{whose} never ends' if whose else 'no skill ever ends'} so"
+        yield _finding("ALU707", message, node, "ask for an end that can come there, or have it come")
 
 
 def _never_ticked(regions: Regions) -> Iterator[Diagnostic]:

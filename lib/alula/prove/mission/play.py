@@ -34,6 +34,7 @@ from alula.runtime.local.middleware import Bus, VirtualLink, VirtualMiddleware
 from alula.runtime.middleware import GoalListener
 
 COMPARISONS = {"<": operator.lt, "<=": operator.le, ">": operator.gt, ">=": operator.ge, "==": operator.eq}
+FLIPPED = {"<": ">", "<=": ">=", ">": "<", ">=": "<=", "==": "=="}
 STEP_S = 0.01
 """Between two ticks; times that the run says are over pass before the tick that sees it."""
 
@@ -75,10 +76,20 @@ class _Answers(Oracle):
         self.choices: list[Asked] = []
 
     def choose(self, question: Question, options: tuple[Answer, ...] = (False, True)) -> Answer:
-        for number, one in enumerate(self.choices):
-            if one.question == question:
-                return self.choices.pop(number).answer
+        for alike in (operator.eq, _alike):
+            for number, one in enumerate(self.choices):
+                if alike(one.question, question):
+                    return self.choices.pop(number).answer
         return options[0]
+
+
+def _alike(chosen: Question, asked: Question) -> bool:
+    """Tell whether a choice of the search answers a comparison in which one number, which the search did not know, is known here."""
+    match chosen, asked:
+        case ("compare", str(left), str(symbol), str(right)), ("compare", str(one), str(other_symbol), str(other)):
+            straight = symbol == other_symbol and (left == one or right == other)
+            return straight or (FLIPPED[symbol] == other_symbol and (left == other or right == one))
+    return False
 
 
 class _Function(SkillHooks):

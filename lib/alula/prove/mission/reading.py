@@ -78,9 +78,9 @@ class Read:
     def asks(self, element: Element) -> Asks:
         """Return what one node asks for."""
         one = Read(self.oracle, names=set())
-        scripts = [_Named.of(text) for text in _scripts(element)]
+        scripts = [_Named.of(text) for text in scripts_of(element)]
         named = {name for script in scripts for name in script.names}
-        for text in _scripts(element):
+        for text in scripts_of(element):
             _script(one, text, {})
         _ports(one, element, self.unread)
         if type_name(element) not in self.unread:
@@ -129,7 +129,7 @@ def what_is_read(files: TreeFiles, opaque: Iterable[str], constants: Mapping[str
     read = Read(oracle, unread=frozenset(opaque), free=frozenset(free))
     for tree in files.trees.values():
         for element in tree.iterate():
-            for text in _scripts(element):
+            for text in scripts_of(element):
                 _script(read, text, constants)
             _ports(read, element, read.unread)
     for model in files.models.values():
@@ -148,7 +148,8 @@ def what_is_read(files: TreeFiles, opaque: Iterable[str], constants: Mapping[str
     return read
 
 
-def _scripts(element: Element) -> Iterator[str]:
+def scripts_of(element: Element) -> Iterator[str]:
+    """Yield the scripts of a node."""
     for name in (*PRECONDITIONS, *POSTCONDITIONS, *SCRIPT_PORTS):
         if name in element.attributes and not element.get(name).lstrip().startswith("{"):
             yield element.get(name)

@@ -9,7 +9,7 @@ from __future__ import annotations
 
 import math
 from collections import deque
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field
 
 from alula.prove.limits import Deadline
@@ -88,19 +88,22 @@ class Regions:
         self.complete = False
         self.situations = 0
         """How many situations the regions stand for; those of one memory may overlap."""
-        self._deadline = deadline
+        self.deadline = deadline
         self._by_memory: dict[int, list[int]] = {}
         self._closures: dict[tuple[int, frozenset[int], bool], Closure] = {}
         self._commanded: dict[tuple[int, int, int, tuple[int, ...], tuple[int, ...]], int] = {}
 
-    def explore(self) -> None:
-        """Find them all, those that few ticks lead to first; raises OutOfTimeError."""
-        first = self.system.initial()
+    def explore(self, begin: State | None = None, until: Callable[[Region], bool] = lambda _: False) -> None:
+        """Find them all from a situation on (default: power-up), or up to one region; raises OutOfTimeError.
+
+        Those that few ticks lead to come first; the last is the one that was looked for.
+        """
+        first = begin or self.system.initial()
         todo = deque([self._add(first.memory, tuple(frozenset({one}) for one in first.managers), None)])
         while todo:
             number = todo.popleft()
-            self._deadline.doing = self._progress(number, len(todo))
-            self._deadline.check()
+            self.deadline.doing = self._progress(number, len(todo))
+            self.deadline.check()
             region = self.regions[number]
             for act in self._acts(region):
                 for ticked in self.ticks(region.memory, act, region.sets):
@@ -112,6 +115,8 @@ class Regions:
                     if known is None:
                         known = self._add(memory, after, (number, ticked))
                         todo.append(known)
+                        if until(self.regions[known]):
+                            return
                     region.next.append((known, ticked))
         self.complete = True
 
@@ -120,7 +125,7 @@ class Regions:
         known = len(self.regions)
         return (
             f"{self.situations:,} situations in {known} groups, {left} of them to look at, {self.regions[number].depth} ticks deep,"
-            f" {self._deadline.a_second(known):.3g} groups a second"
+            f" {self.deadline.a_second(known):.3g} groups a second"
         )
 
     def _acts(self, region: Region) -> Iterator[str]:

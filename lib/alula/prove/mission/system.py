@@ -58,7 +58,8 @@ class System:
         """The leaves that are skills, by the numbers that executions and events have them by."""
         self.nodes: tuple[Node, ...] = tuple(ticker.nodes)
         self._steps = [ManagersSteps(one, self._skills_of(one), failures, deadline, self.told_end) for one in skillsets]
-        self._read = body.read
+        self.reads = body.read
+        """What the trees decide by."""
         self._place = {one.name: number for number, one in enumerate(skillsets)}
         self._managers: list[Managers] = []
         self._numbers: dict[Managers, int] = {}
@@ -243,10 +244,10 @@ class System:
         state, result = end
         success = state == TERMINATED and result in node.leaf.success
         outcome = pointer(node.wiring.ports.get(OUTCOME_PORT, ""), OUTCOME_PORT)
-        told = (result or state) if outcome is None else self._read.value(outcome.removeprefix("@"), result or state)
+        told = (result or state) if outcome is None else self.reads.value(outcome.removeprefix("@"), result or state)
         if success:
             return (state, result) if outcome is not None and told == result else (TERMINATED, min(node.leaf.success))
-        return (state, result) if result in self._read.ends or (outcome is not None and told == (result or state)) else (FAILED, "")
+        return (state, result) if result in self.reads.ends or (outcome is not None and told == (result or state)) else (FAILED, "")
 
     def _skills_of(self, skillset: Skillset) -> Mapping[int, str]:
         return {number: leaf.model.name for number, leaf in enumerate(self.leaves) if leaf.skillset == skillset.name}
