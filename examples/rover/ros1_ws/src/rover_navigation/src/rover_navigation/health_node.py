@@ -11,12 +11,12 @@ import numpy as np
 import rospy
 from geometry_msgs.msg import PoseWithCovarianceStamped, Twist
 from nav_msgs.msg import Odometry
-from resource_reporter import ResourceReporter
+from resource_reporter import DoneReporter, ResourceReporter
 from sensor_msgs.msg import BatteryState, LaserScan
 from std_msgs.msg import Bool, Float32, String
 
 from rover_navigation.health import OK, BumperMonitor, LaserMonitor, PoseMonitor, WheelMonitor, WheelReading
-from rover_navigation.ros import Done, pose_of
+from rover_navigation.ros import pose_of
 
 COMMAND_TIMEOUT_S = 0.5  # the base stops by itself when no command comes any more
 
@@ -33,7 +33,7 @@ class HealthNode:
         self._verdicts: dict[str, str] = {}
         self._reporters = {skillset: ResourceReporter(skillset) for skillset in ("base", "perception", "power")}
         self._health = rospy.Publisher("/health", String, queue_size=5, latch=True)
-        self._done = Done()
+        self._done = DoneReporter(*self._reporters.values())
         for topic, kind, handler in (
             ("/scan", LaserScan, self._on_scan),
             ("/bumper", Bool, self._on_bumper),
@@ -73,7 +73,7 @@ class HealthNode:
             self._wheels.step(WheelReading(now_s, pose[:2], self._matched, told_rad_s, message.twist.twist.angular.z))
         self._bumper.step(pose[:2], pressed=self._pressed)
         self._report(now_s)
-        self._done.tell(message.header.stamp)
+        self._done.done(message.header.stamp.to_nsec())
 
     def _report(self, now_s: float) -> None:
         laser = self._laser.verdict(now_s)

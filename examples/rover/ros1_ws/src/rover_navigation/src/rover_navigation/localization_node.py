@@ -12,13 +12,14 @@ import tf2_ros
 from geometry_msgs.msg import PoseStamped, PoseWithCovarianceStamped, Twist
 from move_base_msgs.msg import MoveBaseAction, MoveBaseFeedback, MoveBaseGoal
 from nav_msgs.msg import Odometry
+from resource_reporter import DoneReporter
 from sensor_msgs.msg import LaserScan
 from std_msgs.msg import Float32
 
 from rover_navigation.geometry import Points, Pose, compose, inverse, wrapped
 from rover_navigation.health import LaserMonitor
 from rover_navigation.matching import Match, match, search
-from rover_navigation.ros import Done, points_of_scan, pose_message, pose_of, transform, wait_for_map
+from rover_navigation.ros import points_of_scan, pose_message, pose_of, transform, wait_for_map
 
 BELIEVED = 0.5  # a match of a smaller quality corrects nothing
 FOUND = 0.75  # a search that finds less has found nothing
@@ -48,9 +49,9 @@ class LocalizationNode:
         self._pose = rospy.Publisher("/localization/pose", PoseWithCovarianceStamped, queue_size=5)
         self._quality_topic = rospy.Publisher("/localization/quality", Float32, queue_size=5)
         self._commands = rospy.Publisher("/cmd_vel", Twist, queue_size=5)
-        self._done = Done()
         self._localize = actionlib.SimpleActionServer("localize", MoveBaseAction, self._search, auto_start=False)
         rospy.Subscriber("/scan", LaserScan, self._on_scan, queue_size=2, tcp_nodelay=True)
+        self._done = DoneReporter()
         rospy.Subscriber("/odom", Odometry, self._on_odometry, queue_size=20, tcp_nodelay=True)
         self._localize.start()
 
@@ -125,7 +126,7 @@ class LocalizationNode:
         self._steps += 1
         if self._localize.is_active() and self._steps % FEEDBACK_STEPS == 0:
             self._localize.publish_feedback(MoveBaseFeedback(base_position=PoseStamped(message.header, message.pose.pose)))
-        self._done.tell(stamp)
+        self._done.done(stamp.to_nsec())
 
 
 def main() -> None:

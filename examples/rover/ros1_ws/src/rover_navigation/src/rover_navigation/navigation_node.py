@@ -12,6 +12,7 @@ import rospy
 from geometry_msgs.msg import PoseStamped, PoseWithCovarianceStamped, Twist
 from move_base_msgs.msg import MoveBaseAction, MoveBaseFeedback, MoveBaseGoal
 from nav_msgs.msg import Odometry, Path
+from resource_reporter import DoneReporter
 from sensor_msgs.msg import BatteryState, LaserScan
 from std_msgs.msg import Bool, Header
 
@@ -19,7 +20,7 @@ from rover_navigation.geometry import Points, Pose, compose, inverse
 from rover_navigation.health import LaserMonitor
 from rover_navigation.jobs import Corridor, Creep, Dock, Drive, Ended, Job, Situation
 from rover_navigation.planning import Surroundings
-from rover_navigation.ros import Done, free_of_scan, points_of_scan, pose_message, pose_of, wait_for_map
+from rover_navigation.ros import free_of_scan, points_of_scan, pose_message, pose_of, wait_for_map
 
 FEEDBACK_STEPS = 4  # odometries
 REMEMBERED = 20  # odometries, for the poses of localisation that belong to them
@@ -52,7 +53,6 @@ class NavigationNode:
         self._bumped = self._charging = False
         self._commands = rospy.Publisher("/cmd_vel", Twist, queue_size=5)
         self._way = rospy.Publisher("/move_base/plan", Path, queue_size=2, latch=True)
-        self._done = Done()
         self._servers = {
             name: actionlib.SimpleActionServer(name, MoveBaseAction, partial(self._execute, name, make), auto_start=False)
             for name, make in makers.items()
@@ -61,6 +61,7 @@ class NavigationNode:
         rospy.Subscriber("/scan", LaserScan, self._on_scan, queue_size=2, tcp_nodelay=True)
         rospy.Subscriber("/bumper", Bool, self._on_bumper, queue_size=5)
         rospy.Subscriber("/battery_state", BatteryState, self._on_battery, queue_size=5)
+        self._done = DoneReporter()
         rospy.Subscriber("/odom", Odometry, self._on_odometry, queue_size=20, tcp_nodelay=True)
         for server in self._servers.values():
             server.start()
@@ -135,7 +136,7 @@ class NavigationNode:
                 age_s = now_s - self._scan_s
                 situation = Situation(now_s, self._pose, self._odom, self._points, age_s, self._bumped, self._charging)
                 self._step(self._job, situation)
-        self._done.tell(message.header.stamp)
+        self._done.done(message.header.stamp.to_nsec())
 
     def _step(self, job: Job, situation: Situation) -> None:
         done = job.step(situation)

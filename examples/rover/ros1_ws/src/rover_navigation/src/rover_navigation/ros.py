@@ -1,4 +1,4 @@
-"""Between ROS messages and poses; and how a node tells that it has dealt with an odometry, which simulated time waits for."""
+"""Between ROS messages and poses."""
 
 from __future__ import annotations
 
@@ -77,14 +77,3 @@ def wait_for_map() -> GridMap:
 def world_file() -> Path:
     """Return the file that the parameter ~world names."""
     return Path(rospy.get_param("~world"))
-
-
-class Done:
-    """Tells on ``~done`` (std_msgs/Header) up to which stamp a node has done its work."""
-
-    def __init__(self) -> None:
-        self._publisher = rospy.Publisher("~done", Header, queue_size=5)
-
-    def tell(self, stamp: rospy.Time) -> None:
-        """Say that what was measured at this moment is dealt with."""
-        self._publisher.publish(Header(stamp=stamp))
