@@ -34,7 +34,7 @@ def alula(tmp_path_factory: pytest.TempPathFactory) -> Alula:
     def run(*words: str, code: int = 0) -> subprocess.CompletedProcess[str]:
         command = [str(place / "venv/bin/alula"), *words]
         environment = {**ALLOWED, "HOME": str(place), "MPLCONFIGDIR": str(place)}
-        done = subprocess.run(command, cwd=ALULA_ROOT, env=environment, capture_output=True, text=True, timeout=300, check=False)
+        done = subprocess.run(command, cwd=ALULA_ROOT, env=environment, capture_output=True, text=True, timeout=120, check=False)
         assert done.returncode == code, done.stdout[-2000:] + done.stderr[-2000:]
         return done
 

@@ -81,13 +81,7 @@ def run(given: argparse.Namespace) -> int:
     """Do what is asked for; raises what ``main`` tells."""
     if given.most < 1:
         raise OddsError(f"--most {given.most}: is a number of situations, from 1 on")
-    robot = find_robot()
-    models = models_of(robot, COMMAND)
-    figures, effects = _of_faults(robot, models)
-    failures = Failures(refusals=False, hooks=False, aborts=False)
-    part = part_of(robot, COMMAND)
-    system = System.read(given.file, models, part, failures, few=COUNTED, known=_inputs(given.file, given.world))
-    steps = MissionSteps(system, effects, _brought(robot, models), _departure(robot, models), figures)
+    steps, figures = steps_of(given.file, given.world)
     graph = explore(steps, figures, most=given.most, unlikely=given.unlikely, tell=_tell)
     changes = {text: changed(figures, text, graph) for text in given.changes}
     found = odds_of(graph, figures)
@@ -97,6 +91,21 @@ def run(given: argparse.Namespace) -> int:
         write_text(given.svg, as_svg(title, found))
     sys.stdout.write(json.dumps(as_dict(found, others)) + "\n" if given.json else as_text(title, found, others))
     return 0
+
+
+def steps_of(path: Path, world: str = "", others: Figures | None = None) -> tuple[MissionSteps, Figures]:
+    """Return what can happen to a mission's file of this robot, and the figures that it hangs on: the robot's, or others.
+
+    Raises what ``main`` tells.
+    """
+    robot = find_robot()
+    models = models_of(robot, COMMAND)
+    figures, effects = _of_faults(robot, models)
+    failures = Failures(refusals=False, hooks=False, aborts=False)
+    part = part_of(robot, COMMAND)
+    system = System.read(path, models, part, failures, few=COUNTED, known=_inputs(path, world))
+    known = figures if others is None else others
+    return MissionSteps(system, effects, _brought(robot, models), _departure(robot, models), known), known
 
 
 def _inputs(path: Path, world: str) -> Inputs | None:

@@ -3,17 +3,26 @@
 from __future__ import annotations
 
 import math
+from collections.abc import Mapping
 from pathlib import Path
 
 import pytest
 from fetch_and_carry import by_hand
+from odds_flights import Flights, only
 
+from alula.campaign.mocked_scenarios import load_mocked_scenario
+from alula.commands.odds import steps_of
+from alula.common.robots import find_robot
 from alula.language.models import check_files, models_in
 from alula.missions.director import Outcome
 from alula.missions.filed.part import NO_PART
 from alula.missions.filed.plan import plan_of_file
 from alula.missions.mocked import MockedMission
+from alula.odds.figures import Figures
+from alula.odds.graph import explore
+from alula.odds.odds import Odds, odds_of
 from alula.odds.reading import load_figures
+from alula.records.causes.fault_file import effects_of_robot
 from alula.runtime.mock import Behaviour, Ending, Rule
 
 CARRIER = Path(__file__).parent / "carrier"
@@ -37,3 +46,63 @@ def test_a_thousand_missions_over_mocks_are_within_the_confidence_interval() -> 
     chance = float(by_hand(5))
     assert set(ends) == {Outcome.ACCOMPLISHED, Outcome.GIVEN_UP}
     assert abs(ends.count(Outcome.ACCOMPLISHED) / FLIGHTS - chance) <= DEVIATIONS * math.sqrt(chance * (1 - chance) / FLIGHTS)
+
+
+# --- the drone's mapping -----------------------------------------------------------------------------------------------
+
+DRONE = Path(__file__).parents[3]
+MISSION = DRONE / "missions/mapping.xml"
+
+
+def drones(others: Mapping[str, int] | None = None) -> tuple[Flights, Odds]:
+    """Return flights of the drone's mission and its odds, by its own figures, or with other faults so many times an hour."""
+    _, own = steps_of(MISSION)
+    figures: Figures = own if others is None else only(own, others)
+    steps, _ = steps_of(MISSION, others=figures)
+    scenario = load_mocked_scenario("mapping")
+    flights = Flights.by(scenario.plan, scenario.skillsets, scenario.behaviour, figures, effects_of_robot().known)
+    return flights, odds_of(explore(steps, figures, unlikely=1e-3), figures, costs=False)
+
+
+def within(odds: Odds, ends: list[Outcome]) -> bool:
+    """Tell whether how often each end was flown can come of its chances."""
+    assert set(ends) <= {Outcome.ACCOMPLISHED, Outcome.DEGRADED, Outcome.GIVEN_UP}
+    for outcome in (Outcome.ACCOMPLISHED, Outcome.DEGRADED, Outcome.GIVEN_UP):
+        known = odds.outcomes[outcome.value]
+        low, high = float(known.least.low), float(known.most.high)
+        often = ends.count(outcome) / len(ends)
+        if not low - deviation(low, len(ends)) <= often <= high + deviation(high, len(ends)):
+            return False
+    return True
+
+
+def deviation(chance: float, flights: int) -> float:
+    return DEVIATIONS * math.sqrt(chance * (1 - chance) / flights)
+
+
+@pytest.fixture
+def _drone(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setenv("ALULA_ROBOT", str(DRONE))
+    assert find_robot().root == DRONE
+
+
+@pytest.mark.long
+@pytest.mark.timeout(0)  # hundreds of flights: as long as the machine needs
+@pytest.mark.usefixtures("_drone")
+def test_a_thousand_mock_flights_of_the_drone_are_within_its_odds() -> None:
+    flights, odds = drones()
+    ends = [flights.fly(seed) for seed in range(FLIGHTS)]
+    assert within(odds, ends)
+    assert ends.count(Outcome.GIVEN_UP) > 0
+
+
+@pytest.mark.long
+@pytest.mark.timeout(0)  # hundreds of flights: as long as the machine needs
+@pytest.mark.usefixtures("_drone")
+def test_flights_in_which_sensors_often_fail_are_within_the_odds_and_not_within_those_of_others() -> None:
+    flights, odds = drones({"zed": 10, "lidar": 5})
+    ends = [flights.fly(seed) for seed in range(300)]
+    assert within(odds, ends)
+    assert min(ends.count(one) for one in (Outcome.ACCOMPLISHED, Outcome.DEGRADED, Outcome.GIVEN_UP)) > 10
+    for others in ({"zed": 10}, {"zed": 2, "lidar": 5}):
+        assert not within(drones(others)[1], ends), others
