@@ -134,7 +134,8 @@ def unbuilt(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     state = Path(os.environ.get("ALULA_STATE", ALULA_ROOT / ".alula"))
     made = tmp_path / "state"
     (made / "stamps").mkdir(parents=True)
-    (made / "stamps" / "venv2").touch()
+    for step in ("venv2", "wheels"):
+        (made / "stamps" / step).touch()
     (made / "log").touch()
     for world in ("venv1", "venv2"):
         (made / world).symlink_to(state / world)

@@ -245,7 +245,7 @@ def test_the_report_of_a_run_without_a_supervisor_is_a_command(folder, capsys):
 def test_an_empty_folder(tmp_path):
     summary = make_report(facts(tmp_path, faults=[], mission_exit=None))
     known = {"scenario", "seed", "map", "skills", "resources", "faults", "injected", "died", "lift_off", "accounts", "problems"}
-    known |= {"answers"}
+    known |= {"answers", "tasks"}
     assert {key for key, value in summary.items() if value is not None} == known
     assert summary["skills"] == summary["resources"] == []
     assert set(summary["map"].values()) == {None}

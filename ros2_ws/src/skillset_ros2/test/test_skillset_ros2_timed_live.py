@@ -54,7 +54,7 @@ class Managers:
         number = next(NUMBERS)
         self.hooks = {skill.name: Recorder() for skill in model.skills}
         place = {"namespace": f"timed_{number}"}
-        bindings = {"fps": (f"/timed_{number}/camera/fps", "std_msgs/msg/Float64")}
+        bindings = {"fps": ("/camera/fps", "std_msgs/msg/Float64")}
         clock = {"parameter_overrides": [Parameter("use_sim_time", value=True)]} if simulated else {}
         self.node = SkillsetNode(model, mapping_actions, lambda _: self.hooks, data_bindings=bindings, **place, **clock)
         self.other = Node("tester", **place)

@@ -106,7 +106,7 @@ class BagNode:
 
     def create_action_client(self, _kind: object, name: str) -> Any:
         """Return a client that the record answers."""
-        return self._action(name)
+        return self._action(absolute(name))
 
     def create_publisher(self, _kind: object, _topic: str, _depth: object, **_: object) -> SimpleNamespace:
         """Return what says something to nobody: what came of it then, the record tells."""

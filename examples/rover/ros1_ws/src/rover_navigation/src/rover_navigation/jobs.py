@@ -18,7 +18,7 @@ REPLAN_S = 1.0
 PATIENCE_S = 15.0  # without getting nearer
 PROGRESS_M = 0.15
 BLIND_S = 0.5  # without a scan nothing is driven that needs one
-BACK_M, BACK_M_S, BUMPS = 0.2, 0.1, 3  # creeping: away from what was touched, so often
+BACK_M, BACK_M_S = 0.2, 0.1  # creeping: away from what was touched
 BEFORE_DOCK_M = 0.6  # where docking by scan begins
 FACE_M = 0.25  # around where the dock should be its face is looked for
 GAP_M = 0.27  # from the laser to the dock's face when it stands on the dock
@@ -162,11 +162,10 @@ class Corridor:
 
 @dataclass
 class Creep:
-    """Drive very slowly by map and odometry; backs off from what the bumper touches, and tries again."""
+    """Drive very slowly by map and odometry; ends away from what the bumper touches: whoever it is may have to be asked to let it past."""
 
     around: Surroundings
     goal: Pose
-    bumps: int = 0
     back_from: Pose | None = None
     drive: Drive = field(init=False)
 
@@ -178,12 +177,10 @@ class Creep:
         if self.back_from is not None:
             if math.dist(now.odom[:2], self.back_from[:2]) < BACK_M:
                 return -BACK_M_S, 0.0
-            self.back_from = None
-            if now.bumped:
-                return Ended(arrived=False, text="the bumper stays pressed")
+            return Ended(arrived=False, text="the bumper stays pressed" if now.bumped else "touched something")
         if now.bumped:
-            self.bumps, self.back_from = self.bumps + 1, now.odom
-            return Ended(arrived=False, text=f"touched something {BUMPS} times") if self.bumps >= BUMPS else STAND
+            self.back_from = now.odom
+            return STAND
         return self.drive.step(now)
 
 
