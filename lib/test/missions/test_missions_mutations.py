@@ -21,8 +21,8 @@ from alula.trees.node import SyncAction
 from alula.trees.palette import output_port
 from alula.trees.status import Answer
 from alula.trees.values import INT
+from mission_mutations import __main__ as study
 from mission_mutations import models, trees
-from mission_mutations.__main__ import judge_of, judged, mutants
 from mission_mutations.judging import ANOTHER_RUN, ANSWERS, EQUAL, FOUND, Judge, Robot, Verdict
 from mission_mutations.mutants import KINDS, Mutant, chosen, mutants_of
 
@@ -181,9 +181,9 @@ def test_choice_is_by_the_seed_and_even() -> None:
 @pytest.mark.long
 @pytest.mark.timeout(0)  # 40 s of processor time: as long as the machine needs
 def test_of_the_drones_a_seeded_mutant_of_each_kind_is_not_missed() -> None:
-    some = chosen(list(mutants(ROOT, ["inspection"])), len(KINDS), seed=0)
+    some = chosen(list(study.mutants(ROOT, ["inspection"])), len(KINDS), seed=0)
     assert {one.kind for one in some} == set(KINDS)
-    verdicts = [judged(ROOT, one) for one in some]
-    judge_of.cache_clear()  # it has all runs of a mission
+    verdicts = [study.judged(ROOT, one) for one in some]
+    study.judge_of.cache_clear()  # it has all runs of a mission
     assert all(one.verdict in {FOUND, EQUAL} for one in verdicts), verdicts
     assert all(one.flown for one in verdicts if one.by in {ANSWERS, ANOTHER_RUN, "ALU701", "ALU702", "ALU704", "property"}), verdicts
