@@ -15,7 +15,7 @@ from typing import Any
 import pytest
 
 from alula.common.processes import command_line, end_run, node_name, processes_of_run
-from alula.common.record import EVENTS, FILE, RecordFollower
+from alula.common.record import DECISIONS, EVENTS, FILE, RecordFollower, read_record
 
 ALULA_ROOT = Path(__file__).resolve().parents[3]
 FLIGHT_LIMIT_S = 900.0  # wall clock; several times what a flight takes, so that a hang fails and a slow machine does not
@@ -102,16 +102,22 @@ class Flight:
             end_run(self.run_id)
 
 
-# Two skillsets are asked in one tick: over a network either may be first.
-SIDE_BY_SIDE = {"zed_depthmap", "lidar_mapping"}
+def in_order(flight: Flight) -> list[Mapping[str, Any]]:
+    """Return the executions of a flight's summary in the order of their requests.
+
+    That is the mission's, as its record has it: managers stamp what arrives, and of two that are asked in one tick either may be first.
+    """
+    order = [
+        entry.value["id"]
+        for entry in read_record(flight.out / "skills.mcap")
+        if entry.topic == DECISIONS and entry.value["kind"] == "start"
+    ]
+    return sorted(flight.summary["skills"], key=lambda execution: order.index(execution["id"]))
 
 
-def story(summary: Mapping[str, Any]) -> list[object]:
-    """Return skill, outcome and result of all executions in the order of their requests; those side by side as one set."""
-    entries = [(e["skill"], e["outcome"], e["result"]) for e in sorted(summary["skills"], key=lambda e: float(e["start_s"]))]
-    beside = frozenset(entry for entry in entries if entry[0] in SIDE_BY_SIDE)
-    rest: list[object] = [entry for entry in entries if entry[0] not in SIDE_BY_SIDE]
-    return [*rest[:1], beside, *rest[1:]]
+def story(flight: Flight) -> list[tuple[str, str, str]]:
+    """Return skill, outcome and result of all executions in the order of their requests."""
+    return [(e["skill"], e["outcome"], e["result"]) for e in in_order(flight)]
 
 
 def start_flight(out: Path, *arguments: str, scenario: str = "mapping") -> Flight:

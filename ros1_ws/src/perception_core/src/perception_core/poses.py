@@ -69,24 +69,29 @@ class PoseBuffer:
         with self._lock:
             return self._lock.wait_for(lambda: bool(self._rows) and self._rows[-1][0] >= stamp_ns, timeout=timeout_s)
 
-    def at(self, stamps_ns: Sequence[int]) -> Poses:
-        """Return the poses at these moments, in any order; raise PoseUnavailableError when one of them is out of reach."""
+    def at(self, stamps_ns: Sequence[int], *, tolerance_s: float | None = None) -> Poses:
+        """Return the poses at these moments, in any order; raise PoseUnavailableError when one of them is out of reach.
+
+        ``tolerance_s`` in place of the buffer's own, where a pose that is a little older would mislead.
+        """
         with self._lock:
             rows = list(self._rows)
         if not rows:
             raise PoseUnavailableError("no pose was received yet: is the guidance running?")
         wanted = np.asarray(stamps_ns, dtype=np.int64)
-        self._check_reach(int(wanted.min()), int(wanted.max()), rows[0][0], rows[-1][0])
+        tolerance_ns = self._tolerance_ns if tolerance_s is None else int(tolerance_s * NS)
+        _check_reach(int(wanted.min()), int(wanted.max()), rows[0][0], rows[-1][0], tolerance_ns)
         known = np.array([stamp for stamp, _ in rows], dtype=np.int64)
         first = max(0, int(np.searchsorted(known, wanted.min(), side="right")) - 1)
         last = min(len(rows), int(np.searchsorted(known, wanted.max(), side="left")) + 1)
         values = np.array([row for _, row in rows[first:last]])
         return _interpolate(known[first:last], values, wanted)
 
-    def _check_reach(self, first_ns: int, last_ns: int, oldest_ns: int, newest_ns: int) -> None:
-        gap_ns = max(oldest_ns - first_ns, last_ns - newest_ns)
-        if gap_ns > self._tolerance_ns:
-            raise PoseUnavailableError(f"the nearest known pose is {gap_ns / NS:.2f} s away, more than {self._tolerance_ns / NS:.2f} s")
+
+def _check_reach(first_ns: int, last_ns: int, oldest_ns: int, newest_ns: int, tolerance_ns: int) -> None:
+    gap_ns = max(oldest_ns - first_ns, last_ns - newest_ns)
+    if gap_ns > tolerance_ns:
+        raise PoseUnavailableError(f"the nearest known pose is {gap_ns / NS:.2f} s away, more than {tolerance_ns / NS:.2f} s")
 
 
 def _interpolate(known_ns: NDArray[np.int64], values: NDArray[np.float64], wanted_ns: NDArray[np.int64]) -> Poses:

@@ -1,0 +1,40 @@
+"""The core of the node, fed with sweeps and poses; needs ROS's Python, but no master."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+
+from lidar_obstacles.core import LidarObstacles
+from lidar_obstacles.settings import LidarSettings
+from perception_bench.recordings import RecordingHost
+from perception_core import NS, Sweep
+
+HEIGHT_M, CLIMB_M_S = 3.0, 2.0
+
+
+def over_ground(height_m: float, seed: int) -> np.ndarray:
+    """Return what a sensor that looks down sees of level ground."""
+    azimuth, down = np.meshgrid(np.radians(np.arange(0.0, 360.0, 1.0)), np.radians(np.arange(50.0, 80.0, 2.0)))
+    ray = np.stack([np.cos(down) * np.cos(azimuth), np.cos(down) * np.sin(azimuth), -np.sin(down)], axis=-1).reshape(-1, 3)
+    ranges = height_m / -ray[:, 2] + np.random.default_rng(seed).normal(0, 0.01, len(ray))
+    return (ray * ranges[:, None]).astype(np.float32)
+
+
+@pytest.mark.parametrize("late_s", [0.0, 0.04, 0.12])
+def test_poses_that_are_late_make_no_error_of_a_climb(late_s: float) -> None:
+    host = RecordingHost()
+    core = LidarObstacles(LidarSettings(), host)
+    told_ns = NS
+    for k in range(1, 30):
+        stamp_ns = NS + k * NS // 10
+        climbed_s = max(0.0, k / 10 - 1.0)
+        known_ns = stamp_ns - int((late_s if k % 4 in {2, 3} else 0.0) * NS)  # for two sweeps of four
+        while told_ns <= known_ns:
+            z_m = HEIGHT_M + CLIMB_M_S * max(0.0, told_ns / NS - 2.0)
+            core.vehicle.poses.add(told_ns, (0.0, 0.0, z_m), (0.0, 0.0, 0.0, 1.0))
+            told_ns += NS // 50
+        points = over_ground(HEIGHT_M + CLIMB_M_S * climbed_s, seed=k)
+        host.arrived_ns = stamp_ns
+        finding = core.judged(Sweep(stamp_ns, points, np.zeros(len(points), np.float32)), "lidar").finding
+        assert finding.ok, (k, finding.reason)
