@@ -5,6 +5,7 @@ from __future__ import annotations
 import pytest
 
 from alula.commands import check
+from alula_testing.battery import make_robot
 
 MODEL = """
 type Battery
@@ -13,19 +14,11 @@ skillset rover {
   skill drive { precondition p: %s success ok }
 }
 """
-BATTERY = "float64 level\nstring maker\nbool charging\nrover_msgs/Cell first\nother_msgs/Other other\n"
 
 
 @pytest.fixture
 def robot(tmp_path):
-    package = tmp_path / "ros2_ws/src/rover_msgs/msg"
-    package.mkdir(parents=True)
-    (package / "Battery.msg").write_text(BATTERY, encoding="utf-8")
-    (package / "Cell.msg").write_text("float64 volts\n", encoding="utf-8")
-    (tmp_path / "skillsets").mkdir()
-    (tmp_path / "skillsets/types.yaml").write_text("Battery: rover_msgs/Battery\n", encoding="utf-8")
-    (tmp_path / "robot.yaml").write_text("name: rover\n", encoding="utf-8")
-    return tmp_path
+    return make_robot(tmp_path)
 
 
 @pytest.mark.parametrize(

@@ -22,6 +22,7 @@ from alula.prove.mission.prover import prove_mission
 from alula.runtime.mock import load_behaviour
 from alula.trees.script import parse
 from alula.trees.script.scope import Unknown
+from alula_testing.battery import BATTERY, make_robot
 
 MODEL = """
 type Battery
@@ -187,32 +188,10 @@ def test_the_checker_knows_data(code, said):
     assert all(said in one.message for one in found)
 
 
-BATTERY = """
-# What is left.
-Header header
-float64 level            # 0 to 1
-float32[4] cells
-uint8 CHARGING=1
-uint8 state 1
-string<=20 maker "none"
-bool charging
-rover_msgs/Cell first
-other_msgs/Other other
-Cell[] all
-"""
-
-
 @pytest.fixture
 def messages(tmp_path):
     """The message of the battery as a package of the robot's workspace has it."""
-    package = tmp_path / "ros2_ws/src/rover_msgs/msg"
-    package.mkdir(parents=True)
-    (package / "Battery.msg").write_text(BATTERY, encoding="utf-8")
-    (package / "Cell.msg").write_text("float64 volts\n", encoding="utf-8")
-    (tmp_path / "skillsets").mkdir()
-    (tmp_path / "skillsets/types.yaml").write_text("Battery: rover_msgs/Battery\n", encoding="utf-8")
-    (tmp_path / "robot.yaml").write_text("name: rover\n", encoding="utf-8")
-    return messages_of(load_robot_folder(tmp_path))
+    return messages_of(load_robot_folder(make_robot(tmp_path)))
 
 
 @pytest.mark.parametrize(
