@@ -5,7 +5,6 @@ from __future__ import annotations
 import os
 import signal
 import subprocess
-import time
 from collections.abc import Callable, Iterator, Sequence
 from contextlib import contextmanager
 from xmlrpc.client import ServerProxy
@@ -13,24 +12,11 @@ from xmlrpc.client import ServerProxy
 import pytest
 
 from alula.common.network import free_port
+from alula_testing.waits import until
 
 StartNode = Callable[..., "subprocess.Popen[bytes]"]
-MASTER_START_S = 120.0
 END_WITH_PARENT = ("setpriv", "--pdeathsig", "TERM")
 """Of util-linux: the command ends with the thread that started it, also where tests are killed."""
-
-
-NODE_UP_S = 120.0
-"""Wall clock, until a node that a test has started is up: on a busy machine its imports alone take half a minute."""
-
-
-def wait_until(condition: Callable[[], bool], *, timeout_s: float, what: str) -> None:
-    """Return as soon as the condition holds; fail, naming ``what``, when it does not within the time (wall clock)."""
-    end = time.monotonic() + timeout_s
-    while not condition():
-        if time.monotonic() > end:
-            pytest.fail(f"not within {timeout_s} s: {what}")
-        time.sleep(0.01)
 
 
 def end_process(process: subprocess.Popen[bytes], *, timeout_s: float = 5.0) -> None:
@@ -71,7 +57,7 @@ def running_master(node: str) -> Iterator[str]:
         return True
 
     try:
-        wait_until(answers, timeout_s=MASTER_START_S, what="the ROS master answers")
+        until(answers, what="the ROS master answers")
         rospy.init_node(node, disable_signals=True)
         yield uri
     finally:

@@ -26,12 +26,11 @@ from uav_msgs.srv import Command, Stream
 from video_stream.wire import NS, Seal, VideoPacket
 
 from alula.common.network import free_port
-from alula_testing.ros1 import wait_until
+from alula_testing.waits import HANGS_S, until
 
 SOURCES = Path(__file__).parents[2]
 WIDTH, HEIGHT = 320, 180
 TICK_NS, FRAME_NS = NS // 50, NS // 20
-TIMEOUT_S = 60.0
 SHOWN = 40
 PLAYED = 10
 KEY = "a secret of this test"
@@ -115,7 +114,7 @@ class Flight:
             self.filmed += 1
         self._pass()
         followed = lambda: all(self._done.get(name, 0) >= self.now_ns for name in self.alive)  # noqa: E731
-        wait_until(followed, timeout_s=TIMEOUT_S, what="the nodes follow the clock")
+        until(followed, what="the nodes follow the clock")
 
     def until(self, condition: Callable[[], object], limit_s: float) -> float:
         """Let time pass until the condition holds; return how long that took, in seconds of mission clock."""
@@ -127,7 +126,7 @@ class Flight:
 
     def back(self, name: str) -> None:
         """Wait for a node that was started again."""
-        wait_until(lambda: self._pass() or self._done.get(name, 0) > self.now_ns - NS, timeout_s=TIMEOUT_S, what=f"{name} is back")
+        until(lambda: self._pass() or self._done.get(name, 0) > self.now_ns - NS, what=f"{name} is back")
         self.alive.add(name)
 
 
@@ -143,7 +142,7 @@ class Player(threading.Thread):
     def run(self) -> None:
         try:
             options = {"protocol_whitelist": "file,rtp,udp", "analyzeduration": "100000", "probesize": "20000"}
-            with av.open(str(self._session), format="sdp", options=options, timeout=TIMEOUT_S) as stream:
+            with av.open(str(self._session), format="sdp", options=options, timeout=HANGS_S) as stream:
                 for frame in stream.decode(video=0):
                     self.pictures.append(frame.to_ndarray(format="rgb24"))
                     if len(self.pictures) >= PLAYED:
@@ -177,7 +176,7 @@ def stage(ros_master, start_node, tmp_path):
     parameters[GROUND] += [f"_video_path:={tmp_path}"]
     nodes = {name: start_node([str(SOURCES / name / f"scripts/{name}_node"), *words]) for name, words in parameters.items()}
     flight = Flight(done, (video, report))
-    wait_until(flight.connected, timeout_s=TIMEOUT_S, what="the nodes are up")
+    until(flight.connected, what="the nodes are up")
 
     def kill(name: str) -> Callable[[], None]:
         """Kill a node; return what starts it again."""
@@ -198,9 +197,9 @@ def test_garbage_replays_and_disorder_in_every_port_show_no_wrong_picture_and_a_
     flight, nodes, video, _ = stage
     player = Player(tmp_path / "stream.sdp")
     player.start()
-    rospy.wait_for_service("/video_stream/stream", TIMEOUT_S)
+    rospy.wait_for_service("/video_stream/stream", HANGS_S)
     assert rospy.ServiceProxy("/video_stream/stream", Stream)(True, 5.0, 0.3, 5.0).accepted
-    end_s = time.monotonic() + TIMEOUT_S
+    end_s = time.monotonic() + HANGS_S
     log = tmp_path / "shown.jsonl"
     while (player.is_alive() or log.read_text().count("\n") < SHOWN) and time.monotonic() < end_s:
         flight.tick()
@@ -226,7 +225,7 @@ class Telepilot:
         self.state = message
 
     def begin(self) -> None:
-        rospy.wait_for_service("/video_stream/stream", TIMEOUT_S)
+        rospy.wait_for_service("/video_stream/stream", HANGS_S)
         assert rospy.ServiceProxy("/video_stream/stream", Stream)(True, 5.0, 0.3, 2.0).accepted
 
     def sees(self) -> bool:
@@ -322,9 +321,9 @@ def test_the_stick_s_topic_takes_the_vehicle_over_and_the_service_gives_it_back(
     ports = [f"_control_port:={autopilot.port}", f"_telemetry_port:={telemetry}", "_video_port:=0", "_player_port:=1", "_report_port:=1"]
     start_node([str(SOURCES / GROUND / f"scripts/{GROUND}_node"), *ports])
     stick = rospy.Publisher("/ground_station/stick", Twist, queue_size=1)
-    wait_until(stick.get_num_connections, timeout_s=TIMEOUT_S, what="the ground station hears the stick")
+    until(stick.get_num_connections, what="the ground station hears the stick")
     give_back = rospy.ServiceProxy("/ground_station/give_back", Command)
-    give_back.wait_for_service(TIMEOUT_S)
+    give_back.wait_for_service(HANGS_S)
     assert give_back().reason == "the telepilot does not have the vehicle"
 
     def hold(forward: float) -> Callable[[], None]:
@@ -336,12 +335,12 @@ def test_the_stick_s_topic_takes_the_vehicle_over_and_the_service_gives_it_back(
 
     def flown(forward: float, condition: Callable[[], bool]) -> None:
         held = hold(forward)
-        wait_until(lambda: held() or condition(), timeout_s=TIMEOUT_S, what=f"the stick at {forward}")
+        until(lambda: held() or condition(), what=f"the stick at {forward}")
 
     hold(0.0)()
     flown(0.5, lambda: 500 in autopilot.sticks)
     assert autopilot.mode == 5
-    wait_until(lambda: autopilot.work() or autopilot.sticks[-1] == 0, timeout_s=TIMEOUT_S, what="a stick that says nothing is centred")
+    until(lambda: autopilot.work() or autopilot.sticks[-1] == 0, what="a stick that says nothing is centred")
     assert give_back().accepted
     flown(0.0, lambda: autopilot.mode == 4)
     autopilot.close()

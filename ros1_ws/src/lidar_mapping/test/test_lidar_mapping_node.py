@@ -15,7 +15,8 @@ from std_srvs.srv import SetBool, Trigger
 from tf2_msgs.msg import TFMessage
 from uav_msgs.msg import MappingState
 
-from alula_testing.ros1 import NODE_UP_S, end_process, wait_until
+from alula_testing.ros1 import end_process
+from alula_testing.waits import until
 from lidar_mapping import read_ply
 from perception_core import NS
 from perception_core.testing import FakeFlight, framed, send_raw
@@ -46,7 +47,7 @@ class Walls:
 def flight(ros_master, start_node, tmp_path):
     with FakeFlight("lidar_mapping") as fake:
         fake.process = start_node([NODE, "_enabled:=false", f"_map_path:={tmp_path / 'map.ply'}"])
-        wait_until(fake.listens, timeout_s=NODE_UP_S, what="/lidar_mapping is up")
+        until(fake.listens, what="/lidar_mapping is up")
         rospy.wait_for_service("/lidar_mapping/save", timeout=10.0)
         yield fake
 
@@ -112,11 +113,11 @@ def test_started_again_after_a_crash_it_goes_on_with_map_and_work(flight, states
     assert rospy.ServiceProxy("/lidar_mapping/save", Trigger)().success
     flight.process.kill()
     flight.process.wait()
-    wait_until(lambda: not flight.listens(), timeout_s=10.0, what="/lidar_mapping's connections are gone")
+    until(lambda: not flight.listens(), what="/lidar_mapping's connections are gone")
     before = len(read_ply(tmp_path / "map.ply"))
     states.clear()
     start_node([NODE])
-    wait_until(flight.listens, timeout_s=NODE_UP_S, what="/lidar_mapping is up again")
+    until(flight.listens, what="/lidar_mapping is up again")
     assert flight.run(8.0, until=lambda: bool(states) and states[-1].scans >= 1)
     assert states[-1].running
     assert states[-1].points >= before
@@ -161,22 +162,22 @@ def test_started_again_after_a_crash_it_begins_where_the_guidance_flies(flight, 
     flight.at_10_hz = measure
     poses: list[PoseWithCovarianceStamped] = []
     listener = rospy.Subscriber("/lidar_mapping/pose", PoseWithCovarianceStamped, poses.append)
-    wait_until(lambda: tf.get_num_connections() == 2, timeout_s=NODE_UP_S, what="node and test listen to /tf")
+    until(lambda: tf.get_num_connections() == 2, what="node and test listen to /tf")
     assert rospy.ServiceProxy("/lidar_mapping/enable", SetBool)(True).success
     assert flight.run(8.0, until=lambda: bool(states) and states[-1].scans >= 3 and len(poses) >= 3)
     if saved:
         assert rospy.ServiceProxy("/lidar_mapping/save", Trigger)().success
     flight.process.kill()
     flight.process.wait()
-    wait_until(lambda: not flight.listens(), timeout_s=10.0, what="/lidar_mapping's connections are gone")
-    wait_until(lambda: tf.get_num_connections() == 1, timeout_s=NODE_UP_S, what="only the test listens to /tf")
+    until(lambda: not flight.listens(), what="/lidar_mapping's connections are gone")
+    until(lambda: tf.get_num_connections() == 1, what="only the test listens to /tf")
     assert (tmp_path / "map.ply").exists() == saved
     there = np.add(flight.position, FLOWN_M)
     states.clear()
     poses.clear()
     heard.clear()
     start_node([NODE])
-    wait_until(lambda: flight.listens() and tf.get_num_connections() == 2, timeout_s=NODE_UP_S, what="/lidar_mapping is up again")
+    until(lambda: flight.listens() and tf.get_num_connections() == 2, what="/lidar_mapping is up again")
     assert flight.run(20.0, until=lambda: bool(states) and states[-1].scans >= 3 and len(poses) >= 3 and len(heard) >= 3)
     listener.unregister()
     told = np.array([[p.pose.pose.position.x, p.pose.pose.position.y, p.pose.pose.position.z] for p in poses])
@@ -191,7 +192,7 @@ def test_readings_of_an_imu_that_is_mounted_turned_are_turned_into_the_body(flig
     mount = TransformStamped(header=Header(frame_id="base_link"), child_frame_id="imu")
     mount.transform.rotation = Quaternion(*Rotation.from_euler("x", 90, degrees=True).as_quat())
     flight.mount(mount)
-    wait_until(imu.get_num_connections, timeout_s=NODE_UP_S, what="it listens to the IMU")
+    until(imu.get_num_connections, what="it listens to the IMU")
 
     def measure(stamp_ns: int) -> None:
         reading = Imu(header=Header(stamp=rospy.Time(stamp_ns // NS, stamp_ns % NS), frame_id="imu"))
@@ -216,7 +217,7 @@ def test_readings_of_an_imu_that_is_mounted_turned_are_turned_into_the_body(flig
 def test_a_gyro_that_is_biased_where_the_vehicle_stands_does_not_turn_the_map(flight, states) -> None:
     walls = Walls(flight)
     imu = rospy.Publisher("/imu/data", Imu, queue_size=100)
-    wait_until(imu.get_num_connections, timeout_s=NODE_UP_S, what="it listens to the IMU")
+    until(imu.get_num_connections, what="it listens to the IMU")
 
     def measure(stamp_ns: int) -> None:
         for before_ns in range(90_000_000, -1, -10_000_000):
@@ -240,7 +241,7 @@ def test_a_gyro_that_is_biased_where_the_vehicle_stands_does_not_turn_the_map(fl
 def test_garbage_on_its_inputs_is_left_out_and_it_maps_on(flight, states) -> None:
     walls = Walls(flight)
     imu = rospy.Publisher("/imu/data", Imu, queue_size=10)
-    wait_until(imu.get_num_connections, timeout_s=NODE_UP_S, what="it listens to the IMU")
+    until(imu.get_num_connections, what="it listens to the IMU")
     assert rospy.ServiceProxy("/lidar_mapping/enable", SetBool)(True).success
     assert flight.run(8.0, until=lambda: bool(states) and states[-1].scans >= 3)
     scans = states[-1].scans

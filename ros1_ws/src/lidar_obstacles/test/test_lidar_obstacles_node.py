@@ -14,7 +14,7 @@ from dynamic_reconfigure.srv import Reconfigure
 from std_srvs.srv import SetBool
 from uav_msgs.msg import Obstacle, SensorHealth
 
-from alula_testing.ros1 import NODE_UP_S, wait_until
+from alula_testing.waits import HANGS_S, until
 from perception_core import NS
 from perception_core.testing import Expected, FakeFlight, box_cloud, check_fault
 
@@ -58,8 +58,8 @@ class Scanner:
 def flight(ros_master, start_node):
     with FakeFlight("lidar_obstacles") as fake:
         start_node([NODE, "_enabled:=false"])
-        wait_until(fake.connected, timeout_s=NODE_UP_S, what="/lidar_obstacles is up")
-        rospy.wait_for_service("/lidar_obstacles/enable", timeout=NODE_UP_S)
+        until(fake.connected, what="/lidar_obstacles is up")
+        rospy.wait_for_service("/lidar_obstacles/enable", timeout=HANGS_S)
         yield fake
 
 
@@ -172,9 +172,7 @@ def test_parameters_are_changed_in_flight_and_refused_out_of_range(flight: FakeF
     assert client.update_configuration({"length_m": 4.0})["length_m"] == 4.0
     assert flight.run(2.0, until=lambda: len(obstacles) >= 3)
     assert not obstacles[-1].detected  # the box is at 5.75 m
-    wait_until(
-        lambda: any(p.value == 4.0 for u in updates for p in u.doubles if p.name == "length_m"), timeout_s=5.0, what="the change is told"
-    )
+    until(lambda: any(p.value == 4.0 for u in updates for p in u.doubles if p.name == "length_m"), what="the change is told")
     change = rospy.ServiceProxy("/lidar_obstacles/set_parameters", Reconfigure)
     with pytest.raises(rospy.ServiceException, match=r"~length_m is 0\.5, expected 1 to 50"):
         change(encode_config({"length_m": 0.5, "half_width_m": 2.0}))

@@ -6,7 +6,7 @@ import rosgraph
 import rospy
 from std_msgs.msg import Header
 
-from alula_testing.ros1 import wait_until
+from alula_testing.waits import until
 from perception_core.host import Input
 from perception_core.ros import RosHost
 
@@ -42,13 +42,13 @@ def test_a_node_is_ready_for_lockstep_when_it_listens_to_all_its_inputs(ros_mast
     host.run(core)
     assert core.ready == [False]
     done = rospy.Subscriber("~done", Header, lambda message: heard.append(message.stamp.to_nsec()))
-    wait_until(done.get_num_connections, timeout_s=15.0, what="the node is ready")
+    until(done.get_num_connections, what="the node is ready")
     assert host.published("/host/second") is False
 
     def told() -> bool:  # again and again: the publisher learns of a subscriber after the subscriber of it
         host.done(2)
         return bool(heard)
 
-    wait_until(told, timeout_s=15.0, what="the measurement is dealt with")
+    until(told, what="the measurement is dealt with")
     assert set(heard) == {2}
     done.unregister()

@@ -9,7 +9,7 @@ import rospy
 from geometry_msgs.msg import Point
 from std_msgs.msg import String
 
-from alula_testing.ros1 import wait_until
+from alula_testing.waits import until
 from perception_core.host import Input
 from perception_core.ros import RawSubscriber, subscription, warn_of_garbage
 from perception_core.testing import framed, send_raw
@@ -23,7 +23,7 @@ def link(ros_master):
     garbage: list[str] = []
     publisher = rospy.Publisher("/raw/point", Point, queue_size=10)
     subscriber = RawSubscriber(Input("/raw/point", Point, lambda message: heard.append(message.x), garbage.append, BUFFER_BYTES))
-    wait_until(publisher.get_num_connections, timeout_s=15.0, what="connected")
+    until(publisher.get_num_connections, what="connected")
     yield publisher, heard, garbage
     subscriber.close()
     publisher.unregister()
@@ -33,10 +33,10 @@ def test_a_message_cut_short_is_told_and_the_next_one_is_heard(link) -> None:
     publisher, heard, garbage = link
     send_raw(publisher, framed(struct.pack("<d", 1.0) + b"half"))
     publisher.publish(Point(x=2.0))
-    wait_until(lambda: heard == [2.0], timeout_s=15.0, what="the message after it")
+    until(lambda: heard == [2.0], what="the message after it")
     assert len(garbage) <= 1  # of messages that wait, only the newest is decoded
     send_raw(publisher, framed(struct.pack("<d", 1.0) + b"half"))
-    wait_until(lambda: bool(garbage), timeout_s=15.0, what="the cut message is told")
+    until(lambda: bool(garbage), what="the cut message is told")
     assert garbage[0].startswith("a message of 12 bytes can't be decoded")
 
 
@@ -48,7 +48,7 @@ def test_a_stream_that_lost_its_borders_is_connected_again(link) -> None:
         publisher.publish(Point(x=3.0))
         return bool(heard)
 
-    wait_until(publish_and_hear, timeout_s=30.0, what="messages on a new connection")
+    until(publish_and_hear, what="messages on a new connection")
 
 
 class Watched:
@@ -72,7 +72,7 @@ class Watched:
     def look(self) -> None:
         """Wait until the watch has looked 50 times, half a second of wall clock."""
         self.looks = 0
-        wait_until(lambda: self.looks > 50, timeout_s=15.0, what="50 looks")
+        until(lambda: self.looks > 50, what="50 looks")
 
 
 @pytest.fixture
@@ -84,12 +84,12 @@ def test_a_held_clock_is_no_silence(watched) -> None:
     """Simulated time waits for slow nodes: no message is due, so the connections stay as they are."""
     publisher = rospy.Publisher("/raw/held", Point, queue_size=10)
     subscriber = RawSubscriber(Input("/raw/held", Point, lambda _message: None, lambda _why: None, BUFFER_BYTES))
-    wait_until(publisher.get_num_connections, timeout_s=15.0, what="connected")
+    until(publisher.get_num_connections, what="connected")
     send_raw(publisher, struct.pack("<I", 24) + b"the rest is due")
     watched.look()
     assert watched.subscribed == 1
     watched.now_s += 0.2
-    wait_until(lambda: watched.subscribed == 2, timeout_s=15.0, what="connected again when the clock has gone on")
+    until(lambda: watched.subscribed == 2, what="connected again when the clock has gone on")
     subscriber.close()
     publisher.unregister()
 
@@ -100,13 +100,13 @@ def test_a_topic_that_is_silent_by_nature_is_left_alone(watched) -> None:
     publisher = rospy.Publisher("/raw/latched", Point, queue_size=10, latch=True)
     publisher.publish(Point(x=4.0))
     subscriber = RawSubscriber(Input("/raw/latched", Point, lambda message: heard.append(message.x), warn_of_garbage, BUFFER_BYTES))
-    wait_until(lambda: heard == [4.0], timeout_s=15.0, what="the latched message")
+    until(lambda: heard == [4.0], what="the latched message")
     for _ in range(3):
         watched.now_s += 100.0
         watched.look()
     assert watched.subscribed == 1
     publisher.publish(Point(x=5.0))
-    wait_until(lambda: heard == [4.0, 5.0], timeout_s=15.0, what="the next message")
+    until(lambda: heard == [4.0, 5.0], what="the next message")
     subscriber.close()
     publisher.unregister()
 
@@ -116,7 +116,7 @@ def test_another_type_is_told(ros_master) -> None:
     publisher = rospy.Publisher("/raw/other", String, queue_size=10, latch=True)
     publisher.publish(String("x"))
     subscriber = RawSubscriber(Input("/raw/other", rospy.AnyMsg, lambda _message: None, garbage.append, BUFFER_BYTES))
-    wait_until(lambda: bool(garbage), timeout_s=15.0, what="told")
+    until(lambda: bool(garbage), what="told")
     assert garbage[0] == "/raw/other carries std_msgs/String, expected *"
     subscriber.close()
     publisher.unregister()

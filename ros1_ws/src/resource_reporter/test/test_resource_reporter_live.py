@@ -13,7 +13,7 @@ rospy = pytest.importorskip("rospy")
 from skillset_interfaces.msg import ResourceState, ResourceStates  # noqa: E402
 from skillset_interfaces.srv import Transition, TransitionRequest, TransitionResponse  # noqa: E402
 
-from alula_testing.ros1 import wait_until  # noqa: E402
+from alula_testing.waits import until  # noqa: E402
 from resource_reporter import ResourceReporter  # noqa: E402
 from resource_reporter.calls import publisher  # noqa: E402
 
@@ -81,7 +81,7 @@ def reporter(ros_master: str) -> Iterator[ResourceReporter]:
 
 
 def becomes(skillset: Skillset, state: str) -> None:
-    wait_until(lambda: skillset.state == state, timeout_s=5.0, what=f"the resource is {state}")
+    until(lambda: skillset.state == state, what=f"the resource is {state}")
 
 
 def test_reports_within_milliseconds_once_connected(skillset, reporter):
@@ -122,7 +122,7 @@ def test_a_refused_state_does_not_stand_in_the_way_of_the_next(skillset, reporte
     reporter.report("zed_status", "OK")
     becomes(skillset, "OK")
     reporter.report("zed_status", "UNKNOWN")
-    wait_until(lambda: [to for _, to in skillset.calls].count("UNKNOWN") >= 3, timeout_s=5.0, what="it is tried again")
+    until(lambda: [to for _, to in skillset.calls].count("UNKNOWN") >= 3, what="it is tried again")
     reporter.report("zed_status", "BROKEN")
     becomes(skillset, "BROKEN")
 
@@ -131,10 +131,10 @@ def test_a_hanging_service_blocks_no_caller(skillset, reporter):
     skillset.hangs = threading.Event()
     skillset.serve()
     reporter.report("zed_status", "OK")
-    wait_until(lambda: len(skillset.calls) == 1, timeout_s=5.0, what="it is called")
+    until(lambda: len(skillset.calls) == 1, what="it is called")
     reporter.report("zed_status", "BROKEN")
     assert len(skillset.calls) == 1, "the first call still hangs"
-    wait_until(lambda: len(skillset.calls) >= 2, timeout_s=4.0, what="it is called again after two seconds")
+    until(lambda: len(skillset.calls) >= 2, what="it is called again after two seconds")
     skillset.hangs.set()
     becomes(skillset, "BROKEN")
 
@@ -142,12 +142,12 @@ def test_a_hanging_service_blocks_no_caller(skillset, reporter):
 def test_reasons_travel_with_the_states_and_follow_when_they_change(skillset, reporter):
     skillset.serve()
     reporter.report("zed_status", "UNKNOWN", "no images on /left", insist=False)
-    wait_until(lambda: skillset.reason == "no images on /left", timeout_s=5.0, what="the reason of the first state is shown")
+    until(lambda: skillset.reason == "no images on /left", what="the reason of the first state is shown")
     reporter.report("zed_status", "BROKEN", "the lens is covered")
     becomes(skillset, "BROKEN")
     assert skillset.reason == "the lens is covered"
     reporter.report("zed_status", "BROKEN", "no measurement for 0.35 s")
-    wait_until(lambda: skillset.reason == "no measurement for 0.35 s", timeout_s=5.0, what="the other reason is shown")
+    until(lambda: skillset.reason == "no measurement for 0.35 s", what="the other reason is shown")
     told = len(skillset.calls)
     reporter.report("zed_status", "OK")
     becomes(skillset, "OK")
@@ -158,13 +158,13 @@ def test_what_waits_for_the_skillset_is_done_when_it_has_answered(skillset, repo
     done: list[str] = []
     skillset.hangs = threading.Event()
     skillset.serve()
-    wait_until(lambda: connected(reporter), timeout_s=5.0, what="the states are shown")
+    until(lambda: connected(reporter), what="the states are shown")
     reporter.report("zed_status", "OK")
     reporter.when_settled(lambda: done.append(skillset.state))
-    wait_until(lambda: len(skillset.calls) == 1, timeout_s=5.0, what="it is asked for")
+    until(lambda: len(skillset.calls) == 1, what="it is asked for")
     assert done == [], "the skillset does not know yet"
     skillset.hangs.set()
-    wait_until(lambda: done != [], timeout_s=5.0, what="it is done")
+    until(lambda: done != [], what="it is done")
     assert done == ["OK"]
     reporter.when_settled(lambda: done.append("at once"))
     assert done == ["OK", "at once"]
@@ -179,12 +179,12 @@ def test_nothing_waits_for_a_skillset_that_is_not_there(reporter):
 
 def test_what_waits_for_a_skillset_that_has_gone_is_done(skillset, reporter):
     done: list[str] = []
-    wait_until(lambda: connected(reporter), timeout_s=5.0, what="the states are shown")
+    until(lambda: connected(reporter), what="the states are shown")
     reporter.report("zed_status", "OK")  # nobody serves it
     reporter.when_settled(lambda: done.append("done"))
     assert done == []
     skillset.close()
-    wait_until(lambda: done == ["done"], timeout_s=5.0, what="it is done")
+    until(lambda: done == ["done"], what="it is done")
 
 
 def connected(reporter: ResourceReporter) -> bool:

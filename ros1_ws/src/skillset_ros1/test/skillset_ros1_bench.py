@@ -11,16 +11,12 @@ from navigation_managers.hooks import ABSTRACT_HOOKS
 from navigation_managers.model import SKILLSET
 
 from alula.runtime.hooks import SkillHooks
-from alula_testing import waits
 from alula_testing.recorder import Recorder
+from alula_testing.waits import until
 from skillset_ros1 import SkillsetClient, SkillsetManagers
 
 SOON_S = 30.0
 NUMBERS = itertools.count()
-
-
-def until(condition, what: str, timeout_s: float = SOON_S) -> None:
-    waits.until(condition, what, timeout_s)
 
 
 class Pausing(Recorder):

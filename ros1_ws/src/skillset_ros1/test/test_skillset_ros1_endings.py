@@ -12,9 +12,10 @@ from pathlib import Path
 import pytest
 import rospy
 from skillset_interfaces.srv import Transition
-from skillset_ros1_bench import SOON_S, until
+from skillset_ros1_bench import SOON_S
 
 from alula.model.execution_state import ExecutionState
+from alula_testing.waits import until
 from skillset_ros1 import SkillsetClient
 
 S = ExecutionState

@@ -15,13 +15,14 @@ from navigation_managers.client import NavigationClient
 from navigation_managers.inputs import GotoStraightInputs
 from skillset_interfaces.msg import Event
 from skillset_interfaces.srv import Describe, GetData, TriggerEvent, Why
-from skillset_ros1_bench import SOON_S, Navigation, on_thread, until
+from skillset_ros1_bench import SOON_S, Navigation, on_thread
 from uav_msgs.msg import GuidanceState
 
 from alula.model.execution_state import ExecutionState
 from alula.model.json_form import from_json
 from alula.runtime.waiting import CannotWaitError
 from alula_testing.navigation import FLYING, check_interrupt_and_violation, check_refusals
+from alula_testing.waits import until
 from skillset_ros1.actions import RESULTS_KEPT
 
 S = ExecutionState

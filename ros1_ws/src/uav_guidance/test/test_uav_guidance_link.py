@@ -9,7 +9,7 @@ from collections.abc import Callable, Iterator
 import pytest
 from pymavlink.dialects.v20 import ardupilotmega as mavlink
 
-from alula_testing.ros1 import wait_until
+from alula_testing.waits import until
 from uav_guidance.encoding import heartbeat_message
 from uav_guidance.link import Link
 
@@ -58,7 +58,7 @@ def test_udp_of_a_vehicle_that_sends_to_us(peer):
     ear = Ear(f"udpin:127.0.0.1:{port}")
     assert ear.connected.acquire(timeout=5.0)
     peer.sendto(frame(STATION, 1) + b"\x00noise" + frame(AUTOPILOT, 4), ("127.0.0.1", port))
-    wait_until(lambda: ear.modes == [4], timeout_s=5.0, what="the autopilot's heartbeat only")
+    until(lambda: ear.modes == [4], what="the autopilot's heartbeat only")
     ear.link.send(heartbeat_message())
     heard = mavlink.MAVLink(None).parse_buffer(peer.recv(300))[0]
     assert (heard.get_srcSystem(), heard.get_srcComponent(), heard.type) == (1, 191, mavlink.MAV_TYPE_ONBOARD_CONTROLLER)
@@ -68,7 +68,7 @@ def test_udp_of_a_vehicle_that_sends_to_us(peer):
 def test_udp_towards_a_vehicle(peer):
     ear = Ear(f"udpout:127.0.0.1:{peer.getsockname()[1]}")
     peer.sendto(frame(AUTOPILOT, 9), reached(ear, peer))
-    wait_until(lambda: ear.modes == [9], timeout_s=5.0, what="the answer")
+    until(lambda: ear.modes == [9], what="the answer")
     ear.link.close()
 
 
@@ -87,7 +87,7 @@ def test_tcp_that_is_not_there_yet_and_goes_away():
                 data = frame(AUTOPILOT, mode)
                 client.sendall(data[:half])
                 client.sendall(data[half:])
-                wait_until(lambda mode=mode: ear.modes[-1:] == [mode], timeout_s=5.0, what="a heartbeat")
+                until(lambda mode=mode: ear.modes[-1:] == [mode], what="a heartbeat")
     assert ear.modes == [4, 5]
     ear.link.close()
 
@@ -98,7 +98,7 @@ def test_a_message_that_can_not_be_dealt_with_does_not_end_the_link(peer):
     # What was cut short takes its missing bytes from the one behind it; both are lost.
     for data in (frame(AUTOPILOT, 1), frame(AUTOPILOT, 2)[:-4], frame(AUTOPILOT, 3), frame(AUTOPILOT, 4)):
         peer.sendto(data, address)
-    wait_until(lambda: ear.modes == [1, 4], timeout_s=5.0, what="a message behind those that raised and that were cut short")
+    until(lambda: ear.modes == [1, 4], what="a message behind those that raised and that were cut short")
     assert ear.idle.acquire(timeout=5.0)
     ear.link.close()
 

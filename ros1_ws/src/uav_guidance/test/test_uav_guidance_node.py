@@ -34,7 +34,8 @@ from uav_msgs.srv import (  # noqa: E402
     Takeoff,
 )
 
-from alula_testing.ros1 import NODE_UP_S, StartNode, end_process, wait_until  # noqa: E402
+from alula_testing.ros1 import StartNode, end_process  # noqa: E402
+from alula_testing.waits import HANGS_S, until  # noqa: E402
 from perception_core.testing import framed, send_raw  # noqa: E402
 
 SOURCES = Path(__file__).resolve().parents[2]
@@ -72,7 +73,7 @@ class Bench:
         rospy.set_param("/uav_guidance", {"url": self.autopilot.url})
         self.node = self.run_node()
         # The clock starts late, as it does when the simulator takes longer to come up than the node.
-        rospy.wait_for_service("/uav_guidance/check_fence", timeout=NODE_UP_S)
+        rospy.wait_for_service("/uav_guidance/check_fence", timeout=HANGS_S)
         self.autopilot.start()
 
     def run_node(self) -> subprocess.Popen[bytes]:
@@ -86,11 +87,11 @@ class Bench:
     def state(self) -> GuidanceState:
         return self.states[-1] if self.states else GuidanceState()
 
-    def until(self, condition: Callable[[GuidanceState], bool], what: str, timeout_s: float = 60.0) -> None:
-        wait_until(lambda: bool(self.states) and condition(self.state), timeout_s=timeout_s, what=what)
+    def until(self, condition: Callable[[GuidanceState], bool], what: str, timeout_s: float = HANGS_S) -> None:
+        until(lambda: bool(self.states) and condition(self.state), timeout_s=timeout_s, what=what)
 
     def call(self, name: str, kind: type, *arguments: object) -> object:
-        rospy.wait_for_service(f"/uav_guidance/{name}", timeout=NODE_UP_S)
+        rospy.wait_for_service(f"/uav_guidance/{name}", timeout=HANGS_S)
         return rospy.ServiceProxy(f"/uav_guidance/{name}", kind)(*arguments)
 
     def take_off(self, height_m: float = 3.0) -> None:
@@ -215,7 +216,7 @@ def test_whole_mission_leaves_the_golden_transcript(bench):
         ("setpoints", "0x9f8", 2),
         ("MAV_CMD_DO_SET_MODE", 1.0, LAND, 0.0),
     ]
-    wait_until(lambda: bench.resources["flight_status"] == "ON_GROUND", timeout_s=60.0, what="the skillset knows of the landing")
+    until(lambda: bench.resources["flight_status"] == "ON_GROUND", what="the skillset knows of the landing")
     assert [state for name, state in bench.transitions if name == "flight_status"] == ["IN_AIR", "ON_GROUND"]
     assert ("SDK_authority", "AVAILABLE") in bench.transitions
     assert ("homepoint_status", "VALID") in bench.transitions
@@ -228,7 +229,7 @@ def test_pilot_takes_over_and_nothing_is_taken_back(bench):
     bench.until(lambda s: s.position_enu_m.x > 1.0, "under way")
     bench.autopilot.pilot(LOITER)
     bench.until(lambda s: not s.authority and s.reference == "idle" and s.mode == "LOITER", "taken over")
-    wait_until(lambda: bench.resources["SDK_authority"] == "UNAVAILABLE", timeout_s=60.0, what="the skillset knows it")
+    until(lambda: bench.resources["SDK_authority"] == "UNAVAILABLE", what="the skillset knows it")
     sent = len(bench.autopilot.transcript)
     before_s = bench.autopilot.now_s
     refused = bench.call("set_position", SetPositionReference, Point(1.0, 0.0, 3.0), 1.5, KEEP)
@@ -264,9 +265,7 @@ def test_parameters_are_changed_in_flight_and_refused_out_of_range(bench):
     bench.until(lambda s: s.home_valid, "home is known")
     assert client.update_configuration({"fence_radius_m": 10.0})["fence_radius_m"] == 10.0
     assert "20.0 m from home, at most 10 m" in bench.call("check_fence", CheckFence, Point(20.0, 0.0, 3.0)).reason
-    wait_until(
-        lambda: any(p.value == 10.0 for c in told for p in c.doubles if p.name == "fence_radius_m"), timeout_s=60.0, what="it is told"
-    )
+    until(lambda: any(p.value == 10.0 for c in told for p in c.doubles if p.name == "fence_radius_m"), what="it is told")
     with pytest.raises(rospy.ServiceException, match=r"~max_speed_m_s is 3\.5, expected 0\.1 to 3 "):
         bench.call("set_parameters", Reconfigure, encode_config({"max_speed_m_s": 3.5, "fence_radius_m": 50.0}))
     assert rospy.get_param("/uav_guidance/fence_radius_m") == 10.0
@@ -298,7 +297,7 @@ def test_reconnects_and_asks_for_its_streams_again(bench):
     bench.take_off()
     bench.autopilot.drop_client()
     poses = len(bench.poses)
-    wait_until(lambda: len(bench.poses) > poses + 20, timeout_s=60.0, what="poses arrive again")
+    until(lambda: len(bench.poses) > poses + 20, what="poses arrive again")
     bench.until(lambda s: s.authority and s.landed_state == 2, "it still flies")
 
 
@@ -311,7 +310,7 @@ def test_what_it_is_done_with_is_told_whether_the_autopilot_speaks_or_not(bench)
     for change in (lambda: None, autopilot.drop_client, autopilot.forget_streams, autopilot.close_port, autopilot.open_port):
         change()
         begin_s = bench.autopilot.now_s
-        wait_until(lambda begin_s=begin_s: done[-1] > begin_s + 2.0, timeout_s=60.0, what="two seconds are done with")
+        until(lambda begin_s=begin_s: done[-1] > begin_s + 2.0, what="two seconds are done with")
     assert all(a < b for a, b in pairwise(done)), done
     listener.unregister()
 
@@ -337,7 +336,7 @@ def test_flies_by_the_map_and_its_pose_stays_the_autopilots(bench, mapping):
     answer = bench.call("set_position", SetPositionReference, Point(6.0, 0.0, 3.0), 1.5, KEEP)
     bench.until(lambda s: s.reference_id == answer.reference_id and s.distance_to_go_m < 0.1, "at the place of the map")
     bench.until(lambda _: abs(mapping.guidance_map.y + 0.8) < 0.001, "the correction is followed to its end")
-    wait_until(lambda: bench.autopilot.enu == pytest.approx((6.0, -0.8, 3.0), abs=0.15), timeout_s=60.0, what="there")
+    until(lambda: bench.autopilot.enu == pytest.approx((6.0, -0.8, 3.0), abs=0.15), what="there")
     assert bench.state.position_enu_m.y == pytest.approx(0.0, abs=0.15)
     assert bench.poses[-1].pose.position.y == pytest.approx(-0.8, abs=0.15)
     assert (bench.state.header.frame_id, bench.poses[-1].header.frame_id) == ("map", "odom")

@@ -13,7 +13,7 @@ from sensor_msgs.msg import Image, PointCloud2
 from std_srvs.srv import SetBool
 from uav_msgs.msg import Obstacle, SensorHealth
 
-from alula_testing.ros1 import NODE_UP_S, wait_until
+from alula_testing.waits import HANGS_S, until
 from perception_core import NS
 from perception_core.clouds import sweep_of_cloud
 from perception_core.testing import Expected, FakeFlight, check_fault, wall_pair
@@ -70,8 +70,8 @@ class Camera:
 def flight(ros_master, start_node):
     with FakeFlight("zed_depth") as fake:
         start_node([NODE, "_enabled:=false"])
-        wait_until(fake.connected, timeout_s=NODE_UP_S, what="/zed_depth is up")
-        rospy.wait_for_service("/zed_depth/enable", timeout=NODE_UP_S)
+        until(fake.connected, what="/zed_depth is up")
+        rospy.wait_for_service("/zed_depth/enable", timeout=HANGS_S)
         yield fake
 
 

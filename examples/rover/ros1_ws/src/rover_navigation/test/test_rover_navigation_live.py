@@ -10,7 +10,7 @@ import actionlib
 import pytest
 import rospy
 from actionlib_msgs.msg import GoalStatus
-from alula_testing.ros1 import wait_until
+from alula_testing.waits import until
 from move_base_msgs.msg import MoveBaseAction, MoveBaseGoal
 from nav_msgs.msg import OccupancyGrid, Odometry
 from std_msgs.msg import String
@@ -35,7 +35,7 @@ class Layer:
     def client(self, name):
         if name not in self._clients:
             self._clients[name] = actionlib.SimpleActionClient(name, MoveBaseAction)
-            wait_until(lambda: self._clients[name].wait_for_server(rospy.Duration.from_sec(0.1)), timeout_s=UP_S, what=f"a server {name}")
+            until(lambda: self._clients[name].wait_for_server(rospy.Duration.from_sec(0.1)), what=f"a server {name}")
         return self._clients[name]
 
     def send(self, name, x=0.0, y=0.0, yaw=0.0):
@@ -50,7 +50,7 @@ class Layer:
 
     def drive(self, name, *pose):
         client = self.send(name, *pose)
-        wait_until(lambda: client.get_state() not in {GoalStatus.PENDING, GoalStatus.ACTIVE}, timeout_s=DRIVE_S, what=f"{name} ends")
+        until(lambda: client.get_state() not in {GoalStatus.PENDING, GoalStatus.ACTIVE}, timeout_s=DRIVE_S, what=f"{name} ends")
         return client.get_state(), client.get_goal_status_text()
 
     def distance_m(self, x, y):
@@ -65,7 +65,7 @@ def start_layer(ros_master, start_node):
     def start(*arguments):
         start_node(["roslaunch", str(LAUNCH), f"world:={WORLD}", "rate:=0", *arguments])
         layer = Layer()
-        wait_until(lambda: layer.truth is not None and layer.state.get("t_s", 0.0) > 0.5, timeout_s=UP_S, what="simulated time begins")
+        until(lambda: layer.truth is not None and layer.state.get("t_s", 0.0) > 0.5, what="simulated time begins")
         return layer
 
     return start
@@ -78,16 +78,16 @@ def test_stock_clients_drive_it_through_doors_and_onto_the_dock(start_layer):
 
     # The newest goal counts, also of another action; a goal that is cancelled stops the rover.
     first = layer.send("move_base", 14.5, 5.4, math.pi)
-    wait_until(lambda: layer.distance_m(0.57, 5.4) > 1.0, timeout_s=DRIVE_S, what="a metre driven")
+    until(lambda: layer.distance_m(0.57, 5.4) > 1.0, timeout_s=DRIVE_S, what="a metre driven")
     client = layer.send("follow_corridor", 14.5, 5.4, math.pi)
-    wait_until(lambda: first.get_state() == GoalStatus.PREEMPTED, timeout_s=DRIVE_S, what="preempted by another goal")
+    until(lambda: first.get_state() == GoalStatus.PREEMPTED, timeout_s=DRIVE_S, what="preempted by another goal")
     assert first.get_goal_status_text() == "another goal has come"
     assert client.get_state() in {GoalStatus.PENDING, GoalStatus.ACTIVE}
     client.cancel_goal()
-    wait_until(lambda: client.get_state() == GoalStatus.PREEMPTED, timeout_s=DRIVE_S, what="preempted")
+    until(lambda: client.get_state() == GoalStatus.PREEMPTED, timeout_s=DRIVE_S, what="preempted")
     from_m = layer.distance_m(0.57, 5.4)
     second_s = rospy.get_time() + 1.0
-    wait_until(lambda: rospy.get_time() > second_s, timeout_s=DRIVE_S, what="a second")
+    until(lambda: rospy.get_time() > second_s, timeout_s=DRIVE_S, what="a second")
     assert layer.distance_m(0.57, 5.4) - from_m < 0.3
     assert layer.feedback
 
@@ -101,7 +101,7 @@ def test_stock_clients_drive_it_through_doors_and_onto_the_dock(start_layer):
     assert "no way" in text or "stays in the way" in text
 
     assert layer.drive("dock") == (GoalStatus.SUCCEEDED, "charging")
-    wait_until(lambda: layer.state["charging"], timeout_s=UP_S, what="the truth says so, too")
+    until(lambda: layer.state["charging"], what="the truth says so, too")
     assert layer.state["collisions"] == 0
 
 
@@ -110,18 +110,18 @@ def test_carried_away_it_notices_and_finds_itself_by_turning(start_layer):
     health = []
     rospy.Subscriber("/health", String, lambda message: health.append(json.loads(message.data)))
     client = layer.send("move_base", 14.5, 5.4, math.pi)
-    wait_until(lambda: health and health[-1]["pose"] == "LOST", timeout_s=DRIVE_S, what="LOST")
+    until(lambda: health and health[-1]["pose"] == "LOST", timeout_s=DRIVE_S, what="LOST")
     client.cancel_goal()
 
     # A search that is stopped leaves the rover standing; the next one finds it.
     turning = lambda: abs(layer.truth.twist.twist.angular.z) > 0.3
     stopped = layer.send("localize")
-    wait_until(turning, timeout_s=DRIVE_S, what="it turns")
+    until(turning, timeout_s=DRIVE_S, what="it turns")
     stopped.cancel_goal()
-    wait_until(lambda: stopped.get_state() == GoalStatus.PREEMPTED and not turning(), timeout_s=DRIVE_S, what="it stands")
+    until(lambda: stopped.get_state() == GoalStatus.PREEMPTED and not turning(), timeout_s=DRIVE_S, what="it stands")
     status, told = layer.drive("localize")
     assert status == GoalStatus.SUCCEEDED, told
-    wait_until(lambda: health[-1]["pose"] == "GOOD", timeout_s=UP_S, what="GOOD")
+    until(lambda: health[-1]["pose"] == "GOOD", what="GOOD")
     assert rospy.ServiceProxy("/door/office/open", SetBool)(True).success
     assert layer.drive("move_base", 13.4, 8.8, 0.0) == (GoalStatus.SUCCEEDED, "arrived")
     assert layer.distance_m(13.4, 8.8) < 0.25
