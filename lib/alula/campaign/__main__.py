@@ -23,6 +23,7 @@ from alula.campaign.running import options_of, run
 from alula.campaign.table import ROWS, Row, Table
 from alula.campaign.telling import as_page, as_text
 from alula.common.files import write_json, write_text
+from alula.common.garbage import collect_seldom
 from alula.common.robots import RobotError
 from alula.common.runs import runs_folder
 from alula.common.scenarios import ScenarioError, load_scenario, scenario_names
@@ -113,6 +114,7 @@ def finish(campaign: Campaign, table: Table, out: Path, title: str, time_s: floa
 def main(arguments: Sequence[str] | None = None) -> int:
     """Do it; return the exit code."""
     given = parse(sys.argv[1:] if arguments is None else arguments)
+    collect_seldom()
     out = given.out or runs_folder() / f"campaign-{given.file.stem}"
     try:
         campaign = load_campaign(given.file)

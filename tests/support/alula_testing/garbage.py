@@ -4,12 +4,11 @@ from __future__ import annotations
 
 import gc
 
-THRESHOLDS = (10_000, 50, 10)
-"""How many objects are made before the youngest are looked at, and how many times that before the older ones."""
+from alula.common.garbage import collect_seldom
 
 
 def pytest_collection_finish() -> None:
     """Leave out what stays to the end, and look less often at what comes."""
     gc.collect()
     gc.freeze()
-    gc.set_threshold(*THRESHOLDS)
+    collect_seldom()
