@@ -85,6 +85,13 @@ def test_a_part_tells_its_progress_to_the_suite_and_knows_the_time_left_the_seco
     assert all(line.endswith(" s left") for line in lines())
 
 
+def test_an_expression_that_is_called_as_a_folder_is_selects_tests_and_no_part() -> None:
+    command = [ALULA_ROOT / "tests/run", "tests/test_manifests.py", "-k", "lib", "--collect-only"]
+    done = subprocess.run(command, capture_output=True, text=True, check=False)
+    assert [line for line in done.stdout.splitlines() if line.startswith("==")] == ["== across the rooms: tests/test_manifests.py =="]
+    assert "2 deselected" in done.stdout
+
+
 DPKG = """\
 #!/bin/sh
 sed 's/^/installed /' "{packages}"

@@ -18,11 +18,12 @@ from alula.campaign.coverage import Coverage, cover, processes
 from alula.campaign.failures import ways_to_fail
 from alula.campaign.mocked_scenarios import load_mocked_scenario
 from alula.campaign.plan import MOCKS, Campaign, load_campaign
-from alula.campaign.proved import proved
+from alula.campaign.proved import TIME_S, proved
 from alula.campaign.running import options_of, run
 from alula.campaign.table import ROWS, Row, Table
 from alula.campaign.telling import as_page, as_text
 from alula.common.files import write_json, write_text
+from alula.common.garbage import collect_seldom
 from alula.common.robots import RobotError
 from alula.common.runs import runs_folder
 from alula.common.scenarios import ScenarioError, load_scenario, scenario_names
@@ -43,6 +44,13 @@ def parse(arguments: Sequence[str]) -> argparse.Namespace:
     parser.add_argument("--out", type=Path, help="folder for the results (default: runs/campaign-NAME); an interrupted one continues there")
     parser.add_argument(
         "--dask", metavar="URL", help="use the workers of this Dask scheduler, such as tcp://host:8786 (default: this machine)"
+    )
+    parser.add_argument(
+        "--time",
+        type=float,
+        default=TIME_S,
+        metavar="SECONDS",
+        help=f"time limit for the proof of a mission's answers (default {TIME_S:g})",
     )
     return parser.parse_args(arguments)
 
@@ -75,14 +83,14 @@ class Teller:
             sys.stderr.flush()
 
 
-def answers_of(campaign: Campaign, rows: Sequence[Row]) -> list[MissionAnswers]:
+def answers_of(campaign: Campaign, rows: Sequence[Row], time_s: float) -> list[MissionAnswers]:
     """Return the answers of each mission of a campaign over mocks, flown beside proved; live runs don't tell theirs."""
     if campaign.over != MOCKS:
         return []
     found, models, effects = [], robot_skillsets(), effects_of_robot()
     for name in dict.fromkeys(campaign.scenarios):
         tell = partial(_tell_proof, name)
-        mission = proved(load_scenario(name), models, effects, tell)
+        mission = proved(load_scenario(name), models, effects, tell, time_s)
         found.append(beside(name, mission, [row for row in rows if row["scenario"] == name]))
     return found
 
@@ -91,12 +99,12 @@ def _tell_proof(scenario: str, progress: str) -> None:
     sys.stderr.write(f"looking at all runs of {scenario}: {progress}\n")
 
 
-def finish(campaign: Campaign, table: Table, out: Path, title: str) -> Coverage:
+def finish(campaign: Campaign, table: Table, out: Path, title: str, time_s: float) -> Coverage:
     """Order the table and write the coverage beside it."""
     table.finish()
     rows = [table.rows[number] for number in sorted(table.rows)]
     ways = ways_to_fail(robot_skillsets(), processes(map(load_scenario, scenario_names())))
-    coverage = cover(rows, ways, answers_of(campaign, rows))
+    coverage = cover(rows, ways, answers_of(campaign, rows, time_s))
     write_json(out / "coverage.json", coverage.as_dict())
     write_text(out / "coverage.txt", as_text(coverage))
     write_text(out / "coverage.html", as_page(coverage, title))
@@ -106,6 +114,7 @@ def finish(campaign: Campaign, table: Table, out: Path, title: str) -> Coverage:
 def main(arguments: Sequence[str] | None = None) -> int:
     """Do it; return the exit code."""
     given = parse(sys.argv[1:] if arguments is None else arguments)
+    collect_seldom()
     out = given.out or runs_folder() / f"campaign-{given.file.stem}"
     try:
         campaign = load_campaign(given.file)
@@ -115,7 +124,7 @@ def main(arguments: Sequence[str] | None = None) -> int:
         if table.rows:
             sys.stderr.write(f"{len(table.rows)} of {len(campaign.runs)} runs are in {out / ROWS}\n")
         run(campaign, table, out, Teller(len(campaign.runs), len(table.rows)), options, given.dask)
-        coverage = finish(campaign, table, out, f"Campaign {given.file.stem}")
+        coverage = finish(campaign, table, out, f"Campaign {given.file.stem}", given.time)
     except (AnalysisError, RobotError, ScenarioError) as error:
         sys.stderr.write(f"alula campaign: {error}\n")
         return CANNOT_START

@@ -27,7 +27,7 @@ from alula.records.tree import Path
 LOOKED_AT = Failures(aborts=False)
 """What can happen in a campaign: hooks may refuse and raise, too; nobody aborts, and processes of managers that die are not compared."""
 TIME_S = 120.0
-_BOUND = f"not all runs were looked at in {TIME_S:g} s"
+"""What the search has where nothing else is said, seconds of wall clock."""
 End = tuple[str, str]
 """State and result of an execution."""
 Asked = frozenset[Path]
@@ -77,21 +77,23 @@ class ProvedMission:
         return place, self.seen.get((place, end), end[1] or end[0]), moment
 
 
-def proved(scenario: Scenario, models: Sequence[Skillset], effects: EffectsByFault, tell: Callable[[str], None]) -> ProvedMission:
-    """Look at all runs of a scenario's mission; ``tell`` hears now and then how far a long search is."""
+def proved(
+    scenario: Scenario, models: Sequence[Skillset], effects: EffectsByFault, tell: Callable[[str], None], time_s: float = TIME_S
+) -> ProvedMission:
+    """Look at all runs of a scenario's mission within a time; ``tell`` hears now and then how far a long search is."""
     if not scenario.mission.endswith(".xml"):
         return ProvedMission(unproved=f"{scenario.mission} is no file of a tree")
-    deadline = Deadline.after(TIME_S, tell)
+    deadline = Deadline.after(time_s, tell)
     try:
         robot = find_robot()
         path = robot.root / scenario.mission
         system = System.read(path, models, robot.part("missions") or NO_PART, LOOKED_AT, deadline)
         regions = Regions(system, deadline)
-        unproved = _explored(regions)
+        unproved = _explored(regions, time_s)
     except (UndecidedError, InputError, RobotError) as error:
         return ProvedMission(unproved=f"its runs can't be looked at: {error}")
     except OutOfTimeError:
-        return ProvedMission(unproved=_BOUND)
+        return ProvedMission(unproved=_bound(time_s))
     found: dict[Key, ProvedAnswer] = {}
     for row in Answers(regions).rows:
         one = _answer(system, row, effects)
@@ -105,13 +107,17 @@ def proved(scenario: Scenario, models: Sequence[Skillset], effects: EffectsByFau
     return ProvedMission(found, unproved, seen)
 
 
-def _explored(regions: Regions) -> str:
+def _explored(regions: Regions, time_s: float) -> str:
     """Find all regions; return why there may be more."""
     try:
         regions.explore()
     except OutOfTimeError:
-        return _BOUND
+        return _bound(time_s)
     return ""
+
+
+def _bound(time_s: float) -> str:
+    return f"not all runs were looked at in {time_s:g} s"
 
 
 def _both(one: ProvedAnswer, other: ProvedAnswer) -> ProvedAnswer:

@@ -16,6 +16,7 @@ from functools import partial
 from time import monotonic
 
 from alula.commands.check_missions import SUFFIX, check_missions, prove_missions
+from alula.common.garbage import collect_seldom
 from alula.common.robots import RobotError, RobotFolder, find_robot
 from alula.language.check.fields import check_fields
 from alula.language.errors import Diagnostic, Severity, has_errors, render
@@ -43,6 +44,7 @@ def _models_of(robot: RobotFolder) -> list[str]:
 def main(arguments: Sequence[str] | None = None) -> int:
     """Check the files named on the command line; return the exit code."""
     options = _parser().parse_args(arguments)
+    collect_seldom()
     if options.play is not None:
         from alula.commands import play  # it takes the counterexamples from here
 

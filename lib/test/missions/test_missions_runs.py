@@ -245,17 +245,6 @@ def test_a_long_search_says_how_far_it_is() -> None:
     assert "groups a second" in said[9]
 
 
-@pytest.mark.parametrize("name", ["mapping", "inspection"])
-def test_the_drones_missions_keep_the_axes_as_listing_3_does(name: str) -> None:
-    proved = drones(name, Deadline.after(1e6))
-    assert proved.complete
-    assert proved.findings == []
-    (finding,) = proved.accepted
-    assert finding.code == "ALU701"
-    assert "`navigation.land`" in finding.message
-    assert "axes_authority == USED" in finding.message
-
-
 def test_a_tree_that_says_that_it_gives_up_has_an_answer() -> None:
     broken = EXAMPLES["ALU702"].broken
     assert found_in(f'<Fallback>{broken}<AlwaysFailure name="given up"/></Fallback>') == []

@@ -11,7 +11,6 @@ import pytest
 
 pytest.importorskip("z3")
 
-from alula.campaign import proved as proving
 from alula.campaign.__main__ import main
 from alula.campaign.beside import NOTHING, MissionAnswers, beside
 from alula.campaign.coverage import Coverage
@@ -40,7 +39,7 @@ def campaign(folder: Path, out: str = "out") -> int:
     """Do one in a folder."""
     shutil.copy(ROOT / "tests/campaigns/uav-failing.yaml", folder / "failing.yaml")
     (folder / "campaign.yaml").write_text(FAULTS, encoding="utf-8")
-    return main([str(folder / "campaign.yaml"), "--out", str(folder / out)])
+    return main([str(folder / "campaign.yaml"), "--out", str(folder / out), "--time", "1e6"])
 
 
 def another_robot(folder: Path) -> Path:
@@ -60,7 +59,6 @@ def another_robot(folder: Path) -> Path:
 def test_all_answers_of_flights_are_proved_and_those_of_another_tree_are_errors(
     tmp_path: Path, capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    monkeypatch.setattr(proving, "TIME_S", 1e6)
     assert campaign(tmp_path) == 0, capsys.readouterr().err
     said = capsys.readouterr()
     told = json.loads((tmp_path / "out/coverage.json").read_text(encoding="utf-8"))
@@ -123,11 +121,10 @@ def answers_of(mission: ProvedMission) -> MissionAnswers:
     return beside("mapping", mission, rows_of([PlannedRun(0, "mapping", 0, ("zed@10",))], MOCKS, (), ""))
 
 
-def test_a_proof_that_is_not_whole_makes_no_error(monkeypatch: pytest.MonkeyPatch) -> None:
+def test_a_proof_that_is_not_whole_makes_no_error() -> None:
     assert len(answers_of(ProvedMission()).unknown) == 1
-    monkeypatch.setattr(proving, "TIME_S", 0.0)
-    answers = answers_of(proved(load_scenario("mapping"), robot_skillsets(), effects_of_robot(), print))
-    assert answers.unproved == "not all runs were looked at in 120 s"
+    answers = answers_of(proved(load_scenario("mapping"), robot_skillsets(), effects_of_robot(), print, 0.0))
+    assert answers.unproved == "not all runs were looked at in 0 s"
     assert answers.unknown == []
     coverage = Coverage([], 1, {"degraded": 1}, [], [answers])
     assert coverage.unknown == []

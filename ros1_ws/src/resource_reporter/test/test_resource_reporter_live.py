@@ -158,7 +158,7 @@ def test_what_waits_for_the_skillset_is_done_when_it_has_answered(skillset, repo
     done: list[str] = []
     skillset.hangs = threading.Event()
     skillset.serve()
-    until(lambda: connected(reporter), what="the states are shown")
+    until(lambda: heard(reporter), what="the states are shown")
     reporter.report("zed_status", "OK")
     reporter.when_settled(lambda: done.append(skillset.state))
     until(lambda: len(skillset.calls) == 1, what="it is asked for")
@@ -179,7 +179,7 @@ def test_nothing_waits_for_a_skillset_that_is_not_there(reporter):
 
 def test_what_waits_for_a_skillset_that_has_gone_is_done(skillset, reporter):
     done: list[str] = []
-    until(lambda: connected(reporter), what="the states are shown")
+    until(lambda: heard(reporter), what="the states are shown")
     reporter.report("zed_status", "OK")  # nobody serves it
     reporter.when_settled(lambda: done.append("done"))
     assert done == []
@@ -187,6 +187,6 @@ def test_what_waits_for_a_skillset_that_has_gone_is_done(skillset, reporter):
     until(lambda: done == ["done"], what="it is done")
 
 
-def connected(reporter: ResourceReporter) -> bool:
-    """Tell whether the reporter hears the skillset: from then on it waits for it."""
-    return bool(reporter._subscriber.get_num_connections())
+def heard(reporter: ResourceReporter) -> bool:
+    """Tell whether the reporter has heard the skillset: from then on it waits for it. rospy counts a connection before it is made."""
+    return bool(reporter._ledger._actual)
