@@ -57,14 +57,17 @@ def _to_ends(regions: Regions, number: int, edge: Edge) -> Iterator[tuple[list[E
 
 
 def _followed(one: Regions, graph: Graph, other: Graph) -> list[frozenset[int]]:
-    """Return for each region of the first where the other can be there."""
+    """Return for each region of the first where the other can be there; it stays where it is while the first asks for nothing."""
     followed: list[frozenset[int]] = [frozenset({0})]
     for number in range(1, len(one.regions)):
         origin = one.regions[number].origin
         assert origin is not None  # noqa: S101 - only the first has none
         before, ticked = origin
         there = [edge for edge in graph.edges[before] if edge.target == number and edge.way in ticked.ways]
-        after = {edge.target for at in followed[before] for edge in other.edges[at] if any(mine.like(edge) for mine in there)}
+        after: set[int] = set()
+        for at in followed[before]:
+            alike = {edge.target for edge in other.edges[at] if any(mine.like(edge) for mine in there)}
+            after |= alike or ({at} if any(mine.quiet for mine in there) else set())
         followed.append(frozenset(after))
     return followed
 

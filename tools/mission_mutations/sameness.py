@@ -24,7 +24,7 @@ from alula.missions.filed.skills import SkillNode
 from alula.prove.mission.accepted import DESCRIPTION
 from alula.prove.mission.oracle import Answer, Question
 from alula.prove.mission.reading import scripts_of
-from alula.prove.mission.regions import Closure, Regions, Sets
+from alula.prove.mission.regions import Closure, Region, Regions, Sets
 from alula.prove.mission.state import Event
 from alula.prove.mission.system import System
 from alula.prove.mission.ticking import TICK, Outcome
@@ -45,8 +45,8 @@ class Edge:
     """A tick.
 
     ``target``: the region after it; ``asked``: what it asks for, and how the mission has ended after it; ``choices``: what nobody knows,
-    with the answers; ``sets``: the managers of each skillset with which it is taken; ``shows``: the number of all else that it shows.
-    ``way`` is the tick itself.
+    with the answers; ``sets``: the managers of each skillset with which it is taken; ``shows``: the number of all else that it shows;
+    ``quiet``: it asks for nothing, and the mission neither begins nor ends. ``way`` is the tick itself.
     """
 
     target: int
@@ -54,6 +54,7 @@ class Edge:
     asked: Hashable
     choices: Mapping[Question, Answer]
     sets: Products
+    quiet: bool
     way: tuple[Outcome, Sets]
 
     def like(self, other: Edge) -> bool:
@@ -147,13 +148,15 @@ class Seen:
             moves.append(
                 {key: one for place, known in enumerate(region.closures) for key, one in self._known(place, known, over=over).items()}
             )
-            edges.append(tuple(self._edge(target, ticked.act, way) for target, ticked in region.next for way in ticked.ways))
+            edges.append(tuple(self._edge(region, target, ticked.act, way) for target, ticked in region.next for way in ticked.ways))
         return Graph(tuple(edges), tuple(moves))
 
-    def _edge(self, target: int, act: str, way: tuple[Outcome, Sets]) -> Edge:
+    def _edge(self, region: Region, target: int, act: str, way: tuple[Outcome, Sets]) -> Edge:
         outcome, sets = way
         chosen = {one.question: one.answer for one in outcome.choices}
-        return Edge(target, self.tick(outcome), (act, *self._asked(outcome)), chosen, self.common(sets), way)
+        asked = self._asked(outcome)
+        quiet = asked == ((), (), self._system.ticker.memories[region.memory].started, None)
+        return Edge(target, self.tick(outcome), (act, *asked), chosen, self.common(sets), quiet, way)
 
     def _asked(self, outcome: Outcome) -> tuple[Hashable, ...]:
         requests = tuple(tuple(self._keys[leaf] for leaf in leaves) for leaves in (outcome.started, outcome.interrupted))

@@ -139,6 +139,30 @@ def test_a_round_that_is_counted_before_it_is_done_is_told_by_the_missions_accou
     assert "'rounds': 0.0} becomes" in one.told
 
 
+SEES = ROBOT.replace("skill hover {", "skill hover {\n    progress 0.5")
+SEEING = """<Fallback>
+  <Parallel success_count="1" failure_count="1">
+    <drone.hover/>
+    <Sequence>
+      <WaitFor name="it sees" if="progress(drone.hover) &gt;= 1"/>
+      <WaitFor name="ours" if="drone.control == OURS"/>
+    </Sequence>
+  </Parallel>
+  <drone.land/>
+</Fallback>"""
+
+
+def test_what_is_waited_for_in_another_order_is_told_apart_where_it_may_be_over_again(tmp_path: Path) -> None:
+    """One of both asks a question that the other does not ask there; the flight of both is told the answer that tells them apart."""
+    (sees,) = check_texts([ModelFile("robot.rl", SEES)])[0].skillsets
+    assert sees.skill("hover").progress is not None
+    (tmp_path / "example.xml").write_text(whole(SEEING))
+    judge = Judge(Robot(tmp_path, (sees,), NO_PART, {}), "example")
+    swapped = next(text for kind, what, text in trees.altered(whole(SEEING)) if kind == trees.CHILDREN_SWAPPED and "'Sequence'" in what)
+    one = judge.judge(Mutant("example", "by hand", "", "example.xml", swapped))
+    assert (one.verdict, one.by, one.flown) == (FOUND, ANOTHER_RUN, True), one
+
+
 NEEDING = whole("""<root BTCPP_format="4" main_tree_to_execute="mission">
 <BehaviorTree ID="mission"><Fallback><drone.hover/><drone.land/></Fallback></BehaviorTree>
 <BehaviorTree ID="ready"><Sequence>
