@@ -139,13 +139,21 @@ def test_a_round_that_is_counted_before_it_is_done_is_told_by_the_missions_accou
     assert "'rounds': 0.0} becomes" in one.told
 
 
-SEES = ROBOT.replace("skill hover {", "skill hover {\n    progress 0.5")
-SEEING = """<Fallback>
+SENSES = """
+skillset drone {
+  resource control { state { OURS THEIRS } initial OURS transition { extern OURS -> THEIRS  extern THEIRS -> OURS } }
+  skill see { progress 0.5  invariant { ours { guard control == OURS } }  success DONE }
+  skill hear { progress 0.5  invariant { ours { guard control == OURS } }  success DONE }
+  skill land { success DONE }
+}
+"""
+SENSING = """<Fallback>
   <Parallel success_count="1" failure_count="1">
-    <drone.hover/>
+    <drone.see/>
+    <drone.hear/>
     <Sequence>
-      <WaitFor name="it sees" if="progress(drone.hover) &gt;= 1"/>
-      <WaitFor name="ours" if="drone.control == OURS"/>
+      <WaitFor name="it sees" if="progress(drone.see) &gt;= 1"/>
+      <WaitFor name="it hears" if="progress(drone.hear) &gt;= 1"/>
     </Sequence>
   </Parallel>
   <drone.land/>
@@ -154,11 +162,10 @@ SEEING = """<Fallback>
 
 def test_what_is_waited_for_in_another_order_is_told_apart_where_it_may_be_over_again(tmp_path: Path) -> None:
     """One of both asks a question that the other does not ask there; the flight of both is told the answer that tells them apart."""
-    (sees,) = check_texts([ModelFile("robot.rl", SEES)])[0].skillsets
-    assert sees.skill("hover").progress is not None
-    (tmp_path / "example.xml").write_text(whole(SEEING))
-    judge = Judge(Robot(tmp_path, (sees,), NO_PART, {}), "example")
-    swapped = next(text for kind, what, text in trees.altered(whole(SEEING)) if kind == trees.CHILDREN_SWAPPED and "'Sequence'" in what)
+    (senses,) = check_texts([ModelFile("robot.rl", SENSES)])[0].skillsets
+    (tmp_path / "example.xml").write_text(whole(SENSING))
+    judge = Judge(Robot(tmp_path, (senses,), NO_PART, {}), "example")
+    swapped = next(text for kind, what, text in trees.altered(whole(SENSING)) if kind == trees.CHILDREN_SWAPPED and "'Sequence'" in what)
     one = judge.judge(Mutant("example", "by hand", "", "example.xml", swapped))
     assert (one.verdict, one.by, one.flown) == (FOUND, ANOTHER_RUN, True), one
 
