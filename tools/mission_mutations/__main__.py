@@ -1,24 +1,25 @@
-"""Prints what `check` makes of altered missions: ``setup/in_ros2 python -m mission_mutations [--count N] [--seed N] [--json FILE]``."""
+"""Prints what `check`, or a campaign, makes of altered missions: ``setup/in_ros2 python -m mission_mutations [--count N] [--seed N]``."""
 
 from __future__ import annotations
 
 import argparse
-import json
 import sys
 import traceback
 from collections.abc import Iterator, Sequence
-from concurrent.futures import ProcessPoolExecutor
-from functools import cache
+from functools import cache, partial
 from pathlib import Path
 
+from alula.campaign.plan import load_campaign
 from alula.commands.check_missions import faults_of
 from alula.commands.mission_robot import models_of, part_of
 from alula.common.robots import find_robot
 from alula.language.messages import messages_of
 from alula.trees.reading import read_files
+from mission_mutations.flights import Campaigned, Flights
 from mission_mutations.judging import MISSED, Judge, Robot, Verdict
 from mission_mutations.mutants import Mutant, chosen, mutants_of
-from mission_mutations.telling import by_what, table
+from mission_mutations.study import Study
+from mission_mutations.telling import by_what, table, table_of_flights
 
 COMMAND = "mission_mutations"
 MAIN = "main_tree_to_execute="
@@ -36,6 +37,12 @@ def robot_of(root: Path) -> Robot:
 def judge_of(root: Path, mission: str) -> Judge:
     """Return the judge of a mission, made once in each process."""
     return Judge(robot_of(root), mission)
+
+
+@cache
+def flights_of(root: Path, file: Path, mission: str) -> Flights:
+    """Return the flights of a campaign's file that are of a mission, made once in each process; raises AnalysisError."""
+    return Flights(robot_of(root), mission, load_campaign(file))
 
 
 def judged(root: Path, mutant: Mutant) -> Verdict:
@@ -59,6 +66,11 @@ def mutants(root: Path, missions: Sequence[str]) -> Iterator[Mutant]:
             yield from mutants_of(path, parts, robot.skillsets, used)
 
 
+def flown(root: Path, file: Path, mutant: Mutant) -> Campaigned:
+    """Fly one mutant by a campaign's file, in any process."""
+    return flights_of(root, file, mutant.mission).judge(mutant)
+
+
 def main(arguments: Sequence[str] | None = None) -> int:
     """Judge, print, and end with 1 where a mutant was missed."""
     parser = argparse.ArgumentParser(prog=COMMAND, description="Alter a robot's missions and models, and look what `check` finds.")
@@ -66,22 +78,20 @@ def main(arguments: Sequence[str] | None = None) -> int:
     parser.add_argument("--count", type=int, default=300, help="so many mutants, of each kind alike (default 300)")
     parser.add_argument("--seed", type=int, default=0)
     parser.add_argument("--processes", type=int, default=1, help="at once (default 1)")
-    parser.add_argument("--json", type=Path, metavar="FILE", help="also write each mutant to this file")
+    parser.add_argument(
+        "--campaign", type=Path, metavar="FILE", help="fly them as this campaign over mocks instead, and look what that finds"
+    )
+    parser.add_argument("--json", type=Path, metavar="FILE", help="also write each mutant to this file; what it has is not judged again")
     given = parser.parse_args(arguments)
     root = find_robot().root
     everything = list(mutants(root, given.missions))
     some = chosen(everything, given.count, given.seed)
     sys.stderr.write(f"{len(some)} of {len(everything)} mutants\n")
-    verdicts: list[Verdict] = []
-    with ProcessPoolExecutor(given.processes) as pool:
-        for number, verdict in enumerate(pool.map(judged, [root] * len(some), some), 1):
-            verdicts.append(verdict)
-            sys.stderr.write(
-                f"{number} of {len(some)}: {verdict.verdict} ({verdict.by}), {verdict.cpu_s} s: {verdict.kind}: {verdict.what}\n"
-            )
-            if given.json is not None:
-                told = {"seed": given.seed, "mutants": [one.as_dict() for one in verdicts]}
-                given.json.write_text(json.dumps(told, indent=1) + "\n", encoding="utf-8")
+    if given.campaign is not None:
+        by_flights = Study(partial(flown, root, given.campaign), Campaigned, given.json, given.seed).run(some, given.processes)
+        sys.stdout.write(f"{table_of_flights(by_flights)}\n")
+        return 0
+    verdicts = Study(partial(judged, root), Verdict, given.json, given.seed).run(some, given.processes)
     sys.stdout.write(f"{table(verdicts)}\n\n{by_what(verdicts)}\n")
     return 1 if any(one.verdict == MISSED for one in verdicts) else 0
 

@@ -24,20 +24,21 @@ from alula.prove.mission.conditions import Faults
 from alula.prove.mission.findings import findings, waits
 from alula.prove.mission.holding import SINGLE, held
 from alula.prove.mission.oracle import UndecidedError
-from alula.prove.mission.play import play
+from alula.prove.mission.play import Played, play
 from alula.prove.mission.prover import LOOKED_AT
 from alula.prove.mission.regions import Regions
-from alula.prove.mission.run import MissionFinding
+from alula.prove.mission.run import MissionFinding, MissionRun
 from alula.prove.mission.system import System
+from alula.prove.mission.unknown import is_unknown
 from alula.prove.mission.waits import Waits
 from alula.prove.mission.wanted import wanted
-from mission_mutations.differing import differing, taken
+from mission_mutations.differing import differing, flown, writing
 from mission_mutations.mutants import Mutant
-from mission_mutations.sameness import Graph, Shown, same
+from mission_mutations.sameness import Seen, Shown, same
 
 FOUND, EQUAL, MISSED = "found", "equal", "missed"
-ANSWERS, ANOTHER_RUN = "answers", "another run"
-COMPARED = frozenset({ANSWERS, ANOTHER_RUN})
+ANSWERS, ANOTHER_RUN, ACCOUNT = "answers", "another run", "account"
+COMPARED = frozenset({ANSWERS, ANOTHER_RUN, ACCOUNT})
 """What is seen only beside the mission as it is."""
 CANDIDATES = 4
 """So many runs that may tell two missions apart are flown at most."""
@@ -62,7 +63,8 @@ class Verdict:
     Attributes:
         verdict: "found", "equal" or "missed".
         by: what found it: "check" (the file or the model is refused or warned of), a code of a finding about its runs, "property", "model
-            proof"; beside the mission as it is "answers" (another answer to a failure, or another end after it) and "another run".
+            proof"; beside the mission as it is "answers" (another answer to a failure, or another end after it), "another run", and
+            "account" (the same run, of which the mission tells something else).
         told: the finding's message, or what differs.
         flown: whether a flight over mocks shows it: a counterexample that plays to its end, or a run that one of both missions flies and
             the other leaves; None where there is no run to fly.
@@ -77,6 +79,16 @@ class Verdict:
     told: str
     flown: bool | None
     cpu_s: float
+
+    @property
+    def said(self) -> str:
+        """In words."""
+        return f"{self.verdict} ({self.by})"
+
+    @property
+    def again(self) -> bool:
+        """Tell whether it is worth to be judged again."""
+        return self.verdict == MISSED
 
     def as_dict(self) -> dict[str, object]:
         """Return it as JSON has it."""
@@ -95,6 +107,7 @@ class Looked:
     skillsets: tuple[Skillset, ...]
     regions: Regions
     answers: Answers
+    seen: Seen
 
     @property
     def system(self) -> System:
@@ -116,7 +129,6 @@ class Judge:
         self._mission = mission
         self._shown = Shown()
         self.original = self._look(robot.folder / f"{mission}.xml", robot.skillsets)
-        self._graph = self._shown.graph(self.original.regions)
         self._stages_of_original = self._stages(self.original)
         self._known: list[set[tuple[str, str]]] = []
         self._known_of_file = {_key(one) for one in self._of_file(self.original.path, robot.skillsets)}
@@ -130,7 +142,7 @@ class Judge:
             shutil.copytree(self._robot.folder, missions)
             if mutant.file:
                 (missions / mutant.file).write_text(mutant.text, encoding="utf-8")
-            skillsets = tuple(_in_place(one, mutant.skillset) for one in self._robot.skillsets)
+            skillsets = tuple(in_place(one, mutant.skillset) for one in self._robot.skillsets)
             said = self._said(mutant, missions / f"{self._mission}.xml", skillsets)
         return Verdict(self._mission, mutant.kind, mutant.what, *said, round(time.process_time() - begun, 2))
 
@@ -147,20 +159,21 @@ class Judge:
         stages = enumerate(self._stages(looked))
         if new := self._new_of(*next(stages)):
             return self._found(new, looked)
-        graph = self._shown.graph(looked.regions)
-        if same(self._graph, graph):
+        if same(self.original.seen, looked.seen):
             return EQUAL, "bisimulation", "", None
         if new := self._new_of(*next(stages)):
             return self._found(new, looked)
         if changed := self._changed(looked):
-            return FOUND, ANSWERS, changed, self._run_of_one_alone(looked, graph)
+            return FOUND, ANSWERS, changed, self._run_of_one_alone(looked)
         for stage in stages:
             if new := self._new_of(*stage):
                 return self._found(new, looked)
         if mutant.skillset is not None and (new := self._proved(mutant.skillset)):
             return FOUND, "model proof", _told(new[0]), None
-        if self._run_of_one_alone(looked, graph):
+        if self._run_of_one_alone(looked):
             return FOUND, ANOTHER_RUN, "one of both flies a run that the other leaves", True
+        if told := self._account(looked):
+            return FOUND, ACCOUNT, told, True
         return MISSED, "nothing", "it is not shown to be equal, and no flight tells it apart", None
 
     def _new_of(self, stage: int, found: Sequence[Diagnostic]) -> list[Diagnostic]:
@@ -186,15 +199,26 @@ class Judge:
         changed = next((key for key in (*before, *after) if before.get(key) != after.get(key)), None)
         return "" if changed is None else f"{changed}: {before.get(changed)} becomes {after.get(changed)}"
 
-    def _run_of_one_alone(self, looked: Looked, graph: Graph) -> bool:
+    def _run_of_one_alone(self, looked: Looked) -> bool:
         """Tell whether a run of one of both flies, and the other leaves it."""
-        mutant, original = (looked, graph), (self.original, self._graph)
-        for (one, mine), (other, theirs) in ((mutant, original), (original, mutant)):
-            for run in differing(one.regions, mine, theirs, CANDIDATES):
-                flies = taken(run, one.system, one.path, one.system, one.skillsets, self._robot.part)
-                if flies and not taken(run, one.system, other.path, other.system, other.skillsets, self._robot.part):
+        for one, other in ((looked, self.original), (self.original, looked)):
+            for run in differing(one.seen, other.seen, CANDIDATES):
+                if self._flown(run, one, one) and not self._flown(run, one, other):
                     return True
         return False
+
+    def _account(self, looked: Looked) -> str:
+        """Return what both tell otherwise of a run that both fly; empty where there is no such run."""
+        for one, other in ((looked, self.original), (self.original, looked)):
+            for run in writing(one.seen, other.seen, CANDIDATES):
+                told = [self._flown(run, one, each) for each in (self.original, looked)]
+                before, after = map(_told_at_end, told)
+                if all(told) and before != after:
+                    return f"{before} becomes {after}"
+        return ""
+
+    def _flown(self, run: MissionRun, of: Looked, by: Looked) -> Played | None:
+        return flown(run, of.system, by.path, by.system, by.skillsets, self._robot.part)
 
     # --- what `check` says -------------------------------------------------------------------------------------------
 
@@ -203,7 +227,7 @@ class Judge:
         system = System.read(path, skillsets, self._robot.part, LOOKED_AT, deadline)
         regions = Regions(system, deadline)
         regions.explore()
-        return Looked(path, system.skillsets, regions, Answers(regions))
+        return Looked(path, system.skillsets, regions, Answers(regions), self._shown.of(regions, path))
 
     def _stages(self, looked: Looked) -> Iterator[list[Diagnostic]]:
         """Yield what `check` finds about all runs, the quick parts first."""
@@ -243,5 +267,12 @@ def _told(finding: Diagnostic) -> str:
     return f"{finding.code}: {finding.message}"
 
 
-def _in_place(model: Skillset, mutant: Skillset | None) -> Skillset:
+def _told_at_end(played: Played | None) -> dict[str, object]:
+    """Return what a mission tells of itself at its end; a flight without a world does not know all of it."""
+    known = {} if played is None else {"reason": played.end.reason, **played.facts}
+    return {name: value for name, value in known.items() if not is_unknown(value)}
+
+
+def in_place(model: Skillset, mutant: Skillset | None) -> Skillset:
+    """Return the mutant where it is one of this model, else the model."""
     return mutant if mutant is not None and mutant.name == model.name else model

@@ -1,35 +1,40 @@
 """Whether two missions do the same, shown by a bisimulation of all that they can do.
 
-A mission is compared as the graph of its regions. A region shows what the managers of each skillset can be and can do until the next tick
-(starts, refusals, ends with their results, resources), and how the mission has ended. A tick out of it shows with which managers it is
-taken, what it asks for, how what nobody knows answers its questions, and which nodes it ticks that write on the blackboard or give inputs.
-Two missions whose first regions can't be told apart so do the same, step for step: each run of one is a run of the other.
+Both are searched side by side, as one: pairs of memories of their trees, with what the managers can be there. Between two ticks both must
+have the same managers, which can do the same: starts, refusals, ends with their results, resources. A tick must ask for the same in both,
+with the same managers, for the same answers of what nobody knows, tick the same of those nodes that write on the blackboard or give inputs,
+and end the mission alike. A tick hangs on nothing else; so each run of one is a run of the other, step for step.
 
 Numbers and texts that the search does not know have no values here. So the nodes that write or read them must also be the same, in the same
-order in the file; otherwise nothing is claimed. Missions that do the same may be told apart all the same: this shows sameness only.
+order in the file, and what both need to start must be the same, in any order: it is told together. Otherwise nothing is claimed. Missions
+that do the same may be told apart all the same: this shows sameness only.
 """
 
 from __future__ import annotations
 
-import math
-from collections.abc import Hashable, Mapping, Sequence
-from dataclasses import dataclass, replace
-from itertools import product
+from collections import deque
+from collections.abc import Hashable, Iterable, Mapping
+from dataclasses import dataclass
+from functools import cached_property
+from pathlib import Path
 
+from alula.missions.filed.nodes import Needs
+from alula.missions.filed.plan import READY
 from alula.missions.filed.skills import SkillNode
+from alula.prove.mission.accepted import DESCRIPTION
 from alula.prove.mission.oracle import Answer, Question
 from alula.prove.mission.reading import scripts_of
-from alula.prove.mission.regions import Closure, Regions, Sets
+from alula.prove.mission.regions import Closure, Region, Regions, Sets
 from alula.prove.mission.state import Event
 from alula.prove.mission.system import System
-from alula.prove.mission.ticking import Outcome
+from alula.prove.mission.ticking import TICK, Outcome
+from alula.trees.document import Element
 from alula.trees.node import Node, pointer
 from alula.trees.palette import Direction
+from alula.trees.reading import read_files, type_name
 from alula.trees.script import parse
 from alula.trees.script.syntax import Assignment, Literal, Name, walk
 
-FEW = 20_000
-"""Up to so many situations are compared one by one."""
 Products = tuple[frozenset[int], ...]
 Key = tuple[str, str, int]
 """A skill, the name of the node that asks for it, and which of those of the same names."""
@@ -39,22 +44,30 @@ Key = tuple[str, str, int]
 class Edge:
     """A tick.
 
-    ``label`` is all that it shows but ``sets``, the managers of each skillset with which it is taken; ``target``: the region after it;
-    ``asked``: what it asks for, and how the mission has ended after it; ``choices``: what nobody knows, with the answers. ``way`` is
-    the tick itself.
+    ``target``: the region after it; ``asked``: what it asks for, and how the mission has ended after it; ``choices``: what nobody knows,
+    with the answers; ``sets``: the managers of each skillset with which it is taken; ``shows``: the number of all else that it shows;
+    ``quiet``: it asks for nothing, and the mission neither begins nor ends. ``way`` is the tick itself.
     """
 
-    label: int
     target: int
+    shows: int
     asked: Hashable
     choices: Mapping[Question, Answer]
     sets: Products
+    quiet: bool
     way: tuple[Outcome, Sets]
 
     def like(self, other: Edge) -> bool:
         """Tell whether both ask for the same, with some managers that are the same, and the same answers of what nobody knows."""
+        return self.asked == other.asked and self._meets(other)
+
+    def unlike(self, other: Edge) -> bool:
+        """Tell whether the same managers and answers can lead to both, and they ask for something else, or end otherwise."""
+        return self.asked != other.asked and self._meets(other)
+
+    def _meets(self, other: Edge) -> bool:
         agree = all(other.choices.get(question, answer) == answer for question, answer in self.choices.items())
-        return agree and self.asked == other.asked and all(a & b for a, b in zip(self.sets, other.sets, strict=True))
+        return agree and all(a & b for a, b in zip(self.sets, other.sets, strict=True))
 
 
 @dataclass(frozen=True)
@@ -69,15 +82,10 @@ class Move:
 
 @dataclass(frozen=True)
 class Graph:
-    """The regions with what each shows, and the ticks out of each.
+    """The regions: the ticks out of each, and what can happen in the managers of each."""
 
-    ``moves`` are what can happen in the managers of each region; ``values``: the nodes that deal in values, in the file's order.
-    """
-
-    labels: tuple[Hashable, ...]
     edges: tuple[tuple[Edge, ...], ...]
     moves: tuple[Mapping[int, Move], ...]
-    values: tuple[Hashable, ...]
 
 
 def keys_of(system: System) -> list[Key]:
@@ -90,24 +98,29 @@ def keys_of(system: System) -> list[Key]:
 
 
 class Shown:
-    """Makes graphs that can be compared: what is the same has the same number in all of them."""
+    """Tells of missions what can be compared: what is the same has the same number in all of them."""
 
     def __init__(self) -> None:
         self._numbers: dict[Hashable, int] = {}
 
-    def graph(self, regions: Regions) -> Graph:
-        """Return the graph of a mission whose regions are all known."""
-        return _Making(self, regions).graph()
+    def of(self, regions: Regions, path: Path) -> Seen:
+        """Return what a mission's file shows, whose regions are all known."""
+        return Seen(self, regions, path)
 
     def number(self, value: Hashable) -> int:
         """Return the number of a value."""
         return self._numbers.setdefault(value, len(self._numbers))
 
 
-class _Making:
-    def __init__(self, shown: Shown, regions: Regions) -> None:
+class Seen:
+    """What can be seen of a mission.
+
+    ``values`` are the nodes that deal in values, in the file's order; ``needs``: what the mission needs to start, in any order.
+    """
+
+    def __init__(self, shown: Shown, regions: Regions, path: Path) -> None:
+        self.regions = regions
         self._number = shown.number
-        self._regions = regions
         self._system = regions.system
         self._keys = keys_of(regions.system)
         self._ports = {
@@ -117,33 +130,50 @@ class _Making:
             if port.direction is not Direction.INPUT
         }
         self._values = {number: value for number, node in enumerate(self._system.nodes) if (value := self._deals(node)) is not None}
+        self.values = tuple(self._values.values())
+        ready = read_files(path).trees.get(READY)
+        needs = [_attributes(one) for one in ready.iterate()] if ready is not None else []
+        self.needs = sorted(one for one in needs if one[0] == Needs.__name__)
         self._managers: dict[tuple[int, int], int] = {}
         self._moves: dict[tuple[int, int], int] = {}
         self._closures: dict[int, int] = {}
         self._happens: dict[int, Mapping[int, Move]] = {}
 
+    @cached_property
     def graph(self) -> Graph:
-        labels, edges, moves = [], [], []
-        for region in self._regions.regions:
-            memory = self._system.ticker.memories[region.memory]
-            closures = tuple(self._closure(place, one) for place, one in enumerate(region.closures))
-            labels.append(self._number(("region", memory.started, memory.end, closures)))
-            over = memory.end is not None
+        """All regions."""
+        edges, moves = [], []
+        for region in self.regions.regions:
+            over = self._system.ticker.memories[region.memory].end is not None
             moves.append(
                 {key: one for place, known in enumerate(region.closures) for key, one in self._known(place, known, over=over).items()}
             )
-            edges.append(tuple(self._edge(target, ticked.act, way) for target, ticked in region.next for way in ticked.ways))
-        return Graph(tuple(labels), tuple(edges), tuple(moves), tuple(self._values.values()))
+            edges.append(tuple(self._edge(region, target, ticked.act, way) for target, ticked in region.next for way in ticked.ways))
+        return Graph(tuple(edges), tuple(moves))
 
-    def _edge(self, target: int, act: str, way: tuple[Outcome, Sets]) -> Edge:
-        (memory, started, interrupted, choices, touched), sets = way
-        requests = tuple(tuple(self._keys[leaf] for leaf in leaves) for leaves in (started, interrupted))
-        asked = (act, *requests, self._system.ticker.memories[memory].end)
-        chosen = {one.question: one.answer for one in choices}
-        wrote = frozenset((self._values[number], status) for number, status in touched if number in self._values)
-        known = tuple(frozenset(self._one(place, number) for number in numbers) for place, numbers in enumerate(sets))
-        label = self._number(("tick", asked, frozenset(chosen.items()), wrote))
-        return Edge(label, target, asked, chosen, known, way)
+    def _edge(self, region: Region, target: int, act: str, way: tuple[Outcome, Sets]) -> Edge:
+        outcome, sets = way
+        chosen = {one.question: one.answer for one in outcome.choices}
+        asked = self._asked(outcome)
+        quiet = asked == ((), (), self._system.ticker.memories[region.memory].started, None)
+        return Edge(target, self.tick(outcome), (act, *asked), chosen, self.common(sets), quiet, way)
+
+    def _asked(self, outcome: Outcome) -> tuple[Hashable, ...]:
+        requests = tuple(tuple(self._keys[leaf] for leaf in leaves) for leaves in (outcome.started, outcome.interrupted))
+        memory = self._system.ticker.memories[outcome.memory]
+        return (*requests, memory.started, memory.end)
+
+    def tick(self, outcome: Outcome) -> int:
+        """Return the number of all that a tick shows but the managers with which it is taken: of each question all its answers."""
+        chosen: dict[Question, tuple[Answer, ...]] = {}
+        for one in outcome.choices:
+            chosen[one.question] = (*chosen.get(one.question, ()), one.answer)
+        wrote = frozenset((self._values[number], status) for number, status in outcome.touched if number in self._values)
+        return self._number(("tick", self._asked(outcome), frozenset(chosen.items()), wrote))
+
+    def common(self, sets: Sets) -> Products:
+        """Return managers by the numbers that they have in all missions."""
+        return tuple(frozenset(self.one(place, number) for number in numbers) for place, numbers in enumerate(sets))
 
     def _deals(self, node: Node) -> Hashable | None:
         """Return a node that writes on the blackboard, or gives inputs to what it asks for, as its file has it."""
@@ -151,7 +181,7 @@ class _Making:
         writes = any(port.direction is not Direction.INPUT for port in wiring.type.ports.values() if port.name in wiring.ports)
         if not (writes or isinstance(node, SkillNode) or any(map(self._computes, scripts_of(element)))):
             return None
-        return (wiring.type.name, node.name, *((name, element.get(name)) for name in element.attributes if name != "_description"))
+        return (node.name, *_attributes(element))
 
     def _computes(self, text: str) -> bool:
         """Tell whether a script writes values that the search does not keep as they are."""
@@ -165,7 +195,8 @@ class _Making:
         others = {target for _, target in reads.flows} | {source for source, _ in reads.flows} | reads.counted
         return isinstance(part.value, Literal) and name in reads.names and name not in others and name not in self._ports
 
-    def _closure(self, place: int, closure: Closure) -> int:
+    def closure(self, place: int, closure: Closure) -> int:
+        """Return the number of all that managers can be, with all that can happen in them."""
         if id(closure) not in self._closures:
             self._closures[id(closure)] = self._number(("closure", frozenset(self._can(place, one) for one in closure.all)))
         return self._closures[id(closure)]
@@ -173,8 +204,8 @@ class _Making:
     def _can(self, place: int, number: int) -> int:
         """Return managers with all that can happen in them."""
         if (place, number) not in self._moves:
-            moves = frozenset((self._event(event), self._one(place, after)) for event, after in self._system.moves_of(place, number))
-            self._moves[place, number] = self._number(("moves", self._one(place, number), moves))
+            moves = frozenset((self._event(event), self.one(place, after)) for event, after in self._system.moves_of(place, number))
+            self._moves[place, number] = self._number(("moves", self.one(place, number), moves))
         return self._moves[place, number]
 
     def _known(self, place: int, closure: Closure, *, over: bool) -> Mapping[int, Move]:
@@ -185,12 +216,13 @@ class _Making:
                 for event, after in self._system.moves_of(place, number):
                     if not (over and event.leaf < 0):
                         found.setdefault(
-                            self._number(("event", self._one(place, number), self._event(event))), Move(place, number, event, after)
+                            self._number(("event", self.one(place, number), self._event(event))), Move(place, number, event, after)
                         )
             self._happens[id(closure)] = found
         return self._happens[id(closure)]
 
-    def _one(self, place: int, number: int) -> int:
+    def one(self, place: int, number: int) -> int:
+        """Return the number that managers have in all missions."""
         if (place, number) not in self._managers:
             states, executions = self._system.managers_of(number)
             value = (place, states, tuple((self._keys[one.leaf], *one[1:]) for one in executions))
@@ -203,57 +235,104 @@ class _Making:
         return (event.kind, event.name, event.result, event.state, event.source, event.changes, leaf, ended)
 
 
-def same(one: Graph, other: Graph) -> bool:
+def same(one: Seen, other: Seen) -> bool:
     """Tell whether it is shown that two missions do the same."""
-    if one.values != other.values:
+    if (one.values, one.needs) != (other.values, other.needs):
         return False
-    labels = [*one.labels, *other.labels]
-    shift = len(one.labels)
-    edges = [*one.edges, *(tuple(replace(edge, target=edge.target + shift) for edge in known) for known in other.edges)]
-    blocks, unions = _numbered(labels), _Unions()
-    while True:
-        if blocks[0] != blocks[shift]:
-            return False
-        refined = _numbered([(blocks[at], unions.shown(known, blocks)) for at, known in enumerate(edges)])
-        if len(set(refined)) == len(set(blocks)):
-            return True
-        blocks = refined
+    return _Both(one, other).same()
 
 
-class _Unions:
-    """What the ticks out of a region show: those that show the same are one, taken with all managers of any of them."""
+@dataclass(frozen=True)
+class _Pair:
+    """Memories of both trees, and for each skillset the managers, by the numbers of each mission."""
 
-    def __init__(self) -> None:
-        self._known: dict[frozenset[Products], Hashable] = {}
-
-    def shown(self, edges: Sequence[Edge], blocks: Sequence[int]) -> Hashable:
-        """Return it, with the blocks that the ticks lead to."""
-        found: dict[tuple[int, int], set[Products]] = {}
-        for edge in edges:
-            found.setdefault((edge.label, blocks[edge.target]), set()).add(edge.sets)
-        return frozenset((key, self._union(frozenset(sets))) for key, sets in found.items())
-
-    def _union(self, sets: frozenset[Products]) -> Hashable:
-        """Return a union of products, the same however it was divided, where it is not too large to be looked at one by one."""
-        if sets not in self._known:
-            merged = _merged(sets)
-            few = len(merged) > 1 and sum(math.prod(map(len, one)) for one in merged) <= FEW
-            self._known[sets] = frozenset(one for known in merged for one in product(*known)) if few else merged
-        return self._known[sets]
+    memories: tuple[int, int]
+    sets: tuple[Sets, Sets]
 
 
-def _merged(sets: frozenset[Products]) -> frozenset[Products]:
-    """Return the products with those that differ in one skillset only made one."""
-    found: list[Products] = []
-    for each in sorted(sets, key=lambda known: [sorted(part) for part in known]):
-        one = each
-        while (other := next((known for known in found if sum(a != b for a, b in zip(known, one, strict=True)) <= 1), None)) is not None:
-            found.remove(other)
-            one = tuple(a | b for a, b in zip(other, one, strict=True))
-        found.append(one)
-    return frozenset(found)
+class _Both:
+    """Two missions, searched as one."""
+
+    def __init__(self, one: Seen, other: Seen) -> None:
+        self._both = (one, other)
+        self._known: dict[tuple[int, int], list[Sets]] = {}
+
+    def same(self) -> bool:
+        first = [one.regions.system.initial() for one in self._both]
+        roots = [tuple(frozenset({number}) for number in state.managers) for state in first]
+        todo = deque([_Pair((first[0].memory, first[1].memory), (roots[0], roots[1]))])
+        while todo:
+            pair = self._grown(todo.popleft())
+            if pair is None:
+                return False
+            known = self._known.setdefault(pair.memories, [])
+            if any(all(a <= b for a, b in zip(pair.sets[0], sets, strict=True)) for sets in known):
+                continue
+            known.append(pair.sets[0])
+            after = self._after(pair)
+            if after is None:
+                return False
+            todo += after
+        return True
+
+    def _grown(self, pair: _Pair) -> _Pair | None:
+        """Return all that can come of the managers before the next tick; None where both can't do the same until then."""
+        found = []
+        for seen, memory, roots in zip(self._both, pair.memories, pair.sets, strict=True):
+            over = seen.regions.system.ticker.memories[memory].end is not None
+            closures = tuple(seen.regions.closure(place, numbers, over=over) for place, numbers in enumerate(roots))
+            found.append((tuple(seen.closure(*known) for known in enumerate(closures)), tuple(known.all for known in closures)))
+        return _Pair(pair.memories, (found[0][1], found[1][1])) if found[0][0] == found[1][0] else None
+
+    def _after(self, pair: _Pair) -> list[_Pair] | None:
+        """Return what the next tick leads to; None where it is not the same."""
+        if self._both[0].regions.system.ticker.memories[pair.memories[0]].end is not None:
+            return []
+        ways: list[dict[int, list[tuple[Outcome, Products]]]] = [{}, {}]
+        for found, seen, memory, sets in zip(ways, self._both, pair.memories, pair.sets, strict=True):
+            for outcome, left in seen.regions.split(memory, TICK, sets):
+                found.setdefault(seen.tick(outcome), []).append((outcome, seen.common(left)))
+        mine, theirs = ways
+        if mine.keys() != theirs.keys() or any(_all(known) != _all(theirs[tick]) for tick, known in mine.items()):
+            return None
+        pairs = []
+        for tick, known in mine.items():
+            for a, those in known:
+                for b, these in theirs[tick]:
+                    managers = tuple(x & y for x, y in zip(those, these, strict=True))
+                    if all(managers):
+                        pairs.append(self._ticked(pair, (a, b), managers))
+        return pairs
+
+    def _ticked(self, pair: _Pair, outcomes: tuple[Outcome, Outcome], managers: Products) -> _Pair:
+        found = []
+        for seen, outcome, sets in zip(self._both, outcomes, pair.sets, strict=True):
+            some = [[number for number in numbers if seen.one(place, number) in managers[place]] for place, numbers in enumerate(sets)]
+            found.append(tuple(frozenset(seen.regions.after(place, one, outcome) for one in ones) for place, ones in enumerate(some)))
+        return _Pair((outcomes[0].memory, outcomes[1].memory), (found[0], found[1]))
 
 
-def _numbered(values: Sequence[Hashable]) -> list[int]:
-    numbers: dict[Hashable, int] = {}
-    return [numbers.setdefault(value, len(numbers)) for value in values]
+def _all(ways: Iterable[tuple[Outcome, Products]]) -> Hashable:
+    return union(frozenset(sets for _, sets in ways))
+
+
+def union(products: frozenset[Products]) -> Hashable:
+    """Return a union of products, the same however it was divided: managers of the first skillset by what they go together with."""
+    if products <= {()}:
+        return bool(products)
+    rests: dict[int, list[Products]] = {}
+    for first, *rest in products:
+        for one in first:
+            rests.setdefault(one, []).append(tuple(rest))
+    alike: dict[frozenset[Products], set[int]] = {}
+    for one, others in rests.items():
+        alike.setdefault(frozenset(others), set()).add(one)
+    found: dict[Hashable, set[int]] = {}
+    for together, some in alike.items():
+        found.setdefault(union(together), set()).update(some)
+    return frozenset((frozenset(some), rest) for rest, some in found.items())
+
+
+def _attributes(element: Element) -> tuple[str | tuple[str, str], ...]:
+    """Return a node as its file has it, but for what is said about it."""
+    return (type_name(element), *((name, element.get(name)) for name in element.attributes if name != DESCRIPTION))

@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections import Counter
 from collections.abc import Sequence
 
+from mission_mutations.flights import NOTHING, OTHERWISE, REFUSED, WRONG, Campaigned
 from mission_mutations.judging import COMPARED, EQUAL, FOUND, MISSED, Verdict
 from mission_mutations.mutants import KINDS
 
@@ -23,6 +24,24 @@ def _row(kind: str, verdicts: Sequence[Verdict]) -> str:
     taken_s = sum(one.cpu_s for one in verdicts)
     beside = sum(one.by in COMPARED for one in verdicts)
     return f"| {kind} | {len(verdicts)} | {count[FOUND] - beside} | {beside} | {flown} | {count[EQUAL]} | {count[MISSED]} | {taken_s:.0f} |"
+
+
+FLIGHTS = (
+    "| what was done to a mission or model | mutants | refused | a flight is wrong | another course only | not seen | flights | CPU, s |"
+)
+
+
+def table_of_flights(several: Sequence[Campaigned]) -> str:
+    """Return what flights over mocks have found as a table of Markdown."""
+    rows = [_row_of_flights(kind, [one for one in several if one.kind == kind]) for kind in KINDS]
+    return "\n".join([FLIGHTS, "|---|---|---|---|---|---|---|---|", *rows, _row_of_flights("**all**", several)])
+
+
+def _row_of_flights(kind: str, several: Sequence[Campaigned]) -> str:
+    count = Counter(one.by for one in several)
+    seen = " | ".join(str(count[by]) for by in (REFUSED, WRONG, OTHERWISE, NOTHING))
+    flights, taken_s = sum(one.flights for one in several), sum(one.cpu_s for one in several)
+    return f"| {kind} | {len(several)} | {seen} | {flights} | {taken_s:.0f} |"
 
 
 def by_what(verdicts: Sequence[Verdict]) -> str:

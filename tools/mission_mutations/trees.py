@@ -41,14 +41,15 @@ Place = tuple[str, str, Change]
 def altered(text: str) -> Iterator[tuple[str, str, str]]:
     """Yield each altered file: kind, what was done to which node, and the file's text."""
     root = ET.fromstring(text)  # noqa: S314 - the robot's own files
-    for number, node in enumerate(root.iter()):
-        if any(node is inside for tree in root.iter("BehaviorTree") for inside in tree.iter() if inside is not tree):
+    numbers = {id(node): number for number, node in enumerate(root.iter())}
+    for tree in root.iter("BehaviorTree"):
+        for node in (inside for inside in tree.iter() if inside is not tree):
             for kind, what, change in _places(node):
                 copied = copy.deepcopy(root)
-                mine = list(copied.iter())[number]
+                mine = list(copied.iter())[numbers[id(node)]]
                 parent = next(one for one in copied.iter() if any(child is mine for child in one))
                 change(parent, mine)
-                yield kind, f"'{node.get('name', node.tag)}': {what}", ET.tostring(copied, encoding="unicode")
+                yield kind, f"{tree.get('ID')}: '{node.get('name', node.tag)}': {what}", ET.tostring(copied, encoding="unicode")
 
 
 def _places(node: ET.Element) -> Iterator[Place]:

@@ -49,14 +49,14 @@ def _mocked(planned: PlannedRun, behaviour: tuple[str, ...]) -> Row:
     scenario, ways = _scenario(planned.scenario, behaviour)
     mocked = scenario.run(planned.requests, planned.seed)
     monitor = Monitor(scenario.skillsets)
-    landed = _landed(mocked.events)
+    landed = came_back(mocked.events)
     found = {"outcome": mocked.end.outcome.value, "reason": mocked.end.reason, "landed": landed, "open": list(mocked.open)}
     found |= {"problems": list(mocked.notes), "collisions": None, "min_clearance_m": None, "died": [], "exit_code": None}
     left = _Evidence(mocked.events, mocked.places, first_s=mocked.faults, behaviour=scenario.behaviour, answers=mocked.answers)
     return _row(planned, found, left, monitor, ways)
 
 
-def _landed(events: Sequence[EngineEvent]) -> bool | None:
+def came_back(events: Sequence[EngineEvent]) -> bool | None:
     """Tell whether the robot came back to its state of departure; None where it never left it, or need not be brought back by the mission.
 
     Others have to when it was taken from the mission while it was away; nobody has to when it rests where it may be left.
@@ -166,7 +166,7 @@ def _simulated(planned: PlannedRun, options: Sequence[str], out: Path) -> Row:
     names = dict.fromkeys(event.skillset for event in run.events)
     ended = {one["id"] for one in summary.get("skills") or () if one.get("end_s") is not None}
     found = {name: summary.get(name) for name in ("outcome", "reason", "landed", "collisions", "min_clearance_m")}
-    if found["landed"] is False and _landed(run.events) is None:
+    if found["landed"] is False and came_back(run.events) is None:
         found["landed"] = None
     found |= {"open": [one["id"] for one in summary.get("skills") or () if one["id"] not in ended]}
     found |= {"problems": summary.get("problems") or [], "died": summary.get("died") or [], "exit_code": done.returncode}

@@ -2,12 +2,16 @@
 
 from __future__ import annotations
 
+import json
+import random
 from collections.abc import Iterator
 from dataclasses import replace
+from itertools import product
 from pathlib import Path
 
 import pytest
 
+from alula.campaign.plan import load_campaign
 from alula.common.robots import find_robot
 from alula.language.models import ModelFile, check_texts
 from alula.missions.check.page import whole
@@ -23,8 +27,11 @@ from alula.trees.status import Answer
 from alula.trees.values import INT
 from mission_mutations import __main__ as study
 from mission_mutations import models, trees
-from mission_mutations.judging import ANOTHER_RUN, ANSWERS, EQUAL, FOUND, Judge, Robot, Verdict
+from mission_mutations.flights import NOTHING, OTHERWISE, REFUSED, WRONG, Flights
+from mission_mutations.judging import ACCOUNT, ANOTHER_RUN, ANSWERS, EQUAL, FOUND, MISSED, Judge, Robot, Verdict
 from mission_mutations.mutants import KINDS, Mutant, chosen, mutants_of
+from mission_mutations.sameness import union
+from mission_mutations.study import Study
 
 ROOT = find_robot(Path(__file__)).root
 (DRONE,) = check_texts([ModelFile("robot.rl", ROBOT)])[0].skillsets
@@ -114,6 +121,89 @@ def test_what_is_written_again_is_equal_where_it_is_a_value_of_the_file(tmp_path
     assert verdict(tmp_path, *(TWO_WAYS.replace("<drone.land/>", last) for last in (one, again))).verdict == EQUAL
 
 
+COUNTED = whole("""<Fallback>
+  <Sequence><drone.hover/><Script name="one more" code="rounds += 1"/></Sequence>
+  <ForceFailure><drone.land/></ForceFailure>
+</Fallback>""").replace(
+    "</root>", '<TreeNodesModel><SubTree ID="mission"><output_port name="rounds" default="0"/></SubTree></TreeNodesModel></root>'
+)
+
+
+def test_a_round_that_is_counted_before_it_is_done_is_told_by_the_missions_account(tmp_path: Path) -> None:
+    """Both ask for the same and end alike; of a hover that is aborted one of them says that it was a round."""
+    (tmp_path / "example.xml").write_text(COUNTED)
+    judge = Judge(Robot(tmp_path, (DRONE,), NO_PART, {}), "example")
+    swapped = next(text for kind, what, text in trees.altered(COUNTED) if kind == trees.CHILDREN_SWAPPED and "'Sequence'" in what)
+    one = judge.judge(Mutant("example", "by hand", "", "example.xml", swapped))
+    assert (one.verdict, one.by, one.flown) == (FOUND, ACCOUNT, True), one
+    assert "'rounds': 0.0} becomes" in one.told
+
+
+SENSES = """
+skillset drone {
+  resource control { state { OURS THEIRS } initial OURS transition { extern OURS -> THEIRS  extern THEIRS -> OURS } }
+  skill see { progress 0.5  invariant { ours { guard control == OURS } }  success DONE }
+  skill hear { progress 0.5  invariant { ours { guard control == OURS } }  success DONE }
+  skill land { success DONE }
+}
+"""
+SENSING = """<Fallback>
+  <Parallel success_count="1" failure_count="1">
+    <drone.see/>
+    <drone.hear/>
+    <Sequence>
+      <WaitFor name="it sees" if="progress(drone.see) &gt;= 1"/>
+      <WaitFor name="it hears" if="progress(drone.hear) &gt;= 1"/>
+    </Sequence>
+  </Parallel>
+  <drone.land/>
+</Fallback>"""
+
+
+def test_what_is_waited_for_in_another_order_is_told_apart_where_it_may_be_over_again(tmp_path: Path) -> None:
+    """One of both asks a question that the other does not ask there; the flight of both is told the answer that tells them apart."""
+    (senses,) = check_texts([ModelFile("robot.rl", SENSES)])[0].skillsets
+    (tmp_path / "example.xml").write_text(whole(SENSING))
+    judge = Judge(Robot(tmp_path, (senses,), NO_PART, {}), "example")
+    swapped = next(text for kind, what, text in trees.altered(whole(SENSING)) if kind == trees.CHILDREN_SWAPPED and "'Sequence'" in what)
+    one = judge.judge(Mutant("example", "by hand", "", "example.xml", swapped))
+    assert (one.verdict, one.by, one.flown) == (FOUND, ANOTHER_RUN, True), one
+
+
+NEEDING = whole("""<root BTCPP_format="4" main_tree_to_execute="mission">
+<BehaviorTree ID="mission"><Fallback><drone.hover/><drone.land/></Fallback></BehaviorTree>
+<BehaviorTree ID="ready"><Sequence>
+  <Needs name="ours" if="drone.control == OURS" otherwise="'it is theirs'"/>
+  <Needs name="free" if="drone.axes == FREE" otherwise="'it is taken'"/>
+</Sequence></BehaviorTree></root>""")
+
+
+def test_what_is_needed_may_stand_in_any_order_and_no_word_of_it_may_change(tmp_path: Path) -> None:
+    (tmp_path / "example.xml").write_text(NEEDING)
+    judge = Judge(Robot(tmp_path, (DRONE,), NO_PART, {}), "example")
+    swapped = next(text for kind, what, text in trees.altered(NEEDING) if kind == trees.CHILDREN_SWAPPED and "ready" in what)
+    assert judge.judge(Mutant("example", "by hand", "", "example.xml", swapped)).verdict == EQUAL
+    other = NEEDING.replace("it is theirs", "nobody knows")
+    assert judge.judge(Mutant("example", "by hand", "", "example.xml", other)).verdict != EQUAL
+
+
+def test_unions_of_products_are_the_same_however_they_are_divided() -> None:
+    chance = random.Random(7)  # noqa: S311 - for tests
+    elements = list(product(range(3), range(3), range(2)))
+    for _ in range(300):
+        some = frozenset(chance.sample(elements, chance.randint(1, len(elements))))
+        divided: list[tuple[frozenset[int], ...]] = [tuple(frozenset({one}) for one in each) for each in some]
+        for _ in range(8):  # join two that differ in one place, which keeps the union
+            one, other = chance.choice(divided), chance.choice(divided)
+            if sum(a != b for a, b in zip(one, other, strict=True)) == 1:
+                divided.append(tuple(a | b for a, b in zip(one, other, strict=True)))
+        covered = {each for known in divided for each in product(*known)}
+        assert covered == some
+        assert union(frozenset(divided)) == union(frozenset(tuple(frozenset({one}) for one in each) for each in some))
+        less = frozenset(divided[: len(some)][1:])
+        assert union(less) != union(frozenset(divided)) or not less
+
+
 def observed(folder: Path, text: str, skillset: Skillset) -> set[object]:
     """Return all that can be seen of a mission's situations, one looked at after another."""
     (folder / "seen.xml").write_text(text)
@@ -176,6 +266,48 @@ def test_choice_is_by_the_seed_and_even() -> None:
     assert some == chosen(everything, 16, seed=4) != chosen(everything, 16, seed=5)
     assert all([one.kind for one in some].count(kind) == 2 for kind in KINDS)
     assert len(chosen(everything, 1000, seed=1)) == len(set(everything))
+
+
+def test_a_study_goes_on_where_its_file_ends_and_judges_again_what_was_missed(tmp_path: Path) -> None:
+    several = [Mutant("example", "by hand", str(number)) for number in range(4)]
+    file = tmp_path / "told.json"
+    told = [
+        Verdict("example", "by hand", str(number), verdict, "", "", None, 0.0) for number, verdict in ((0, FOUND), (1, MISSED), (3, EQUAL))
+    ]
+    file.write_text(json.dumps({"seed": 0, "mutants": [one.as_dict() for one in told]}))
+    found = Study(_judged_now, Verdict, file, 0).run(several, processes=1)
+    assert [(one.what, one.verdict, one.by) for one in found] == [
+        ("0", FOUND, ""),
+        ("1", FOUND, "now"),
+        ("2", FOUND, "now"),
+        ("3", EQUAL, ""),
+    ]
+    assert [Verdict(**one) for one in json.loads(file.read_text())["mutants"]] == found
+
+
+def _judged_now(mutant: Mutant) -> Verdict:
+    return Verdict(mutant.mission, mutant.kind, mutant.what, FOUND, "now", "", None, 0.0)
+
+
+def test_flights_of_a_campaign_see_what_is_wrong_and_what_is_otherwise() -> None:
+    campaign = load_campaign(ROOT / "tests" / "campaigns" / "uav.yaml")
+    flights = Flights(study.robot_of(ROOT), "mapping", replace(campaign, runs=campaign.runs[:12]))
+    every = {one.what: one for one in study.mutants(ROOT, ["mapping"])}
+    seen = {
+        "mapping.xml, mapping: 'mapping mission': its first child stands in its place": WRONG,  # nothing lands it when it gives up
+        "mapping.xml, zed_navigation: 'leg': children 2 and 3 are swapped": OTHERWISE,
+        "mapping.xml, ready: 'Sequence': Sequence is Fallback": NOTHING,
+    }
+    for what, by in seen.items():
+        one = flights.judge(every[what])
+        assert (one.by, one.flights) == (by, one.first if by == WRONG else 6), one
+    broken = flights.judge(replace(every["mapping.xml, ready: 'Sequence': Sequence is Fallback"], text="<root>"))
+    assert broken.by == REFUSED
+
+
+def test_no_two_mutants_of_the_drone_are_told_alike_among_those_that_are_studied() -> None:
+    some = [(one.mission, one.kind, one.what) for one in chosen(list(study.mutants(ROOT, [])), 300, seed=0)]
+    assert len(set(some)) == len(some)
 
 
 @pytest.mark.long

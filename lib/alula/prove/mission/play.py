@@ -7,7 +7,7 @@ those of the search: without inputs and outputs, and what data say is one resour
 from __future__ import annotations
 
 import operator
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
 
@@ -45,11 +45,12 @@ class LeftError(Exception):
 
 @dataclass(frozen=True)
 class Played:
-    """How a run was played: the mission's end, and where it left the run (empty: nowhere)."""
+    """How a run was played: the mission's end, where it left the run (empty: nowhere), and the outputs that the mission's account tells."""
 
     end: End
     left: str
     simulated_s: float
+    facts: Mapping[str, object]
 
 
 def play(path: Path, run: MissionRun, part: MissionPart, out: Path | None = None) -> Played:
@@ -93,15 +94,15 @@ def _alike(chosen: Question, asked: Question) -> bool:
 
 
 class _Function(SkillHooks):
-    """A function that ends when the run says so, also when it was interrupted."""
+    """A function that ends when the run says so, also when it was interrupted; ``validated`` says why inputs are refused."""
 
-    def __init__(self, running: dict[str, Execution], told: dict[str, float], refuses: Callable[[], bool]) -> None:
+    def __init__(self, running: dict[str, Execution], told: dict[str, float], validated: Callable[[], str]) -> None:
         self._running = running
         self._told = told
-        self._refuses = refuses
+        self._validated = validated
 
     def validate(self, _: object) -> str:
-        return "as in the counterexample" if self._refuses() else ""
+        return self._validated()
 
     def on_dispatch(self, execution: Execution) -> None:
         self._running[execution.id] = execution
@@ -140,8 +141,8 @@ class _Player:
         self._running: dict[str, Execution] = {}
         self._told: dict[str, float] = {}
         """The progress that functions tell."""
-        self._refusing = False
-        """Whether the function that is asked now refuses the inputs."""
+        self._arriving: Event | None = None
+        """The step by which a request arrives now."""
         self._handles: dict[int, SkillHandle] = {}
         self._oracle = _Answers()
         playables = [playable(one) for one in run.skillsets]
@@ -151,6 +152,7 @@ class _Player:
         nodes = MissionPart(opaque(Robot(self._oracle), part).nodes, memory=part.memory)
         plan = plan_of_file(path, path.stem, run.skillsets, _Unknown(), nodes)
         plan = replace(plan, inputs={})
+        self._facts = plan.facts
         clock_ns = lambda: self.world.clock.now_ns  # noqa: E731
         record = None if out is None else MissionRecord(out, plan, clock_ns, plan.parameters)
         bus = self.world.bus
@@ -164,7 +166,14 @@ class _Player:
         self.world.run_for(0.0)
 
     def _function(self) -> _Function:
-        return _Function(self._running, self._told, lambda: self._refusing)
+        return _Function(self._running, self._told, self._validated)
+
+    def _validated(self) -> str:
+        """Refuse the inputs of the request that arrives, or interrupt it while they are looked at: then it never runs."""
+        event = self._arriving
+        if event is not None and event.kind is Kind.INTERRUPT:
+            self.world.managers[event.skillset].engine.interrupt(self._handles[event.leaf].id)
+        return "as in the counterexample" if event is not None and event.state == ExecutionState.NOT_VALIDATED.value else ""
 
     def take(self, event: Event) -> None:
         """Have it happen; raise LeftError where it does not."""
@@ -175,6 +184,8 @@ class _Player:
                 self._arrive(event)
             case Kind.RESULT:
                 self._execution(event).terminate(event.result)
+            case Kind.INTERRUPT if self._is_held(event):
+                self._arrive(event)
             case Kind.INTERRUPT:
                 self._execution(event).interrupted()
             case Kind.EXTERN:
@@ -249,21 +260,23 @@ class _Player:
         by_data = event.failure and event.state == ExecutionState.NOT_READY.value
         if by_data:
             self._say_data(event.skillset, refuses(event.name, event.result))
-        self._refusing = event.state == ExecutionState.NOT_VALIDATED.value
+        self._arriving = event
         self._held.pop(handle.id)()
         self.world.run_for(0.0)
-        self._refusing = False
+        self._arriving = None
         if by_data:
             self._say_data(event.skillset, AS_WANTED)
         found = f"{handle.state.value} {handle.result}".strip()
         refused = handle.state in {ExecutionState.NOT_READY, ExecutionState.NOT_VALIDATED}
-        if refused != (event.kind is Kind.REFUSE):
+        interrupted = handle.state is ExecutionState.INTERRUPTED
+        if refused != (event.kind is Kind.REFUSE) or interrupted != (event.kind is Kind.INTERRUPT):
             raise LeftError(f"{event.skill} is {found}, which it is not in the counterexample")
+
+    def _is_held(self, event: Event) -> bool:
+        return event.leaf in self._handles and self._handles[event.leaf].id in self._held
 
     def _execution(self, event: Event) -> Execution:
         handle = self._handles.get(event.leaf)
-        if handle is not None and handle.id in self._held:
-            raise LeftError(f"{event.skill} is interrupted before its request arrives, which no play can bring about")
         execution = None if handle is None else self._running.get(handle.id)
         if execution is None or execution.done:
             raise LeftError(f"{event.skill} does not run")
@@ -286,7 +299,7 @@ class _Player:
         """End the record."""
         end = self._driver.end or End(Outcome.ABORTED, f"it left the counterexample {left}" if left else "the counterexample ends here")
         self._driver.finish(end)
-        return Played(end, left, self.world.now_s)
+        return Played(end, left, self.world.now_s, self._facts())
 
 
 class _Unknown(dict[str, object]):
