@@ -117,6 +117,11 @@ class RobotFolder:
         file = self.file(BEHAVIOUR)
         return [] if file is None else [file]
 
+    def mocks_on_top(self, robot: str) -> list[Path]:
+        """Return the file by which a fleet adds to what the mocks of one of its robots do, none where it has none."""
+        file = self.root / "mocks" / f"{robot}.yaml"
+        return [file] if file.is_file() else []
+
     def world(self, name: str) -> Path:
         """Return the file of a world, by its name or as a path."""
         return self.worlds / f"{name}.yaml" if name and name.isidentifier() else Path(name).expanduser()

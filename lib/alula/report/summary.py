@@ -20,7 +20,7 @@ from alula.report.recovery import Recovery
 from alula.report.responses import FaultResponse, injected, summarise_response
 from alula.report.rows import resources, skills
 
-OUTCOMES = frozenset({"accomplished", "degraded", "given_up", "aborted", "not_started", "running"})
+OUTCOMES = frozenset({"accomplished", "degraded", "given_up", "aborted", "not_started", "served", "running"})
 
 
 class RecoverySummary(TypedDict):
@@ -111,10 +111,10 @@ def _of_fleet() -> bool:
 
 def note_doubts(facts: RunFacts, observed: Observed, phases: Phases, problems: Problems) -> None:
     """Say what the numbers alone would hide: a run without a departure, faults that never came."""
-    if not phases.departed and home() is not None:
+    scenario = load_scenario(facts.scenario)
+    if not phases.departed and home() is not None and scenario.mission:  # who only serves skills may stay where it is
         problems.note(f"no {page_words()['departure']} is known: times count from {phases.zero_from}")
     broken = {fault.sensor for fault in injected(observed)}
-    scenario = load_scenario(facts.scenario)
     others = dict(scenario.faults).keys() - dict(scenario.processes).keys()  # the radio's: nothing of them is in the bag
     for fault in facts.faults:
         what = parse_fault(fault).what
