@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import json
-import signal
 import subprocess
 import time
 from collections.abc import Callable, Sequence
@@ -103,7 +102,7 @@ class Members:
         living = [member for member in self._members if member.lives]
         for member in living if not at_once() else ():
             if member.process is not None:
-                member.process.send_signal(signal.SIGINT)
+                member.process.terminate()
         if living:
             say(f"the runs of {' and '.join(member.name for member in living)} end")
         end_s = time.monotonic() + END_TIMEOUT_S

@@ -28,7 +28,7 @@ import json, os, signal, sys, time
 from pathlib import Path
 out = Path(sys.argv[1])
 out.mkdir(parents=True)
-signal.signal(signal.SIGINT, lambda *_: (out / "told").touch() or sys.exit(0))
+signal.signal(signal.SIGTERM, lambda *_: (out / "told").touch() or sys.exit(0))
 if "refuse" in sys.argv: sys.exit("alula run: --fail: there is no zet")
 (out / "skills.mcap").touch()
 time.sleep(0 if "leave" in sys.argv else 600)

@@ -183,6 +183,14 @@ def find_robot(start: Path | None = None) -> RobotFolder:
     raise RobotError(f"there is no {FILE} in {here} or above; name the robot's folder with --robot DIR, or make one: alula new robot DIR")
 
 
+def robots_of_fleet() -> Mapping[str, RobotFolder]:
+    """Return the robots of the fleet that commands are about; none where they are about a robot, or there is none."""
+    try:
+        return find_robot().robots
+    except RobotError:
+        return {}
+
+
 def page_words() -> Mapping[str, Any]:
     """Return the robot's words for its reports; the usual ones where there is no robot, as for a run from elsewhere."""
     try:

@@ -7,7 +7,7 @@ from dataclasses import asdict
 from typing import Any, TypedDict
 
 from alula.common.faults import parse_fault
-from alula.common.robots import RobotError, find_robot, page_words
+from alula.common.robots import page_words, robots_of_fleet
 from alula.common.scenarios import load_scenario
 from alula.report.facts import Death, RunFacts
 from alula.report.files import Problems, ReportError, mapping, read_json, sequence
@@ -73,7 +73,7 @@ def read_outcome(facts: RunFacts, history: History, problems: Problems) -> tuple
 
 def read_bridge(facts: RunFacts, problems: Problems) -> dict[str, object] | None:
     """Return the bridge's statistics, topic by topic; None where the run had no bridge, as over mocks, and a fleet's mission by itself."""
-    if facts.mock or _of_fleet():
+    if facts.mock or robots_of_fleet():
         return None
     statistics: object = None
     with problems.survive("bridge.json"):
@@ -100,13 +100,6 @@ def duration_s(history: History, observed: Observed, phases: Phases) -> float | 
     ends = [history.last_s, observed.last_s]
     end_s = phases.back_s or max((end for end in ends if end is not None), default=None)
     return phases.since(end_s)
-
-
-def _of_fleet() -> bool:
-    try:
-        return bool(find_robot().robots)
-    except RobotError:
-        return False
 
 
 def note_doubts(facts: RunFacts, observed: Observed, phases: Phases, problems: Problems) -> None:
