@@ -2,7 +2,10 @@
 
 from __future__ import annotations
 
+import contextlib
 import json
+import os
+import signal
 import subprocess
 import time
 from collections.abc import Callable, Sequence
@@ -58,10 +61,16 @@ class Member:
         lines = self._log.read_text(encoding="utf-8", errors="replace").strip().splitlines() if self._log.exists() else []
         return lines[-1].removeprefix("alula run: ") if lines else "it said nothing"
 
+    def tell(self, number: signal.Signals) -> None:
+        """Send a signal to the command, and to what it has begun before the run: set-up."""
+        if self.process is not None and self.process.poll() is None:
+            with contextlib.suppress(ProcessLookupError):
+                os.killpg(self.process.pid, number)
+
     def kill(self) -> None:
         """End all of its processes at once."""
-        if self.process is not None and self.process.poll() is None:
-            self.process.kill()
+        if self.process is not None:
+            self.tell(signal.SIGKILL)
             self.process.wait()
         try:
             run_id = RunSpec.load(self.folder / FILE).run_id
@@ -101,8 +110,7 @@ class Members:
         """Tell them to end, and wait until they have: robots come to rest first, unless ``at_once`` says otherwise."""
         living = [member for member in self._members if member.lives]
         for member in living if not at_once() else ():
-            if member.process is not None:
-                member.process.terminate()
+            member.tell(signal.SIGTERM)
         if living:
             say(f"the runs of {' and '.join(member.name for member in living)} end")
         end_s = time.monotonic() + END_TIMEOUT_S
@@ -125,8 +133,8 @@ def reports_of(spec: RunSpec) -> list[str]:
     for name in spec.members:
         folder = Path(spec.out_dir) / name
         try:
-            outcome = json.loads((folder / "summary.json").read_text(encoding="utf-8"))["outcome"]
+            outcome = json.loads((folder / "summary.json").read_text(encoding="utf-8"))["outcome"] or "no outcome"
+            told.append(f"{name}: {outcome}, {folder / 'report.html'}")
         except (OSError, ValueError, KeyError, TypeError):
-            outcome = "no summary"
-        told.append(f"{name}: {outcome}, {folder / 'report.html'}")
+            told.append(f"{name}: no report; {Path(spec.out_dir) / 'logs' / name}.log says what it did")
     return told

@@ -84,14 +84,14 @@ class Front:
     def run(self, spec_path: Path) -> int:
         """Run the supervisor to its end and return the mission's exit code; the run's processes are gone afterwards.
 
-        Of a fleet, the robots' runs first, and afterwards to their ends.
+        Of a fleet, the robots' runs first, and afterwards to their ends; raises RequestError where one of these could not begin.
         """
         self._interrupts.install()
         try:
             why_not = self._members.begin(lambda: self._interrupts.asked)
             if why_not:
-                self._say(why_not)
-            if why_not or self._interrupts.asked:
+                raise RequestError(why_not)
+            if self._interrupts.asked:
                 return CANNOT_START
             return self._run(spec_path)
         finally:
@@ -160,7 +160,11 @@ def main(arguments: list[str]) -> int:
         say(line)
     monitor = monitor_of(spec)
     with console_page(out, say) if spec.console else contextlib.nullcontext():
-        code = Front(spec, claim, say, monitor).run(out / FILE)
+        try:
+            code = Front(spec, claim, say, monitor).run(out / FILE)
+        except RequestError as error:
+            sys.stderr.write(f"alula run: {error}\n")
+            return CANNOT_START
         say("making the report")
         code = finish(spec, code, monitor)
         sys.stdout.write("".join(f"  {line}\n" for line in reports_of(spec)))

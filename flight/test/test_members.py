@@ -148,4 +148,4 @@ def test_the_reports_of_the_robots_are_told(tmp_path):
     (tmp_path / "one").mkdir()
     (tmp_path / "one" / "summary.json").write_text(json.dumps({"outcome": "served"}), encoding="utf-8")
     spec = RunSpec("meet", str(tmp_path), "id", members={"one": [], "two": []})
-    assert reports_of(spec) == [f"one: served, {tmp_path}/one/report.html", f"two: no summary, {tmp_path}/two/report.html"]
+    assert reports_of(spec) == [f"one: served, {tmp_path}/one/report.html", f"two: no report; {tmp_path}/logs/two.log says what it did"]
