@@ -224,7 +224,7 @@ def test_the_runs_of_a_fleets_robots_are_shown_below_that_of_their_mission(
         (tmp_path / name).mkdir()
         (tmp_path / name / "robot.yaml").write_text(f"name: {name}\n{text}", encoding="utf-8")
     monkeypatch.setenv("ALULA_ROBOT", str(tmp_path / "fleet"))
-    os.utime(robot / "run.json", (1.0, 1.0))
+    os.utime(mission / "run.json", (1.0, 1.0))
     (robot / "report.html").write_text("the rover's", encoding="utf-8")
 
     async def play(bench: Bench) -> None:
