@@ -9,6 +9,7 @@ import os
 import shlex
 import sys
 from collections.abc import Iterator
+from dataclasses import replace
 from pathlib import Path
 
 from alula.common.robots import RobotError, RobotFolder, RosPart, load_robot_folder
@@ -33,7 +34,9 @@ def lines(robot: RobotFolder) -> Iterator[str]:
     yield f"robot_skillsets={place(robot.skillsets, robot.root)}"
     yield f"robot_fleet=({' '.join(place(one.skillsets, robot.root) for one in robot.robots.values())})"
     yield from world_lines("1", robot.ros1, robot.root)
-    yield from world_lines("2", robot.ros2, robot.root)
+    # A fleet's missions take data in the messages of its robots.
+    below = [path for one in robot.robots.values() for path in one.ros2.packages]
+    yield from world_lines("2", replace(robot.ros2, packages=(*robot.ros2.packages, *below)), robot.root)
 
 
 if __name__ == "__main__":

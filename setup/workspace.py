@@ -13,7 +13,11 @@ import shutil
 from collections.abc import Iterable, Iterator, Mapping
 from dataclasses import dataclass
 from pathlib import Path
+from typing import TYPE_CHECKING
 from xml.etree import ElementTree as ET
+
+if TYPE_CHECKING:
+    from alula.common.robots import RobotFolder
 
 ROOT, STATE = Path(os.environ["ALULA_ROOT"]), Path(os.environ["ALULA_STATE"])
 GENERAL = {
@@ -135,10 +139,28 @@ def robots_workspace(world: str) -> Workspace:
     below = alulas_workspace(world)
     generated = find_packages([state / "generated"])
     found = find_packages((robot.ros1 if world == "1" else robot.ros2).packages)
-    found |= {name: package for name, package in generated.items() if world == "2" or name.endswith("_interfaces")}
+    if world == "2" and robot.robots:
+        found |= messages_of(robot)
+    # ROS 1 needs the interfaces of a robot's skills for its bridge; a fleet has missions alone, which run in ROS 2.
+    found |= {name: one for name, one in generated.items() if world == "2" or (name.endswith("_interfaces") and not robot.robots)}
     own = {name: package for name, package in found.items() if name not in below.packages}
     prefix = below.folder / ("devel" if world == "1" else "install")
     return Workspace(state / f"ros{world}", own, below.packages, (prefix, *below.prefixes))
+
+
+def messages_of(fleet: RobotFolder) -> dict[str, Package]:
+    """Return the robots' own packages of the messages that their models name: a fleet's missions take data in these."""
+    from alula.language.fleet import load_models
+
+    below = find_packages(place for one in fleet.robots.values() for place in one.ros2.packages)
+    wanted = [kind.interface.partition("/")[0] for kind in load_models(fleet).types.values()]
+    found: dict[str, Package] = {}
+    while wanted:
+        name = wanted.pop()
+        if name in below and name not in found:
+            found[name] = below[name]
+            wanted += below[name].needs
+    return found
 
 
 WORKSPACES = {"alula": alulas_workspace, "robot": robots_workspace}

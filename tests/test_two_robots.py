@@ -1,4 +1,4 @@
-"""A mission of two robots, over mocks: examples/two_robots names the drone and the rover, which know nothing of each other."""
+"""Missions of several robots: examples/two_robots over mocks, whose robots know nothing of each other, and a fleet in simulators."""
 
 from __future__ import annotations
 
@@ -8,7 +8,11 @@ import subprocess
 from pathlib import Path
 from typing import Any
 
+import psutil
 import pytest
+
+from alula.common.processes import processes_of_run
+from alula.common.record import EVENTS, read_record
 
 ALULA_ROOT = Path(__file__).resolve().parents[1]
 FLEET = ALULA_ROOT / "examples/two_robots"
@@ -36,28 +40,34 @@ def test_the_rover_is_sent_to_where_the_drone_landed(tmp_path: Path) -> None:
     summary = run(tmp_path / "run", 0)
     assert (summary["outcome"], summary["problems"]) == ("accomplished", [])
     done = skills(summary)
-    assert done[2:5] == [
-        ("drone_navigation", "takeoff", "AT_ALTITUDE"),
-        ("drone_navigation", "goto_straight", "ARRIVED"),
-        ("drone_navigation", "land", "LANDED"),
-    ]
+    assert done[0] == ("drone_navigation", "takeoff", "AT_ALTITUDE")
+    assert done[3:5] == [("drone_navigation", "goto_straight", "ARRIVED"), ("drone_navigation", "land", "LANDED")]
+    assert target(summary) == {"x": 6.0, "y": 5.4, "theta": 0.0}, "where it landed, in the rover's map"
     assert done[5:] == [("rover_perception", "scan", "INTERRUPTED"), ("rover_base", "drive_to", "ARRIVED")]
     replay = command("replay", str(tmp_path / "run"))
     assert replay.returncode == 0, replay.stdout + replay.stderr
 
 
-@pytest.mark.parametrize(
-    ("fault", "failed"),
-    [
-        ("drone_zed@5", ("drone_perception", "zed_depthmap", "zed_ok")),
-        ("rover_laser@3", ("rover_perception", "scan", "works")),
-    ],
-)
-def test_what_fails_of_one_robot_ends_the_mission_of_both_in_order(fault: str, failed: tuple[str, str, str], tmp_path: Path) -> None:
-    summary = run(tmp_path / "run", 1, "--fail", fault)
+def target(summary: dict[str, Any]) -> object:
+    return next(one["inputs"]["target"] for one in summary["skills"] if one["skill"] == "drive_to")
+
+
+def test_a_drone_without_a_camera_lands_where_it_is_and_the_rover_is_sent_there(tmp_path: Path) -> None:
+    summary = run(tmp_path / "run", 0, "--fail", "drone_zed@4")
+    assert summary["outcome"] == "degraded"
+    done = skills(summary)
+    assert ("drone_perception", "zed_depthmap", "zed_ok") in done
+    assert done[-1] == ("rover_base", "drive_to", "ARRIVED")
+    place = target(summary)
+    assert isinstance(place, dict)
+    assert 2.0 < place["x"] < 5.5, "on the way"
+
+
+def test_what_fails_of_the_rover_ends_the_mission_of_both_in_order(tmp_path: Path) -> None:
+    summary = run(tmp_path / "run", 1, "--fail", "rover_laser@3")
     assert summary["outcome"] == "given_up"
     done = skills(summary)
-    assert failed in done
+    assert ("rover_perception", "scan", "works") in done
     assert ("drone_navigation", "land", "LANDED") in done
     assert ("rover_base", "stop_here", "STANDING") in done
     assert ("rover_base", "drive_to", "ARRIVED") not in done
@@ -75,3 +85,89 @@ def test_the_mission_of_both_is_checked_and_drawn_by_their_models(tmp_path: Path
     palette = command("palette", str(FLEET)).stdout
     assert '<Action ID="rover_base.drive_to">' in palette
     assert '<Action ID="drone_navigation.takeoff">' in palette
+
+
+MISSION = """
+<root BTCPP_format="4" main_tree_to_execute="hop">
+  <BehaviorTree ID="hop">
+    <Sequence>
+      <one_navigation.takeoff name="up" height="2.0" speed="2.0"/>
+      <one_navigation.land name="down"/>
+    </Sequence>
+  </BehaviorTree>
+  <BehaviorTree ID="ready">
+    <Needs name="it is ours" if="one_navigation.SDK_authority == AVAILABLE" otherwise="'it is not ours'"/>
+  </BehaviorTree>
+  <BehaviorTree ID="stop_here">
+    <one_navigation.land name="land here"/>
+  </BehaviorTree>
+</root>
+"""
+
+
+@pytest.fixture
+def hop(tmp_path: Path) -> Path:
+    """Return a fleet of the drone alone: it has what the drone's set-up has built, and needs none of its own."""
+    folder = tmp_path / "fleet"
+    for name, text in {
+        "robot.yaml": f"name: fleet\nrobots: {{one: {ALULA_ROOT}}}\ndeparture: one_navigation.flight_status ON_GROUND\n",
+        "scenarios/hop.yaml": "about: x\nmission: missions/hop.xml\nskillsets: [one_navigation]\n"
+        "launch: skillset_ros1/fleet.launch\nrobots: {one: standby}\n",
+        "missions/hop.xml": MISSION,
+    }.items():
+        (folder / name).parent.mkdir(parents=True, exist_ok=True)
+        (folder / name).write_text(text, encoding="utf-8")
+    (folder / ".alula").symlink_to(Path(os.environ.get("ALULA_STATE", ALULA_ROOT / ".alula")) / "robot")
+    return folder
+
+
+def fly(fleet: Path, out: Path) -> subprocess.Popen[str]:
+    words = [str(ALULA_ROOT / "setup/in_ros1"), "python3", "-m", "alula_flight.run", "hop", "--with", "one:--rate=0", "--out", str(out)]
+    return subprocess.Popen(
+        words, stdout=subprocess.PIPE, stderr=subprocess.STDOUT, text=True, env={**os.environ, "ALULA_ROBOT": str(fleet)}
+    )
+
+
+def left(out: Path) -> list[psutil.Process]:
+    """Return what runs of the runs of the mission and of the robot."""
+    ids = [json.loads(path.read_text(encoding="utf-8"))["run_id"] for path in (out / "run.json", out / "one" / "run.json")]
+    return [process for run_id in ids for process in processes_of_run(run_id)]
+
+
+@pytest.mark.flight
+@pytest.mark.timeout(600)
+def test_the_mission_of_a_fleet_flies_in_the_simulator_of_its_robot(hop: Path, tmp_path: Path) -> None:
+    out = tmp_path / "run"
+    flight = fly(hop, out)
+    said, _ = flight.communicate()
+    assert flight.returncode == 0, said
+    assert left(out) == []
+    mission, robot = (json.loads((folder / "summary.json").read_text(encoding="utf-8")) for folder in (out, out / "one"))
+    assert (mission["outcome"], robot["outcome"]) == ("accomplished", "served")
+    assert skills(mission) == [("one_navigation", "takeoff", "AT_ALTITUDE"), ("one_navigation", "land", "LANDED")]
+    assert skills(robot) == [("navigation", "takeoff", "AT_ALTITUDE"), ("navigation", "land", "LANDED")]
+    assert (robot["landed"], robot["collisions"], robot["problems"], mission["problems"]) == (True, 0, [], [])
+    # By one clock: what the mission hears was so a moment before, by the robot's own record.
+    begun_s = [
+        [one.stamp_s for one in read_record(folder) if one.topic == EVENTS and one.value.get("state") == "RUNNING"]
+        for folder in (out, out / "one")
+    ]
+    assert all(0.0 <= heard_s - told_s < 1.0 for heard_s, told_s in zip(*begun_s, strict=True)), begun_s
+    assert "one: served" in said
+
+
+@pytest.mark.flight
+@pytest.mark.timeout(600)
+def test_a_fleets_command_that_is_killed_leaves_nothing_behind_and_the_drone_landed(hop: Path, tmp_path: Path) -> None:
+    out = tmp_path / "run"
+    flight = fly(hop, out)
+    assert flight.stdout is not None
+    assert any("flight_status: ON_GROUND -> IN_AIR" in line for line in flight.stdout), "it never lifted off"
+    started = psutil.Process(flight.pid).children(recursive=True)
+    flight.kill()
+    flight.wait()
+    psutil.wait_procs(started)
+    assert left(out) == []
+    robot = json.loads((out / "one" / "summary.json").read_text(encoding="utf-8"))
+    assert (robot["outcome"], robot["landed"], robot["collisions"]) == ("served", True, 0)
+    assert json.loads((out / "summary.json").read_text(encoding="utf-8"))["outcome"] in {"aborted", "given_up"}

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import argparse
+import math
 import sys
 import uuid
 from collections.abc import Mapping, Sequence
@@ -12,7 +13,9 @@ from typing import Any
 from alula.commands.run_options import check_seed, groot_address, run_folder, run_parser, world_file
 from alula.common.faults import FaultError, parse_fault
 from alula.common.network import DOMAINS, NAMESPACE, DomainClaim, free_port
+from alula.common.robots import find_robot, fleet_name
 from alula.common.scenarios import Scenario, ScenarioError, load_scenario
+from alula.common.suggestions import nearest
 from alula.live import options
 from alula.live.part import RunPart
 from alula.live.spec import RequestError, RunSpec
@@ -40,6 +43,17 @@ def parse(arguments: Sequence[str], part: RunPart) -> RunSpec:
     parser.add_argument(
         "--namespace", default="", metavar="NAME", help="put its ROS 2 names below this one: runs with one may share a domain"
     )
+    parser.add_argument("--limit", type=float, default=0.0, metavar="SECONDS", help="end the run after so long, by the mission clock")
+    parser.add_argument(
+        "--commanded",
+        action="store_true",
+        help="of a scenario without a mission: simulated time waits for who calls the skills from outside",
+    )
+    if find_robot().robots:
+        parser.add_argument("--served", action="store_true", help="the robots run already, in the DDS domain of --domain: start none")
+        parser.add_argument(
+            "--with", dest="options", action="append", default=[], metavar="ROBOT:OPTION", help="an option of a robot's own run"
+        )
     parser.add_argument("--behaviour", action="append", default=[], metavar="FILE", help="with --mock: behaviour file of the mocks")
     parser.add_argument(options.FLAG, action=TellOptions, part=part, help="print the robot's own options as JSON, and run nothing")
     part.add_options(parser)
@@ -47,24 +61,56 @@ def parse(arguments: Sequence[str], part: RunPart) -> RunSpec:
     scenario = read_scenario(given.scenario)
     if given.behaviour:
         raise RequestError("--behaviour is for mocks; add --mock")
+    if given.commanded and scenario.mission:
+        raise RequestError(f"--commanded: the scenario {scenario.name} has a mission; name one without, that serves its skills only")
     seed, world = check_seed(given.seed), world_file(scenario, given.world)
     part.check_world(world)
     own = part.read(given, scenario)
+    robots = find_robot().robots
+    if robots and given.served and not given.domain:
+        raise RequestError("--served: say in which DDS domain the robots are, with --domain N")
+    members = {} if not robots or given.served else member_words(scenario, given.fail, given.options)
     return RunSpec(
         scenario=given.scenario,
         out_dir=str(run_folder(given.out, given.scenario)),
         run_id=uuid.uuid4().hex,
         seed=seed,
-        faults=read_faults(given.fail, {**part.faults, **dict(scenario.faults)}),
+        faults=read_faults(given.fail, None if robots else {**part.faults, **dict(scenario.faults)}),
         world=world,
         master_port=free_port(),
         domain=read_domain(given.domain),
-        namespace=read_namespace(given.namespace),
+        namespace=read_namespace(given.namespace or (find_robot().name if robots else "")),
         console=given.console,
         monitor=given.monitor,
+        limit_s=read_limit(given.limit),
+        commanded=given.commanded,
+        members=members,
         groot=groot_address(given.groot),
         own=own,
     )
+
+
+def member_words(scenario: Scenario, fail: Sequence[str], options: Sequence[str]) -> dict[str, list[str]]:
+    """Return the words for the run of each robot of a fleet: its scenario, its faults, and its own options; raises RequestError."""
+    robots, said = find_robot().robots, dict(scenario.robots)
+    for name in said:
+        if name not in robots:
+            raise RequestError(f"the scenario {scenario.name} names a robot {name}; {nearest(name, robots)}")
+    if missing := [name for name in robots if name not in said]:
+        how = f"add `robots: {{{missing[0]}: standby}}`, or --served"
+        raise RequestError(f"the scenario {scenario.name} does not say how {missing[0]} serves its skills; {how}")
+    words = {name: [one] for name, one in said.items()}
+    for text in fail:
+        robot = next((name for name in words if text.startswith(fleet_name(name, ""))), "")
+        if not robot:
+            raise RequestError(f"--fail {text}: say of which robot, as {fleet_name(next(iter(words)), text)}")
+        words[robot].append(f"--fail={text.removeprefix(fleet_name(robot, ''))}")
+    for text in options:
+        robot, _, option = text.partition(":")
+        if robot not in words or not option.startswith("--"):
+            raise RequestError(f"--with {text}: needs a robot and an option of its run, as {next(iter(words))}:--rate=0")
+        words[robot].append(option)
+    return words
 
 
 def with_claim(request: RunSpec, claim: DomainClaim, part: RunPart) -> RunSpec:
@@ -78,6 +124,13 @@ def read_domain(number: int | None) -> int:
     if number is not None and number not in DOMAINS:
         raise RequestError(f"--domain {number}: a run has a DDS domain from {DOMAINS[0]} to {DOMAINS[-1]}")
     return number or 0
+
+
+def read_limit(seconds: float) -> float:
+    """Return how long the run may last, 0: without a limit; raises RequestError."""
+    if not 0.0 <= seconds < math.inf:  # also refuses nan
+        raise RequestError(f"--limit {seconds:g}: must be 0 (no limit) or a number of seconds")
+    return seconds
 
 
 def read_namespace(name: str) -> str:
@@ -98,7 +151,7 @@ def read_scenario(name: str) -> Scenario:
     return scenario
 
 
-def read_faults(texts: Sequence[str], known: Mapping[str, Sequence[str]]) -> tuple[str, ...]:
+def read_faults(texts: Sequence[str], known: Mapping[str, Sequence[str]] | None) -> tuple[str, ...]:
     """Check what `--fail` asks for, and return it in the form that all parts read."""
     try:
         return tuple(str(parse_fault(text, known)) for text in texts)

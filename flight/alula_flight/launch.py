@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from alula.common.faults import parse_fault
+from alula.common.robots import find_robot
 from alula.common.scenarios import Scenario, load_scenario
 from alula.live.part import RunPart
 from alula.live.spec import RequestError, RunSpec
@@ -29,4 +30,8 @@ def launch_arguments(spec: RunSpec, part: RunPart) -> list[str]:
     of_every_robot = {"scenario": spec.scenario, "out": spec.out_dir, "seed": spec.seed, "faults": ",".join(faults)}
     world = {"world": spec.world} if spec.world else {}
     groot = {"groot": spec.groot} if spec.groot else {}
-    return [f"{name}:={value}" for name, value in {**of_every_robot, **world, **groot, **part.launch_arguments(spec)}.items()]
+    # The mission of a fleet has the clock of its robots where it has their simulators, which wait for it.
+    clock: dict[str, object] = {"heartbeat": False} if spec.commanded else {}
+    if find_robot().robots:
+        clock = {"heartbeat": bool(spec.members), "use_sim_time": bool(spec.members)}
+    return [f"{name}:={value}" for name, value in {**of_every_robot, **world, **groot, **clock, **part.launch_arguments(spec)}.items()]

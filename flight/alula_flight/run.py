@@ -8,7 +8,6 @@
 from __future__ import annotations
 
 import contextlib
-import ctypes
 import os
 import signal
 import subprocess
@@ -21,7 +20,7 @@ import psutil
 
 from alula.commands.run_options import shown_at
 from alula.common.network import DOMAINS, DomainClaim, NoFreeDomainError, NoFreePortError, claim_domain
-from alula.common.processes import NAMESPACE_VARIABLE, RUN_ID_VARIABLE, end_run, node_name, processes_of_run
+from alula.common.processes import NAMESPACE_VARIABLE, RUN_ID_VARIABLE, die_with_parent, end_run, node_name, processes_of_run
 from alula.common.robots import RobotError
 from alula.common.scenarios import ScenarioError, load_scenario
 from alula.common.shared_memory import sweep_shared_memory
@@ -35,18 +34,13 @@ from alula.report.ends import FRONT, ReportedEnd, ended_by_signal, note_end
 from alula.report.live import LiveEvents
 from alula_flight.command_line import parse, with_claim
 from alula_flight.console_page import console_page
+from alula_flight.members import members_of, reports_of
 from alula_flight.outcome import CANNOT_START, GIVEN_UP, finish
 
-PR_SET_PDEATHSIG = 1  # prctl(2)
 MISSION_TIMEOUT_S = 150.0  # wall clock; to bring the robot to rest
 TIMEOUT_S = 3.0  # wall clock, for what is left of a run to end by itself
 MISSION_NODE = "mission"
 STOPPING = "stopping: the robot comes to rest first; Ctrl-C again ends everything at once"
-
-
-def _die_with_parent() -> None:
-    """Ask the kernel for SIGTERM when the front dies; runs in the supervisor between fork and exec."""
-    ctypes.CDLL(None, use_errno=True).prctl(PR_SET_PDEATHSIG, signal.SIGTERM)
 
 
 def start_supervisor(spec: RunSpec, spec_path: Path, claim: DomainClaim) -> subprocess.Popen[bytes]:
@@ -71,7 +65,7 @@ def start_supervisor(spec: RunSpec, spec_path: Path, claim: DomainClaim) -> subp
             stderr=subprocess.STDOUT,
             start_new_session=True,
             pass_fds=[lock.fileno() for lock in claim.locks],
-            preexec_fn=_die_with_parent,  # noqa: PLW1509  (one prctl, no allocation)
+            preexec_fn=die_with_parent,  # noqa: PLW1509  (one prctl, no allocation)
         )
 
 
@@ -83,17 +77,33 @@ class Front:
         self._claim = claim
         self._say = say
         self._monitor = monitor
+        self._members = members_of(spec)
         self._interrupts = Interrupts(self._stop, lambda: say("ending everything at once"))
         self._supervisor: subprocess.Popen[bytes] | None = None
 
     def run(self, spec_path: Path) -> int:
-        """Run the supervisor to its end and return the mission's exit code; the run's processes are gone afterwards."""
+        """Run the supervisor to its end and return the mission's exit code; the run's processes are gone afterwards.
+
+        Of a fleet, the robots' runs first, and afterwards to their ends; raises RequestError where one of these could not begin.
+        """
         self._interrupts.install()
+        try:
+            why_not = self._members.begin(lambda: self._interrupts.asked)
+            if why_not:
+                raise RequestError(why_not)
+            if self._interrupts.asked:
+                return CANNOT_START
+            return self._run(spec_path)
+        finally:
+            self._members.end(self._say, lambda: self._interrupts.at_once)
+
+    def _run(self, spec_path: Path) -> int:
         supervisor = self._supervisor = start_supervisor(self._spec, spec_path, self._claim)
         live = LiveEvents(Path(self._spec.out_dir), self._say, self._monitor)
         try:
             while supervisor.poll() is None and not self._interrupts.at_once:
                 live.show_new()
+                self._members.look()
                 with contextlib.suppress(subprocess.TimeoutExpired):
                     supervisor.wait(0.2)
             if supervisor.poll() is not None and supervisor.returncode < 0:
@@ -150,9 +160,15 @@ def main(arguments: list[str]) -> int:
         say(line)
     monitor = monitor_of(spec)
     with console_page(out, say) if spec.console else contextlib.nullcontext():
-        code = Front(spec, claim, say, monitor).run(out / FILE)
+        try:
+            code = Front(spec, claim, say, monitor).run(out / FILE)
+        except RequestError as error:
+            sys.stderr.write(f"alula run: {error}\n")
+            return CANNOT_START
         say("making the report")
-        return finish(spec, code, monitor)
+        code = finish(spec, code, monitor)
+        sys.stdout.write("".join(f"  {line}\n" for line in reports_of(spec)))
+        return code
 
 
 def monitor_of(spec: RunSpec) -> Monitor | None:

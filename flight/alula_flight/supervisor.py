@@ -1,7 +1,7 @@
 """Start a run with roslaunch, watch its processes, and end it: ``python -m alula_flight.supervisor RUN_SPEC``.
 
 The supervisor lives in a process of its own, started by the front (`alula_flight.run`). It ends when the mission's process ends,
-or when what died or a signal makes the run pointless. Exit code: the mission's, or 1.
+or when what died or a signal makes the run pointless, or its time is over. Exit code: the mission's, or 1.
 """
 
 from __future__ import annotations
@@ -92,7 +92,9 @@ class Supervisor:
         self._out = Path(spec.out_dir)
         self._clock = MissionClock()
         self._watch = Watch(self._out, self._clock, part.consequences)
+        self._serves = not load_scenario(spec.scenario).mission
         self._asked_to_end: signal.Signals | None = None
+        self._began_s: float | None = None  # mission clock
         self._beginning = Beginning(spec, part, self._clock)
         self._departure = Departure(self._out)
         self._front = os.getppid()
@@ -158,8 +160,19 @@ class Supervisor:
             self._ends("the front has died")
         elif self._asked_to_end is not None:
             note_end(self._out, ReportedEnd(SIGNAL, f"{self._asked_to_end.name} to the supervisor", self._clock.now_s))
+        elif self._over_time:
+            self._ends(f"its limit of {self._spec.limit_s:g} s is over")
         else:
             self._ends(self._watch.worst_death)
+
+    @property
+    def _over_time(self) -> bool:
+        """Tell whether the run has lasted for as long as it may, by the mission clock."""
+        now_s = self._clock.now_s
+        if not self._spec.limit_s or now_s is None:
+            return False
+        self._began_s = now_s if self._began_s is None else self._began_s
+        return now_s - self._began_s > self._spec.limit_s
 
     def _until_over(self, launch: Any) -> int:
         abort_since: float | None = None
@@ -170,8 +183,8 @@ class Supervisor:
             self._beginning.look()
             self._apply_faults()
             if self._watch.mission_exit is not None:
-                if self._watch.mission_exit != 0:
-                    self._part.bring_to_rest(self._clock)  # what the mission could not
+                if self._watch.mission_exit != 0 or self._serves:
+                    self._part.bring_to_rest(self._clock)  # what the mission could not, or there was none
                 return self._watch.mission_exit if self._watch.worst is Consequence.GO_ON else GIVEN_UP
             if self._clock.stands_still:
                 self._ends(f"{self._clock.standstill}: nothing came from {self._part.clock_source(self._spec)}")
@@ -182,7 +195,7 @@ class Supervisor:
             if self._watch.worst is Consequence.REST:
                 self._part.bring_to_rest(self._clock)
                 return GIVEN_UP
-            asked = self._asked_to_end is not None or self._front_died or self._watch.worst is Consequence.ABORT
+            asked = self._asked_to_end is not None or self._front_died or self._watch.worst is Consequence.ABORT or self._over_time
             if asked and abort_since is None:
                 abort_since = time.monotonic()
                 self._note_abort()

@@ -83,6 +83,18 @@ def test_a_specification_survives_its_file(tmp_path):
     assert RunSpec.load(tmp_path / "run.json") == spec
 
 
+@pytest.mark.parametrize(
+    ("words", "told"),
+    [
+        (["--limit", "-1"], "--limit -1: must be 0"),
+        (["--commanded"], "the scenario mapping has a mission; name one without"),
+    ],
+)
+def test_what_a_run_with_a_mission_can_not_be(words, told, tmp_path):
+    with pytest.raises(RequestError, match=told):
+        parse(["mapping", *words, "--out", str(tmp_path / "run")], RunPart())
+
+
 def test_behaviour_is_of_mocks(tmp_path):
     with pytest.raises(RequestError, match="add --mock"):
         parse(["mapping", "--behaviour", "x.yaml", "--out", str(tmp_path / "run")], RunPart())

@@ -10,7 +10,7 @@ from types import SimpleNamespace
 
 import pytest
 
-from alula.live.part import Consequence, RunPart
+from alula.live.part import Clock, Consequence, RunPart
 from alula.live.spec import RunSpec
 from alula.report.deaths import read_deaths
 from alula.report.ends import OPERATOR, SIGNAL, SUPERVISOR, ReportedEnd, note_end, read_end
@@ -45,19 +45,28 @@ class Part(RunPart):
 
     consequences: Mapping[str, Consequence] = {"simulator": Consequence.END}
 
+    rested = 0
+
     def clock_source(self, spec: RunSpec) -> str:
         return "the simulator"
+
+    def bring_to_rest(self, clock: Clock) -> None:
+        self.rested += 1
 
 
 class Flight:
     """A supervisor whose run has no process left: it ends as soon as it is told to."""
 
-    def __init__(self, out: Path) -> None:
-        self.supervisor = Supervisor(RunSpec("mapping", str(out), "id"), Part())
+    def __init__(self, out: Path, scenario: str = "mapping", limit_s: float = 0.0) -> None:
+        self.part = Part()
+        self.supervisor = Supervisor(RunSpec(scenario, str(out), "id", limit_s=limit_s), self.part)
         self.supervisor._clock.begin(simulated=True)
         process = SimpleNamespace(spawn_count=1, respawn=False)
         self.launch = SimpleNamespace(pm=SimpleNamespace(get_process=lambda _: process, get_active_names=list))
         self.supervisor._watch.follow(self.launch)
+
+    def clock(self, now_s: float) -> None:
+        self.supervisor._clock._tick(SimpleNamespace(clock=SimpleNamespace(to_sec=lambda: now_s)))
 
     def died(self, name: str) -> None:
         self.supervisor._watch.process_died(f"{name}-1", 1)
@@ -100,6 +109,25 @@ def test_what_the_operator_asked_the_front_for_is_the_operators(flight: Flight, 
     flight.signalled(signal.SIGINT)
     flight.ends()
     assert read_end(tmp_path) == ReportedEnd(OPERATOR, "Ctrl-C")
+
+
+def test_a_run_lasts_no_longer_than_its_limit(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(supervisor, "ABORT_TIMEOUT_S", 0.0)
+    flight = Flight(tmp_path, limit_s=30.0)
+    for now_s in (7.0, 36.9):
+        flight.clock(now_s)
+        assert not flight.supervisor._over_time
+    flight.clock(37.1)
+    assert flight.ends() == GIVEN_UP
+    assert read_end(tmp_path) == ReportedEnd(SUPERVISOR, "its limit of 30 s is over", 37.1)
+
+
+@pytest.mark.parametrize(("scenario", "rested"), [("standby", 1), ("mapping", 0)])
+def test_who_only_served_its_skills_is_brought_to_rest(scenario: str, rested: int, tmp_path: Path) -> None:
+    flight = Flight(tmp_path, scenario)
+    flight.supervisor._watch.mission_exit = 0
+    assert flight.ends() == 0
+    assert flight.part.rested == rested
 
 
 def test_a_front_that_has_died_is_named(flight: Flight, tmp_path: Path) -> None:

@@ -87,6 +87,8 @@ def load_mocked_scenario(name: str, behaviour: Sequence[Path] = (), *, world: st
     """
     try:
         scenario, robot = load_scenario(name), find_robot()
+        if not scenario.mission:
+            raise AnalysisError(f"the scenario {name} has no mission to be run over mocks; `alula mock` serves its skills")
         inputs = inputs_of(scenario, world)
         known = behaviour_of(robot, behaviour).of(frozenset(scenario.skillsets))
     except (ScenarioError, RobotError, InputError, SkillRuntimeError) as error:

@@ -6,7 +6,9 @@ All processes of a run inherit ``ALULA_RUN_ID``; a process is of the run if, and
 from __future__ import annotations
 
 import contextlib
+import ctypes
 import os
+import signal
 import time
 from collections.abc import Callable
 
@@ -18,8 +20,14 @@ NODE_NAME_VARIABLE = "ALULA_NODE_NAME"
 NAMESPACE_VARIABLE = "ALULA_NAMESPACE"
 """Where a run's names in ROS 2 lie, as ``/rover``; empty: nowhere in particular. `skillset_ros1`'s ``in_ros2`` has nodes know it."""
 NAME_WORD = "__name:="
+PR_SET_PDEATHSIG = 1  # prctl(2)
 KILL_S = 5.0
 LOOK_S = 0.05
+
+
+def die_with_parent() -> None:
+    """Ask the kernel for SIGTERM when the parent dies; to be run between fork and exec."""
+    ctypes.CDLL(None, use_errno=True).prctl(PR_SET_PDEATHSIG, signal.SIGTERM)
 
 
 def processes_of_run(run_id: str) -> list[psutil.Process]:

@@ -117,6 +117,11 @@ class RobotFolder:
         file = self.file(BEHAVIOUR)
         return [] if file is None else [file]
 
+    def mocks_on_top(self, robot: str) -> list[Path]:
+        """Return the file by which a fleet adds to what the mocks of one of its robots do, none where it has none."""
+        file = self.root / "mocks" / f"{robot}.yaml"
+        return [file] if file.is_file() else []
+
     def world(self, name: str) -> Path:
         """Return the file of a world, by its name or as a path."""
         return self.worlds / f"{name}.yaml" if name and name.isidentifier() else Path(name).expanduser()
@@ -176,6 +181,14 @@ def find_robot(start: Path | None = None) -> RobotFolder:
         if (folder / FILE).is_file():
             return load_robot_folder(folder)
     raise RobotError(f"there is no {FILE} in {here} or above; name the robot's folder with --robot DIR, or make one: alula new robot DIR")
+
+
+def robots_of_fleet() -> Mapping[str, RobotFolder]:
+    """Return the robots of the fleet that commands are about; none where they are about a robot, or there is none."""
+    try:
+        return find_robot().robots
+    except RobotError:
+        return {}
 
 
 def page_words() -> Mapping[str, Any]:

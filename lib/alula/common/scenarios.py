@@ -9,8 +9,8 @@ from alula.common.located_yaml import Located, read_yaml
 from alula.common.robots import RobotError, find_robot
 from alula.common.suggestions import nearest
 
-NEEDED = ("about", "mission", "skillsets")
-KEYS = ("about", "world", "mission", "skillsets", "launch", "report", "faults", "processes", "fallback", "motion")
+NEEDED = ("about", "skillsets")
+KEYS = ("about", "world", "mission", "skillsets", "launch", "report", "faults", "processes", "fallback", "motion", "robots")
 
 
 class ScenarioError(Exception):
@@ -25,20 +25,21 @@ class Scenario:
         name: as on the command line.
         about: in a sentence.
         world: name or file of the robot's worlds, unless another is asked for; the mission's inputs come from it.
-        mission: the file of its tree, from the robot's folder.
         skillsets: the skillsets whose managers are started.
+        mission: the file of its tree, from the robot's folder; empty: the robot only serves its skills, until the run is told to end.
         launch: ``package/file`` for roslaunch.
         report: parts of the report, of those that the robot has.
         faults: what can fail besides what the robot's own options say, each with the ways in which it can.
         processes: which of those faults are of a process, and its node in the launch file.
         fallback: the skill whose running means that the robot is safe again after a failure.
         motion: the skills that take it on then.
+        robots: of a fleet, the scenario without a mission by which each robot serves its skills.
     """
 
     name: str
     about: str
-    mission: str
     skillsets: tuple[str, ...]
+    mission: str = ""
     world: str = ""
     launch: str = ""
     report: tuple[str, ...] = ()
@@ -46,6 +47,7 @@ class Scenario:
     processes: tuple[tuple[str, str], ...] = ()
     fallback: str = ""
     motion: tuple[str, ...] = ()
+    robots: tuple[tuple[str, str], ...] = ()
 
 
 def scenarios_folder() -> Path:
@@ -74,8 +76,8 @@ def load_scenario(name: str, folder: Path | None = None) -> Scenario:
     for key in NEEDED:
         if key not in said:
             raise document.wrong(f"a scenario needs `{key}`")
-    mission = said["mission"].text("`mission`")
-    if not mission.endswith(".xml") and mission.count(":") != 1:
+    mission = said["mission"].text("`mission`") if "mission" in said else ""
+    if mission and not mission.endswith(".xml") and mission.count(":") != 1:
         raise said["mission"].wrong(f"`mission` should be a file as missions/{name}.xml, or module:function, not {mission}")
     report = _words(said, "report")
     faults = said["faults"].entries("`faults`") if "faults" in said else {}
@@ -95,6 +97,9 @@ def load_scenario(name: str, folder: Path | None = None) -> Scenario:
         processes=tuple((what, node.text("the node of a process")) for what, node in processes.items()),
         fallback=said["fallback"].text("`fallback`") if "fallback" in said else "",
         motion=_words(said, "motion"),
+        robots=tuple((name, one.text(f"the scenario of {name}")) for name, one in said["robots"].entries("`robots`").items())
+        if "robots" in said
+        else (),
     )
 
 

@@ -116,10 +116,11 @@ def is_live(folder: Path) -> bool:
 
 
 def runs_in(folders: Iterable[Path], fixed: Path | None) -> list[Path]:
-    """Return the folders of runs, the newest first; ``fixed`` is one, wherever it lies."""
+    """Return the folders of runs, the newest first, and of a fleet its mission's before its robots'; ``fixed`` is one, wherever it lies."""
     found = {path.parent for folder in folders for path in folder.glob("*/run.json")} | ({fixed} if fixed is not None else set())
     stamped = []
     for path in found:
         with contextlib.suppress(OSError):
-            stamped.append(((path / "run.json").stat().st_mtime, path))
-    return [path for _, path in sorted(stamped, reverse=True)]
+            whole = path.parent if path.parent in found else path
+            stamped.append(((whole / "run.json").stat().st_mtime, path == whole, path))
+    return [path for *_, path in sorted(stamped, reverse=True)]

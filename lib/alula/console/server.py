@@ -25,7 +25,7 @@ from websockets.exceptions import ConnectionClosed
 from websockets.http11 import Request, Response
 from websockets.protocol import State
 
-from alula.common.robots import RobotFolder
+from alula.common.robots import RobotFolder, robots_of_fleet
 from alula.common.run_log import note_act
 from alula.common.runs import runs_folder
 from alula.common.scenarios import scenario_names
@@ -72,7 +72,8 @@ class Viewer:
 class Console:
     """Serves the page of all runs of a robot; ``fixed`` is the one that is shown first, else the newest. ``link`` reaches the robots.
 
-    The runs of the robots ``beside`` it are called ``ROBOT/RUN``, those of its own ``RUN``. Only its own robot's are started here.
+    The runs of the robots ``beside`` it are called ``ROBOT/RUN``, those of its own ``RUN``; those of a fleet's robots, which lie in
+    the run of its mission, ``RUN/ROBOT``. Only its own robot's are started here.
     ``ask_options`` says which options the robot's live runs have; it raises RequestError where none can be started.
     """
 
@@ -88,6 +89,7 @@ class Console:
         self._admission = admission
         self._fixed = fixed
         self._beside = tuple(beside)
+        self._fleet = robots_of_fleet()
         self._offers: dict[str, object] = {"scenarios": scenario_names(), "worlds": acts.world_names(), "over": [acts.MOCKS], "options": []}
         self._ask_options = ask_options
         self._options: Sequence[RunOption] = ()
@@ -211,13 +213,20 @@ class Console:
         self._offers |= {"over": [acts.LIVE, acts.MOCKS], "options": [asdict(option) for option in self._options]}
 
     def _folders(self) -> list[Path]:
-        return [runs_folder(), *(robot.runs for robot in self._beside)]
+        return [runs_folder(), *(robot.runs for robot in self._beside), *(runs_folder().glob("*") if self._fleet else ())]
 
     def _robot_of(self, run: Path) -> RobotFolder | None:
-        """Return the robot beside the console's own that a run is of; None for one of its own."""
+        """Return the robot beside the console's own, or of its fleet, that a run is of; None for one of its own."""
+        if self._of_fleet(run):
+            return self._fleet.get(run.name)
         return next((robot for robot in self._beside if run.parent == robot.runs), None)
 
+    def _of_fleet(self, run: Path) -> bool:
+        return bool(self._fleet) and run.parent.parent == runs_folder()
+
     def _name_of(self, run: Path) -> str:
+        if self._of_fleet(run):
+            return f"{run.parent.name}/{run.name}"
         robot = self._robot_of(run)
         return run.name if robot is None else f"{robot.name}/{run.name}"
 

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import json
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import asdict, dataclass, field, fields
 from pathlib import Path
 from typing import Any
@@ -34,6 +34,9 @@ class RunSpec:
         namespace: what its names in ROS 2 begin with, as ``/rover``; empty: nothing.
         console: the operator's page is served beside it.
         monitor: every event is held against the models.
+        limit_s: mission clock after which the run is told to end; 0: no limit.
+        commanded: simulated time waits for the heartbeats of who calls the robot's skills from outside, as a fleet does.
+        members: of a fleet, the words of ``alula run`` for the run of each robot, by its name; empty: its robots are served elsewhere.
         groot: ``HOST:PORT`` where viewers find the mission's tree; empty: nowhere.
         own: what the robot's part has made of its own options, by name; in the file these values stand beside the others.
     """
@@ -50,6 +53,9 @@ class RunSpec:
     namespace: str = ""
     console: bool = False
     monitor: bool = False
+    limit_s: float = 0.0
+    commanded: bool = False
+    members: Mapping[str, Sequence[str]] = field(default_factory=dict)
     groot: str = ""
     own: Mapping[str, Any] = field(default_factory=dict)
 

@@ -29,6 +29,7 @@ class Outcome(Enum):
     GIVEN_UP = "given_up"
     ABORTED = "aborted"
     NOT_STARTED = "not_started"
+    SERVED = "served"
 
 
 EXIT_CODES = {
@@ -37,6 +38,7 @@ EXIT_CODES = {
     Outcome.GIVEN_UP: 1,
     Outcome.ABORTED: 1,
     Outcome.NOT_STARTED: 2,
+    Outcome.SERVED: 0,
 }
 
 
@@ -100,14 +102,18 @@ def halted(root: Behaviour) -> list[str]:
 
 
 class Director:
-    """Waits for the robot, has the tree ticked, and knows the outcome. ``step`` is to be called at 10 Hz and after each event."""
+    """Waits for the robot, has the tree ticked, and knows the outcome. ``step`` is to be called at 10 Hz and after each event.
 
-    def __init__(self, mission: Mission, blackboard: Blackboard, *, start_timeout_s: float = START_TIMEOUT_S) -> None:
+    ``serves``: there is no mission; to be told to end is how the run ends well.
+    """
+
+    def __init__(self, mission: Mission, blackboard: Blackboard, *, start_timeout_s: float = START_TIMEOUT_S, serves: bool = False) -> None:
         self.end: End | None = None
         self.start_s: float | None = None
         self._mission = mission
         self.blackboard = blackboard
         self._start_timeout_s = start_timeout_s
+        self._serves = serves
         self._wait_until_s: float | None = None
         self._watch = TreeWatch(mission.root)
         self._abort_reason = ""
@@ -213,7 +219,7 @@ class Director:
     def view(self) -> NodeView:
         """Return the tree as it is now; after an abort with what stops the robot beside it."""
         tree = self._watch.look()
-        if self._stop_watch is None:
+        if self._stop_watch is None or self._serves:
             return tree
         stop = self._stop_watch.look()
         return NodeView("aborted mission", "sequence", stop.status, self._abort_reason, "", (tree, stop))
@@ -255,7 +261,7 @@ class Director:
 
     def _judge(self) -> End:
         if self._stop is not None:
-            return End(Outcome.ABORTED, self._abort_reason)
+            return End(Outcome.SERVED if self._serves else Outcome.ABORTED, self._abort_reason)
         if self._mission.root.status is not Status.SUCCESS:
             return End(Outcome.GIVEN_UP, self.blackboard.reason)
         if self._mission.degraded:

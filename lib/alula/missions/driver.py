@@ -73,7 +73,7 @@ class MissionDriver:
         mission, self.blackboard = plan.make(clients, clock_ns, parameters)
         self.leaves = [(leaf, path_of(node)) for node in mission.root.iterate() if (leaf := skill_leaf(node)) is not None]
         self._watched = watched(mission, clock_ns, record, groot)
-        self.director = Director(mission, self.blackboard, start_timeout_s=start_timeout_s)
+        self.director = Director(mission, self.blackboard, start_timeout_s=start_timeout_s, serves=plan.serves)
 
     @property
     def end(self) -> End | None:

@@ -35,6 +35,7 @@ class MissionPlan:
         parameters: numbers that may be set from outside, with their defaults; on ROS 2 they are parameters of the node.
         inputs: what it was made of.
         facts: what the mission's account says beyond the outcome, asked at the beginning and at the end.
+        serves: it has no mission, and only serves its skills until it is told to end.
         places: of a fleet's, by skillset, the namespace of its robot and what it is called there, as ("/rover", "base").
     """
 
@@ -44,6 +45,7 @@ class MissionPlan:
     parameters: Mapping[str, float] = field(default_factory=dict)
     inputs: Inputs = field(default_factory=dict)
     facts: Callable[[], Mapping[str, object]] = nothing_more
+    serves: bool = False
     places: Mapping[str, tuple[str, str]] = field(default_factory=dict)
 
     def place(self, skillset: str) -> tuple[str, str]:
@@ -58,7 +60,10 @@ class InputError(Exception):
 def plan_of(scenario: Scenario, inputs: Inputs) -> MissionPlan:
     """Return a scenario's plan for these inputs; raises RobotError where there is no robot or none of its nodes, and InputError."""
     from alula.missions.filed.scenario import plan_of_mission_file  # which needs this module
+    from alula.missions.serving import serving_plan  # so does this one
 
+    if not scenario.mission:
+        return serving_plan(scenario)
     if not scenario.mission.endswith(".xml"):
         raise InputError(f"the mission {scenario.mission} is no file of a tree; name one: missions/NAME.xml")
     return plan_of_mission_file(find_robot().root / scenario.mission, scenario, inputs)

@@ -19,5 +19,5 @@ def behaviour_of(robot: RobotFolder, files: Sequence[Path] = ()) -> Behaviour:
         AnalysisError, SkillRuntimeError: a model or a file is wrong, with its place.
     """
     own = load_behaviour([*robot.behaviour_files, *files], robot_model(robot).skillsets)
-    beside = [behaviour_of(one).named(partial(fleet_name, name)) for name, one in robot.robots.items()]
+    beside = [behaviour_of(one, robot.mocks_on_top(name)).named(partial(fleet_name, name)) for name, one in robot.robots.items()]
     return replace(own, beside=tuple(beside))

@@ -7,7 +7,7 @@ from dataclasses import asdict
 from typing import Any, TypedDict
 
 from alula.common.faults import parse_fault
-from alula.common.robots import RobotError, find_robot, page_words
+from alula.common.robots import page_words, robots_of_fleet
 from alula.common.scenarios import load_scenario
 from alula.report.facts import Death, RunFacts
 from alula.report.files import Problems, ReportError, mapping, read_json, sequence
@@ -20,7 +20,7 @@ from alula.report.recovery import Recovery
 from alula.report.responses import FaultResponse, injected, summarise_response
 from alula.report.rows import resources, skills
 
-OUTCOMES = frozenset({"accomplished", "degraded", "given_up", "aborted", "not_started", "running"})
+OUTCOMES = frozenset({"accomplished", "degraded", "given_up", "aborted", "not_started", "served", "running"})
 
 
 class RecoverySummary(TypedDict):
@@ -73,7 +73,7 @@ def read_outcome(facts: RunFacts, history: History, problems: Problems) -> tuple
 
 def read_bridge(facts: RunFacts, problems: Problems) -> dict[str, object] | None:
     """Return the bridge's statistics, topic by topic; None where the run had no bridge, as over mocks, and a fleet's mission by itself."""
-    if facts.mock or _of_fleet():
+    if facts.mock or robots_of_fleet():
         return None
     statistics: object = None
     with problems.survive("bridge.json"):
@@ -102,19 +102,12 @@ def duration_s(history: History, observed: Observed, phases: Phases) -> float | 
     return phases.since(end_s)
 
 
-def _of_fleet() -> bool:
-    try:
-        return bool(find_robot().robots)
-    except RobotError:
-        return False
-
-
 def note_doubts(facts: RunFacts, observed: Observed, phases: Phases, problems: Problems) -> None:
     """Say what the numbers alone would hide: a run without a departure, faults that never came."""
-    if not phases.departed and home() is not None:
+    scenario = load_scenario(facts.scenario)
+    if not phases.departed and home() is not None and scenario.mission:  # who only serves skills may stay where it is
         problems.note(f"no {page_words()['departure']} is known: times count from {phases.zero_from}")
     broken = {fault.sensor for fault in injected(observed)}
-    scenario = load_scenario(facts.scenario)
     others = dict(scenario.faults).keys() - dict(scenario.processes).keys()  # the radio's: nothing of them is in the bag
     for fault in facts.faults:
         what = parse_fault(fault).what

@@ -18,6 +18,7 @@ MEANING = {
     "given_up": "mission given up",
     "aborted": "mission aborted",
     "not_started": "the mission could not start",
+    "served": "skills served, without a mission",
     "running": "the mission's process ended before the mission did",
 }
 BY_EXIT_CODE = {0: "accomplished", 1: "given_up", 2: "not_started"}
@@ -59,6 +60,8 @@ def outcome_words(summary: Mapping[str, Any], died: Sequence[Death], out: Path, 
         ended = ReportedEnd(SIGNAL, str(reason))
     if ended is not None and was_ended(summary):
         return f"mission {ended.sentence()}"
+    if outcome == "served":
+        return f"{MEANING[outcome]}, until the run was told to end: {ended.why if ended else reason}"
     if outcome == "aborted" and str(reason).startswith(outcome):  # as "aborted by the operator" of the page
         return f"mission {reason}"
     if outcome is not None:
@@ -144,7 +147,7 @@ def verdict_lines(summary: Mapping[str, Any], died: Sequence[Death], out: Path) 
     """Return the verdict, a line each; who ended the run stands in its folder."""
     ended = read_end(out)
     lines = ["", outcome_words(summary, died, out, ended), *death_lines(died)]
-    if ended is not None and not was_ended(summary):
+    if ended is not None and not was_ended(summary) and summary.get("outcome") != "served":
         lines.append(f"  the run was {ended.sentence()}")
     lines += [f"  it still waited for {wait}" for wait, over in read_waits(out).items() if not over]
     if summary.get("mock"):

@@ -216,6 +216,28 @@ def test_runs_of_a_robot_beside_are_shown_in_its_words_and_commanded_each_for_it
     serve(play, link=Both(), beside=[rover])
 
 
+def test_the_runs_of_a_fleets_robots_are_shown_below_that_of_their_mission(
+    make_run: Callable[..., Path], tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    mission, robot = make_run("meet"), make_run("meet/rover")
+    for name, text in {"rover": "page: {stop: stop the rover}\n", "fleet": "robots: {rover: ../rover}\n"}.items():
+        (tmp_path / name).mkdir()
+        (tmp_path / name / "robot.yaml").write_text(f"name: {name}\n{text}", encoding="utf-8")
+    monkeypatch.setenv("ALULA_ROBOT", str(tmp_path / "fleet"))
+    os.utime(mission / "run.json", (1.0, 1.0))
+    (robot / "report.html").write_text("the rover's", encoding="utf-8")
+
+    async def play(bench: Bench) -> None:
+        viewer = await bench.viewer("me")
+        status = (await heard(viewer, lambda message: len(message.get("status", {}).get("runs", [])) == 2))["status"]
+        assert (status["run"], status["runs"]) == (mission.name, ["meet", "meet/rover"])
+        await viewer.send(json.dumps({"watch": "meet/rover"}))
+        await heard(viewer, lambda message: "stop the rover" in str(message.get("entries")))
+        assert await bench.get("/runs/meet%2Frover/report.html") == (200, "the rover's")
+
+    serve(play)
+
+
 @pytest.mark.parametrize(
     ("robots", "complaint"),
     [([None], "robot.yaml: No such file or directory; name the robot's folder"), (["rover", "rover"], "told apart by their names")],

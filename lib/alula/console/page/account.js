@@ -7,6 +7,7 @@ const OUTCOMES = {
   given_up: ["Mission given up", "bad"],
   aborted: ["Mission aborted", "bad"],
   not_started: ["The mission did not start", "bad"],
+  served: ["Skills served, without a mission", "good"],
   running: ["The mission is under way", "now"],
 };
 
@@ -144,10 +145,13 @@ function operatorTold(run, say) {
       say(act.t, `The mission goes on${from < act.t ? `, after ${seconds(act.t - from)}` : ""}.`, "reaction");
     } else if (act.command === "abort") {
       const then = started(run, act.t, Infinity);
-      say(act.t, `The mission is told to stop: ${act.reason}${then && `; started ${then}`}.`, "reaction");
+      say(act.t, `${served(run) ? "The run is told to end" : "The mission is told to stop"}: ${act.reason}${then && `; started ${then}`}.`, "reaction");
     }
   }
 }
+
+/** Whether the run had no mission, and only served its skills. */
+const served = (run) => (run.facts["/summary"]?.outcome ?? last(run.mission.v)?.outcome) === "served";
 
 /** A row for each failure, and one for the whole mission: [{what, why, t, until, done, cost}]; the last has no t. */
 function answers(run) {
@@ -170,7 +174,7 @@ function answers(run) {
   }
   rows.sort(byTime);
   const whole = costs(run);
-  if (whole.length) rows.push({ what: "the whole mission", t: null, done: wholeDone(run), cost: whole.join("; ") });
+  if (whole.length) rows.push({ what: served(run) ? "the whole run" : "the whole mission", t: null, done: wholeDone(run), cost: whole.join("; ") });
   return rows;
 }
 

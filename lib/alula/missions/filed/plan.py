@@ -15,7 +15,7 @@ from py_trees.behaviour import Behaviour
 from py_trees.behaviours import Success
 
 from alula.missions.blackboard import Blackboard
-from alula.missions.conditions import Condition, condition
+from alula.missions.conditions import Condition, answers
 from alula.missions.filed.nodes import Needs
 from alula.missions.filed.palette import mission_palette
 from alula.missions.filed.part import MissionPart
@@ -66,11 +66,7 @@ class FiledMission:
 
     def conditions(self) -> list[Condition]:
         """Return what the mission needs to start, met or not."""
-        answers = [
-            condition(f"the skillset {name} answers", holds=client.ready, otherwise=f"the skillset {name} can't be called")
-            for name, client in self._make.crew.clients.items()
-        ]
-        return answers + [Condition(node.name, node.unmet) for node in self._needs]
+        return answers(self._make.crew.clients) + [Condition(node.name, node.unmet) for node in self._needs]
 
     def stop_here(self) -> Behaviour:
         """Make a tree that brings the robot to rest where it is; where the file has none, there is nothing to add to the halt."""

@@ -10,7 +10,7 @@ from alula.records.errors import AnalysisError
 from alula.records.expectations.values import TOLERANCE_S, Expectations, ExpectedMoment, Never, Pattern, States
 
 KEYS = ("about", "outcome", "tolerance_s", "order", "complete", "states", "never")
-OUTCOMES = ("accomplished", "degraded", "given_up", "aborted", "not_started", "running")
+OUTCOMES = ("accomplished", "degraded", "given_up", "aborted", "not_started", "served", "running")
 FURTHEST_S = 1e6
 
 

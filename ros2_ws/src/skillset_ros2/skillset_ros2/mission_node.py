@@ -6,6 +6,7 @@ Needs rclpy; everything else in this package does not.
 from __future__ import annotations
 
 import json
+import math
 import signal
 import sys
 import time
@@ -37,12 +38,14 @@ from alula.trees.groot.address import ServerError
 from alula.trees.view import NodeView
 from skillset_ros2 import NodeExecutor, SkillsetClient
 from skillset_ros2.base import QUIET
+from skillset_ros2.fleet_clock import FleetClock
 
 TURN_S = 0.1  # wall clock; how soon a signal is seen when nothing else happens
 LATCHED = QoSProfile(depth=1, reliability=ReliabilityPolicy.RELIABLE, durability=DurabilityPolicy.TRANSIENT_LOCAL)
 ALL_EVENTS = QoSProfile(depth=1000, reliability=ReliabilityPolicy.RELIABLE, durability=DurabilityPolicy.TRANSIENT_LOCAL)
 
 
+BEAT_S = 1.0  # wall clock; heartbeats of a fleet's mission are repeated so often while its clock stands still
 LAST_EVENTS_S = 2.0  # wall clock to wait for the events of what has ended
 
 
@@ -54,7 +57,7 @@ class MissionNode(Node):  # type: ignore[misc]  # rclpy is not typed
         self._plan = plan
         values = {name: self._parameter(name, value) for name, value in plan.parameters.items()}
         self._record = MissionRecord(out, plan, self._clock_ns, values)
-        self._skillset_clients: list[MissionClient] = []
+        self._robots: dict[str, list[MissionClient]] = {}  # clients, by the namespace of their robot
         self.driver = MissionDriver(
             plan,
             self._make_client,
@@ -66,7 +69,11 @@ class MissionNode(Node):  # type: ignore[misc]  # rclpy is not typed
             groot=self._groot(),
         )
         self._view: NodeView | None = None
-        self._heartbeat: Publisher | None = None
+        self._paces = bool(self.declare_parameter("heartbeat", value=True).value)
+        self._heartbeats: dict[str, Publisher] = {}
+        self._beat_s = -math.inf  # wall clock
+        robots = sorted(filter(None, self._robots))
+        self._fleet_clock = FleetClock(self, robots) if robots and self.get_parameter("use_sim_time").value else None
         self._tree = self.create_publisher(String, "mission/tree", LATCHED)
         for name in plan.skillsets:
             space, skillset = plan.place(name)
@@ -89,9 +96,12 @@ class MissionNode(Node):  # type: ignore[misc]  # rclpy is not typed
         self._meet()
         if self.driver.due or self.driver.abort_asked:
             self.driver.tick()
-            if self._heartbeat is not None:
-                self._heartbeat.publish(Header(stamp=self.get_clock().now().to_msg(), frame_id="mission"))
+            self._beat()
             self._publish_tree()
+        elif self._fleet_clock is not None and time.monotonic() - self._beat_s > BEAT_S:
+            self._fleet_clock.look()
+            # A robot may have to wait long for another one; it would take a mission that says nothing for one that hangs.
+            self._beat()
 
     def finish(self, end: End) -> None:
         """Write what is left to write."""
@@ -110,15 +120,23 @@ class MissionNode(Node):  # type: ignore[misc]  # rclpy is not typed
     def _make_client(self, name: str, wake: Callable[[], None]) -> MissionClient:
         space, skillset = self._plan.place(name)
         client = MissionClient(SkillsetClient(self, skillset, namespace=space), wake, self._record, name)
-        self._skillset_clients.append(client)
+        self._robots.setdefault(space, []).append(client)
         return client
 
     def _meet(self) -> None:
-        """Advertise the heartbeats once every skillset can be called: simulated time begins with them."""
-        if self._heartbeat is None and all(client.ready for client in self._skillset_clients):
-            # Latched: time waits for the first heartbeats, which may be sent before a bridge has connected.
-            self._heartbeat = self.create_publisher(Header, "mission/heartbeat", LATCHED)
-            self.driver.wake()  # the first one at once: the clock may stand still until it comes
+        """Advertise the heartbeats of a robot once all its skillsets can be called: its simulated time begins with them."""
+        for robot, clients in self._robots.items():
+            if self._paces and robot not in self._heartbeats and all(client.ready for client in clients):
+                # Latched: time waits for the first heartbeats, which may be sent before a bridge has connected.
+                topic = f"{robot}/mission/heartbeat" if robot else "mission/heartbeat"
+                self._heartbeats[robot] = self.create_publisher(Header, topic, LATCHED)
+                self.driver.wake()  # the first one at once: the clock may stand still until it comes
+
+    def _beat(self) -> None:
+        """Tell the simulators how far the mission has come."""
+        self._beat_s = time.monotonic()
+        for publisher in self._heartbeats.values():
+            publisher.publish(Header(stamp=self.get_clock().now().to_msg(), frame_id="mission"))
 
     def _parameter(self, name: str, default: float) -> Any:
         return self.declare_parameter(name, default).value
@@ -135,7 +153,7 @@ class MissionNode(Node):  # type: ignore[misc]  # rclpy is not typed
 
     def _on_abort(self, _request: Trigger.Request, response: Trigger.Response) -> Trigger.Response:
         response.message = self.driver.abort("aborted by the operator")
-        response.success = self.driver.end is None or self.driver.end.outcome is Outcome.ABORTED
+        response.success = self.driver.end is None or self.driver.end.outcome in {Outcome.ABORTED, Outcome.SERVED}
         return response
 
     def _on_pause(self, request: SetBool.Request, response: SetBool.Response) -> SetBool.Response:

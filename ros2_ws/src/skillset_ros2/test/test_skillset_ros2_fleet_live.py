@@ -8,6 +8,7 @@ from __future__ import annotations
 import os
 import subprocess
 import sys
+import time
 from collections.abc import Iterator
 from pathlib import Path
 
@@ -15,8 +16,15 @@ import pytest
 
 pytest.importorskip("rclpy")
 
+from builtin_interfaces.msg import Time
+from rosgraph_msgs.msg import Clock as Tick
+from std_msgs.msg import Header
+
 from alula.common.record import DECISIONS, EVENTS, read_record
 from alula.common.run_log import account
+from skillset_ros2.fleet_clock import FleetClock
+from skillset_ros2.names import LATCHED
+from skillset_ros2.session import Session
 
 ALULA_ROOT = Path(__file__).resolve().parents[4]
 QUICK = """
@@ -67,9 +75,6 @@ TICK_S = 0.05
 def clocks(ros2_domain: int) -> Iterator[None]:
     """Have the clock of each robot run."""
     from rclpy.clock import Clock, ClockType
-    from rosgraph_msgs.msg import Clock as Tick
-
-    from skillset_ros2.session import Session
 
     session = Session("clocks", domain=ros2_domain)
     ticks = {name: Tick() for name in CLOCKS_S}
@@ -118,8 +123,63 @@ def test_a_mission_of_two_robots_has_each_do_its_part(mocks: None, fleet: Path, 
         ("two_navigation", "takeoff", "AT_ALTITUDE"),
         ("two_navigation", "land", "LANDED"),
     ]
-    # All times are the mission's: the robots' clocks can't be compared.
+    # All times are the mission's, whose clock is not the robots'.
     stamps = [one.stamp_ns for one in record if one.topic == EVENTS]
     assert stamps == sorted(stamps)
     assert min(stamps) > 1e9 * 1e9, "the system's clock"
     assert {one.value["skillset"] for one in record if one.topic == DECISIONS} == {"one_navigation", "two_navigation"}
+
+
+def test_a_mission_by_the_clocks_of_its_robots_has_those_ahead_wait_for_it(
+    mocks: None, fleet: Path, ros2_domain: int, tmp_path: Path
+) -> None:
+    heard: dict[str, list[int]] = {name: [] for name in CLOCKS_S}
+    session = Session("simulators", domain=ros2_domain)
+    for name, stamps in heard.items():
+        note = lambda header, stamps=stamps: stamps.append(header.stamp.sec)  # noqa: E731
+        session.node.create_subscription(Header, f"/{name}/mission/heartbeat", note, LATCHED)
+    out, place = tmp_path / "run", ["-r", "__ns:=/fleet", "-r", "/clock:=/fleet/clock", "-p", "use_sim_time:=true"]
+    command = [sys.executable, "-m", "skillset_ros2.mission", "--scenario", "meet", "--out", str(out), "--ros-args", *place]
+    done = subprocess.run(command, env={**os.environ, "ALULA_ROBOT": str(fleet)}, capture_output=True, text=True, timeout=600, check=False)
+    session.close()
+    assert done.returncode == 0, done.stdout + done.stderr
+    behind = range(min(CLOCKS_S.values()), max(CLOCKS_S.values()))
+    record = list(read_record(out))
+    assert all(one.stamp_ns // 10**9 in behind for one in record if one.topic == DECISIONS)
+    assert all(one.stamp_ns // 10**9 in behind or one.stamp_ns == 0 for one in record if one.topic == EVENTS)  # 0: before it had begun
+    for stamps in heard.values():
+        assert stamps, "simulators wait for heartbeats"
+        assert all(stamp in behind or stamp == 0 for stamp in stamps)
+        assert stamps == sorted(stamps)
+
+
+class Clocks:
+    """The clock of a fleet of two, and what it has said."""
+
+    def __init__(self, domain: int) -> None:
+        self.session = Session("fleet", domain=domain)
+        self.node = self.session.node
+        self.said: list[int] = []
+        self.fleet = FleetClock(self.node, ["/one", "/two"])
+        self.node.create_subscription(Tick, "clock", lambda tick: self.said.append(tick.clock.sec), 10)
+        self.robots = {name: self.node.create_publisher(Tick, f"/{name}/clock", 10) for name in ("one", "two")}
+
+    def tell(self, heard: int, **ticks: int) -> None:
+        """Publish the clocks of robots until this is the last that the fleet's has said."""
+        while self.said[-1:] != [heard]:
+            for name, sec in ticks.items():
+                self.robots[name].publish(Tick(clock=Time(sec=sec)))
+            self.fleet.look()
+            time.sleep(0.01)
+
+
+def test_the_clock_of_a_fleet_is_that_of_the_robot_furthest_behind(ros2_domain: int) -> None:
+    clocks = Clocks(ros2_domain)
+    clocks.tell(3, one=5, two=3)
+    clocks.tell(4, one=6, two=4)
+    clocks.tell(6, one=6, two=9)
+    assert clocks.said == sorted(clocks.said)
+    # One that has ended holds nobody up.
+    clocks.node.destroy_publisher(clocks.robots.pop("one"))
+    clocks.tell(11, two=11)
+    clocks.session.close()

@@ -140,11 +140,12 @@ class FlightReport:
                 problems.note(sentence)
         points: Floats | None = None
         route: Floats | None = None
-        if "map" in self._run.scenario.report:
+        if "map" in self._run.scenario.report and (self._run.scenario.mission or (folder / "map.ply").exists()):
             with problems.survive("map.ply"):
                 points = load_map(folder / "map.ply")
-        with problems.survive("the route of the mission"):
-            route = load_route(self._run.history.mission)
+        if self._run.scenario.mission:  # who only serves skills has no route
+            with problems.survive("the route of the mission"):
+                route = load_route(self._run.history.mission)
         quality = MapQuality()
         with problems.survive("the map's quality"):
             quality = judge_map(points, route, world, problems)
