@@ -162,7 +162,7 @@ def test_a_fleets_command_that_is_killed_leaves_nothing_behind_and_the_drone_lan
     out = tmp_path / "run"
     flight = fly(hop, out)
     assert flight.stdout is not None
-    assert any("flight_status: ON_GROUND -> IN_AIR" in line for line in flight.stdout), "it never lifted off"
+    assert any("takeoff: TERMINATED AT_ALTITUDE" in line for line in flight.stdout), "it never flew"
     started = psutil.Process(flight.pid).children(recursive=True)
     flight.kill()
     flight.wait()
