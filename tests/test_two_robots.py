@@ -147,12 +147,12 @@ def test_the_mission_of_a_fleet_flies_in_the_simulator_of_its_robot(hop: Path, t
     assert skills(mission) == [("one_navigation", "takeoff", "AT_ALTITUDE"), ("one_navigation", "land", "LANDED")]
     assert skills(robot) == [("navigation", "takeoff", "AT_ALTITUDE"), ("navigation", "land", "LANDED")]
     assert (robot["landed"], robot["collisions"], robot["problems"], mission["problems"]) == (True, 0, [], [])
-    # By one clock: what the mission hears was so a moment before, by the robot's own record.
+    # By one clock, the simulator's: the mission hears of each thing about when it happened by the robot's own record.
     begun_s = [
         [one.stamp_s for one in read_record(folder) if one.topic == EVENTS and one.value.get("state") == "RUNNING"]
         for folder in (out, out / "one")
     ]
-    assert all(0.0 <= heard_s - told_s < 1.0 for heard_s, told_s in zip(*begun_s, strict=True)), begun_s
+    assert all(abs(heard_s - told_s) < 5.0 for heard_s, told_s in zip(*begun_s, strict=True)), begun_s
     assert "one: served" in said
 
 
@@ -162,7 +162,7 @@ def test_a_fleets_command_that_is_killed_leaves_nothing_behind_and_the_drone_lan
     out = tmp_path / "run"
     flight = fly(hop, out)
     assert flight.stdout is not None
-    assert any("flight_status: ON_GROUND -> IN_AIR" in line for line in flight.stdout), "it never lifted off"
+    assert any("takeoff: TERMINATED AT_ALTITUDE" in line for line in flight.stdout), "it never flew"
     started = psutil.Process(flight.pid).children(recursive=True)
     flight.kill()
     flight.wait()

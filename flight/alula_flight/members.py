@@ -12,7 +12,6 @@ from collections.abc import Callable, Sequence
 from pathlib import Path
 
 from alula.common.processes import die_with_parent, end_run
-from alula.common.record import FILE as RECORD
 from alula.common.robots import find_robot
 from alula.live.options import entry
 from alula.live.spec import FILE, RunSpec
@@ -52,8 +51,8 @@ class Member:
 
     @property
     def has_begun(self) -> bool:
-        """Tell whether its own process in place of a mission runs: it keeps a record."""
-        return (self.folder / RECORD).exists()
+        """Tell whether it starts its robot: it refuses nothing any more of what it is asked."""
+        return (self.folder / FILE).exists()
 
     @property
     def last_words(self) -> str:

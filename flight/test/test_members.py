@@ -11,7 +11,6 @@ import psutil
 import pytest
 
 from alula.common.processes import RUN_ID_VARIABLE
-from alula.common.record import FILE as RECORD
 from alula.common.robots import load_robot_folder, meaning
 from alula.common.scenarios import load_scenario
 from alula.live.part import RunPart
@@ -30,10 +29,10 @@ out = Path(sys.argv[1])
 out.mkdir(parents=True)
 signal.signal(signal.SIGTERM, lambda *_: (out / "told").touch() or sys.exit(0))
 if "refuse" in sys.argv: sys.exit("alula run: --fail: there is no zet")
-(out / "skills.mcap").touch()
+(out / "run.json").touch()
 time.sleep(0 if "leave" in sys.argv else 600)
 """
-"""Stands for a robot's run: it begins when it has a record, and ends when it is told to."""
+"""Stands for a robot's run: it has begun when it has written what it was asked for, and ends when it is told to."""
 
 
 @pytest.fixture
@@ -106,7 +105,7 @@ def test_all_begin_before_the_mission_does_and_are_told_to_end_after_it(tmp_path
     robots = [member(tmp_path, "one"), member(tmp_path, "two")]
     members, said = Members(tmp_path, robots), []
     assert members.begin(lambda: False) == ""
-    assert all((robot.folder / RECORD).exists() and robot.lives for robot in robots)
+    assert all((robot.folder / FILE).exists() and robot.lives for robot in robots)
     members.end(said.append, lambda: False)
     assert said == ["the runs of one and two end"]
     assert all((robot.folder / "told").exists() and not robot.lives for robot in robots)
