@@ -27,7 +27,7 @@ PAGES = sorted(
     path
     for room in (".", *ROOMS)
     for path in (ALULA_ROOT.glob("*.md") if room == "." else (ALULA_ROOT / room).rglob("*.md"))
-    if path.name != "CHANGELOG.md"
+    if path.name != "CHANGELOG.md" and ".alula" not in path.parts  # what a set-up has made in an example's folder
 )
 NAMES = [str(path.relative_to(ALULA_ROOT)) for path in PAGES]
 EXAMPLE = re.compile(r"[A-Z]{3,}|rover|patrol|my_|[<>{}$@]|\.\.\.")
