@@ -2,10 +2,9 @@
 
 from __future__ import annotations
 
-from runtime_models import flying_skillset
-
 from alula.runtime.hooks import SkillHooks
 from alula.runtime.local import LocalWorld
+from alula_testing.runtime_models import flying_skillset
 
 
 class Timed(SkillHooks):

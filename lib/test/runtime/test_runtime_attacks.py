@@ -10,7 +10,6 @@ import threading
 import pytest
 from hypothesis import given
 from hypothesis import strategies as st
-from runtime_models import AXES_USED, RELEASE, RESET, SDK, Bench, flying_skill, flying_skillset
 
 from alula.model.execution_state import ExecutionState
 from alula.model.model import Interrupt, Invariant, Parameter, Result, Skill
@@ -22,6 +21,7 @@ from alula.runtime.core.watchdog import TICK_S, Watchdog
 from alula.runtime.workers import Workers
 from alula_testing import waits
 from alula_testing.misbehaviours import CIRCLE, MISBEHAVIOURS, Misbehaviour, Unprintable, returning
+from alula_testing.runtime_models import AXES_USED, RELEASE, RESET, SDK, Bench, flying_skill, flying_skillset
 
 S = ExecutionState
 SOON_S = 30.0

@@ -6,7 +6,6 @@ import threading
 from types import SimpleNamespace
 
 import pytest
-from runtime_models import AXES_FREE, AXES_USED, RELEASE, RESET, SDK, Bench, flying_skill, flying_skillset
 
 from alula.model.execution_state import ExecutionState
 from alula.model.expressions import And, Comparison, DataIs, Not
@@ -17,6 +16,7 @@ from alula.runtime.core.events import TransitionEvent
 from alula.runtime.core.hook_calls import LocalHooks
 from alula.runtime.hooks import SkillHooks
 from alula_testing.recorder import Recorder
+from alula_testing.runtime_models import AXES_FREE, AXES_USED, RELEASE, RESET, SDK, Bench, flying_skill, flying_skillset
 
 S = ExecutionState
 

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import pytest
-from runtime_models import flying_skillset
 
 from alula.model.execution_state import ExecutionState
 from alula.model.json_form import to_json
@@ -14,6 +13,7 @@ from alula.runtime.core.events import ExecutionEvent, TransitionEvent
 from alula.runtime.local import VirtualClock
 from alula.runtime.middleware import EVENTS, RESOURCE_STATES, GoalResult, PublishedEvent, ResourceStates, ResourceStatus
 from alula.runtime.waiting import ThreadWaiter
+from alula_testing.runtime_models import flying_skillset
 
 S = ExecutionState
 MODEL = flying_skillset()

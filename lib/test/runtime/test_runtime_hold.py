@@ -7,7 +7,6 @@ import math
 import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
-from runtime_models import AXES_USED, RELEASE, RESET, SDK, Bench, flying_skill, flying_skillset
 
 from alula.model.execution_state import ExecutionState
 from alula.model.expressions import Comparison, DataIs, Implies, Or
@@ -16,6 +15,7 @@ from alula.runtime.core import SkillsetEngine
 from alula.runtime.core.errors import SkillRuntimeError
 from alula.runtime.core.events import TransitionEvent
 from alula_testing.recorder import Recorder
+from alula_testing.runtime_models import AXES_USED, RELEASE, RESET, SDK, Bench, flying_skill, flying_skillset
 
 S = ExecutionState
 MS = 1_000_000

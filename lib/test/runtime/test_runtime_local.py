@@ -4,13 +4,13 @@ from __future__ import annotations
 
 import pytest
 from runtime_local_rig import Timed, make
-from runtime_models import flying_skill, flying_skillset
 
 from alula.model.execution_state import ExecutionState
 from alula.model.model import Progress
 from alula.runtime.core import ExecutionEvent
 from alula.runtime.local import LocalWorld
 from alula_testing.recorder import Recorder
+from alula_testing.runtime_models import flying_skill, flying_skillset
 
 S = ExecutionState
 

@@ -6,7 +6,6 @@ import json
 
 import pytest
 from runtime_local_rig import Timed, make
-from runtime_models import SDK, flying_skill, flying_skillset
 
 from alula.model.execution_state import ExecutionState
 from alula.model.expressions import Comparison, DataIs
@@ -15,6 +14,7 @@ from alula.model.ros_types import parse_type
 from alula.runtime.core.events import event_record
 from alula.runtime.waiting import NoResponseError
 from alula_testing.recorder import Recorder
+from alula_testing.runtime_models import SDK, flying_skill, flying_skillset
 
 
 @pytest.mark.parametrize(

@@ -9,7 +9,6 @@ from types import SimpleNamespace
 
 import pytest
 from runtime_local_rig import Timed, make, timed
-from runtime_models import flying_skillset
 
 from alula.model.execution_state import ExecutionState
 from alula.model.json_form import from_json
@@ -18,6 +17,7 @@ from alula.runtime.local import LocalWorld, WorldError
 from alula.runtime.local.middleware import VirtualMiddleware
 from alula.runtime.managers import Managers
 from alula_testing.recorder import Recorder
+from alula_testing.runtime_models import flying_skillset
 
 
 def test_managers_that_are_not_there_or_have_gone_leave_no_client_waiting():

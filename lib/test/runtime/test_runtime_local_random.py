@@ -5,10 +5,10 @@ from __future__ import annotations
 from hypothesis import given, settings
 from hypothesis import strategies as st
 from runtime_local_rig import make, timed
-from runtime_models import flying_skillset
 
 from alula.model.execution_state import ExecutionState
 from alula.runtime.core.events import event_record
+from alula_testing.runtime_models import flying_skillset
 
 STEPS = st.lists(
     st.one_of(

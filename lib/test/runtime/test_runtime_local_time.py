@@ -4,12 +4,12 @@ from __future__ import annotations
 
 import pytest
 from runtime_local_rig import make
-from runtime_models import flying_skill, flying_skillset
 
 from alula.model.execution_state import ExecutionState
 from alula.runtime.local import LocalWorld, VirtualClock, WorldError
 from alula.runtime.waiting import CannotWaitError
 from alula_testing.recorder import Recorder
+from alula_testing.runtime_models import flying_skill, flying_skillset
 
 
 def test_time_jumps_from_job_to_job_in_the_order_of_their_moments():

@@ -7,7 +7,6 @@ from textwrap import dedent
 import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
-from runtime_models import flying_skill, flying_skillset
 
 from alula.common.faults import FaultRequest
 from alula.model.execution_state import ExecutionState
@@ -15,6 +14,7 @@ from alula.model.model import Data, Parameter, Result, ResultKind
 from alula.runtime.core.errors import SkillRuntimeError
 from alula.runtime.core.events import event_record
 from alula.runtime.mock import Behaviour, BehaviourError, Ending, Formula, FormulaError, MockChange, Rule, load_behaviour, mock_world
+from alula_testing.runtime_models import flying_skill, flying_skillset
 
 S = ExecutionState
 FLYING = flying_skillset(data=(Data("battery", "float64", period_s=1.0), Data("pose", "Pose")))

@@ -7,7 +7,6 @@ import sys
 import pytest
 from hypothesis import Phase, given, settings
 from hypothesis import strategies as st
-from runtime_models import Bench
 
 from alula_testing.random_models import (
     BEHAVIOURS,
@@ -25,6 +24,7 @@ from alula_testing.random_models import (
     run_all,
     skillsets,
 )
+from alula_testing.runtime_models import Bench
 
 
 @pytest.fixture(autouse=True)

@@ -5,12 +5,12 @@ from __future__ import annotations
 import threading
 
 import pytest
-from runtime_models import RELEASE, TAKE, Bench, flying_skill, flying_skillset
 
 from alula.model.execution_state import ExecutionState
 from alula.model.model import Interrupt
 from alula.runtime.core.engine import DEFAULT_TIMEOUT_S
 from alula.runtime.hooks import SkillHooks
+from alula_testing.runtime_models import RELEASE, TAKE, Bench, flying_skill, flying_skillset
 
 S = ExecutionState
 SECOND = 10**9

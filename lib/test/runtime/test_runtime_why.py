@@ -6,13 +6,13 @@ import json
 import queue
 
 import pytest
-from runtime_models import AXES_FREE, RELEASE, SDK, Bench, flying_skill, flying_skillset
 
 from alula.model.execution_state import ExecutionState
 from alula.model.expressions import And, Comparison, DataIs, Not
 from alula.model.model import Assignment, Data, Effect, Invariant, Precondition, Result, ResultKind
 from alula.runtime.core.events import ExecutionEvent, event_record, read_event
 from alula.runtime.managers import services
+from alula_testing.runtime_models import AXES_FREE, RELEASE, SDK, Bench, flying_skill, flying_skillset
 
 S = ExecutionState
 FORBIDDEN = Effect("give_up", (Assignment("sdk", "UNAVAILABLE"),))

@@ -15,7 +15,6 @@ from multiprocessing.connection import Client, Connection, Listener
 from pathlib import Path
 
 import pytest
-from runtime_models import flying_skill, flying_skillset
 
 from alula.runtime.core.errors import SkillRuntimeError
 from alula.runtime.core.execution import Execution
@@ -23,6 +22,7 @@ from alula.runtime.core.hook_calls import HookOutcome
 from alula.runtime.hook_processes import HookServer, RemoteHooks, pipe_address
 from alula.runtime.hook_processes.place import pipe_key
 from alula.runtime.hooks import SkillHooks
+from alula_testing.runtime_models import flying_skill, flying_skillset
 from alula_testing.waits import until
 
 SOON_S = 10.0

@@ -1,4 +1,4 @@
-"""Models and hooks for this package's tests."""
+"""Models and hooks for tests of the runtime and of its adapters."""
 
 from __future__ import annotations
 
