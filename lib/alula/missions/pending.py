@@ -8,7 +8,6 @@ The wait is bounded; after it the start is made anyway, and the resource manager
 
 from __future__ import annotations
 
-from collections.abc import Iterable
 from dataclasses import dataclass
 
 from alula.missions.skillset import NANOSECONDS, Clock
@@ -36,16 +35,6 @@ class PendingInterrupts:
         """Ask for the end of an execution and remember it until it has ended; ``holds_all``: starts in all skillsets wait for it."""
         handle.interrupt()
         self._pending.append(_Pending(skillset, skill, handle, self._clock_ns(), holds_all))
-
-    @property
-    def handles(self) -> list[SkillHandle]:
-        """Those that are remembered, ended or not."""
-        return [one.handle for one in self._pending]
-
-    def recall(self, interrupted: Iterable[tuple[str, SkillHandle, bool]]) -> None:
-        """Remember these executions instead, each with its skillset and whether it holds all, as at another moment of the mission."""
-        now_ns = self._clock_ns()
-        self._pending = [_Pending(skillset, handle.skill, handle, now_ns, holds_all) for skillset, handle, holds_all in interrupted]
 
     def names(self, skillset: str | None = None) -> list[str]:
         """Return the skills whose end a start in this skillset (None: in any) waits for: their interruption is under way, not overdue."""

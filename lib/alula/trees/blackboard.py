@@ -81,6 +81,18 @@ class Blackboard:
             board, key = step
         return None
 
+    def where(self, key: str) -> tuple[Blackboard, str]:
+        """Return the blackboard that an entry is or belongs on, and its name there."""
+        board = self
+        if key.startswith("@"):
+            board, key = self.root, key[1:]
+        while key not in board._entries:  # noqa: SLF001 - the same class
+            step = board._outside(key)  # noqa: SLF001
+            if step is None:
+                break
+            board, key = step
+        return board, key
+
     def get(self, key: str) -> object:
         """Return a value, None when there is none."""
         entry = self.entry(key)
@@ -88,14 +100,7 @@ class Blackboard:
 
     def create(self, key: str, type_: PortType = ANY) -> Entry:
         """Return an entry, made where its name belongs when it is not there; raises TickError when it is of another type."""
-        board = self
-        if key.startswith("@"):
-            board, key = self.root, key[1:]
-        while key not in board._entries:  # noqa: SLF001
-            step = board._outside(key)  # noqa: SLF001
-            if step is None:
-                break
-            board, key = step
+        board, key = self.where(key)
         entry = board._entries.setdefault(key, Entry(type_))  # noqa: SLF001
         if entry.type is not type_ and ANY not in {entry.type, type_}:
             raise TickError(f"the blackboard's entry '{key}' is a {entry.type.name}, and is to be a {type_.name}")

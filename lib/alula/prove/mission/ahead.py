@@ -28,6 +28,7 @@ AT_ONCE = frozenset({Parallel, ParallelAll})
 ONCE = frozenset({SubTree, Inverter, ForceSuccess, ForceFailure, Delay, Timeout})
 """Nodes that end with their child. All other nodes may tick any child again."""
 
+RUNS = RUNNING.value
 SKIPS = (Precondition, RunOnce, Loop, SkipUnlessUpdated)
 """Types of node that may be skipped without a condition of theirs."""
 
@@ -76,6 +77,10 @@ class Looking:
         conditions = before is not None and (before.skip_if is not None or before.while_true is not None)
         return conditions or isinstance(node, SKIPS) or number in self._opaque
 
+    def may_be_skipped(self, number: int) -> bool:
+        """Tell whether a node, or one below it, may be skipped, or asks for what is not known."""
+        return number in self._skips
+
     def ahead(self, phase: str, *, stops: bool, values: Sequence[Mapping[str, Hashable]]) -> Ahead:
         """Return it for a director's phase; ``values`` are the statuses and attributes of the nodes.
 
@@ -93,14 +98,14 @@ class Looking:
         number = self._number[id(node)]
         mine = values[number]
         kind = type(node)
-        if mine["status"] is not RUNNING or kind not in IN_TURN | AT_ONCE | ONCE or number in self._skips:
+        if mine["status"] != RUNS or kind not in IN_TURN | AT_ONCE | ONCE or number in self._skips:
             return self._below[number]  # what is skipped may begin again
         found = {number}
         for place, child in enumerate(node.children):
             below = self._number[id(child)]
             if not self._passed(kind, mine, place):
                 found |= self._from(child, values)
-            elif values[below]["status"] is RUNNING:  # it was skipped, and is halted some time
+            elif values[below]["status"] == RUNS:  # it was skipped, and is halted some time
                 found |= self._below[below]
         return frozenset(found)
 

@@ -25,8 +25,7 @@ Way = tuple[Outcome, Sets]
 class Row:
     """A failure at a moment, and what comes of it.
 
-    ``node`` is the name of the leaf that failed, ``region`` where it was first seen,
-    ``way`` how the tick goes that sees it.
+    ``node`` is the name of the leaf that failed, ``ways`` are the regions where it is seen, each with how the tick goes that sees it.
 
     ``loses``: before it the mission could be accomplished, and the tree does not come to a node that says that it gives up.
     ``asks``: the leaves that are asked for at once, in the tick that sees it or in the next that asks for any; an empty set where the
@@ -38,12 +37,21 @@ class Row:
     node: str
     leaf: int
     moment: tuple[str, ...]
-    region: int
-    way: Way
+    ways: list[tuple[int, Way]] = field(default_factory=list)
     loses: bool = False
     starts: set[str] = field(default_factory=set)
     asks: set[frozenset[int]] = field(default_factory=set)
     outcomes: set[str] = field(default_factory=set)
+
+    @property
+    def region(self) -> int:
+        """Where it was first seen."""
+        return self.ways[0][0]
+
+    @property
+    def way(self) -> Way:
+        """How the tick goes that first sees it."""
+        return self.ways[0][1]
 
     def as_dict(self) -> dict[str, object]:
         """Return the row as JSON has it."""
@@ -86,7 +94,8 @@ class Answers:
         node = self._system.leaves[leaf]
         skill = f"{node.skillset}.{node.model.name}"
         moment = self._moment(number, leaf)
-        row = rows.setdefault((skill, end, leaf, moment), Row(skill, end, node.name, leaf, moment, number, way))
+        row = rows.setdefault((skill, end, leaf, moment), Row(skill, end, node.name, leaf, moment))
+        row.ways.append((number, way))
         asks = {frozenset(ticked.outcome.started)} if ticked.outcome.started else self._asked_from(target)
         row.asks |= asks
         row.starts |= {self._name(one) for asked in asks for one in asked}

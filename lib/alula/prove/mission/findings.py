@@ -61,7 +61,7 @@ def _unanswered(regions: Regions, answers: Answers) -> Iterator[Diagnostic]:
         seen.add((row.leaf, "ALU702"))
         how = "fails" if row.end == FAILED else f"ends with {row.end}"
         message = f"nothing answers when `{row.skill}` {how}: the mission ends ({', '.join(sorted(row.outcomes))})"
-        run = run_of(regions.system, *regions.run_on(row.region, *way))
+        run = run_of(regions.system, *regions.run_on(way[0], *way[1]))
         yield _finding("ALU702", message, regions.system.leaves[row.leaf], ANSWER, told(regions.system, run.events), run)
 
 

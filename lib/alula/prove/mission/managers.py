@@ -154,9 +154,9 @@ class ManagersSteps:
 
     def _death(self, managers: Managers) -> tuple[Event, Managers]:
         state = ExecutionState.FAILED.value
-        left = [one if one.phase == ENDED else self._ended(one, state) for one in managers.executions]
+        known = [one if one.phase == ENDED else self._ended(one, state) for one in managers.executions if not one.left]
         ended = tuple(self._ending(one, state) for one in managers.executions if one.phase != ENDED)
-        return Event(Kind.DIE, self.model.name, failure=True, ended=ended), Managers(None, _ordered(left))
+        return Event(Kind.DIE, self.model.name, failure=True, ended=ended), Managers(None, _ordered(known))
 
     def _extern(self, managers: Managers, situation: Situation) -> Iterator[tuple[Event, Managers]]:
         for resource in self._skillset.resources:
@@ -186,9 +186,9 @@ class ManagersSteps:
         """Return them after a step: executions that run now, then those that do not."""
         known = {one.leaf: one for one in managers.executions}
         for ending in self._endings(step):
-            known[ending.leaf] = self._ended(known[ending.leaf], ending.state, ending.result)
-        left = [known.pop(int(one.id)) for one in step.situation.running]
-        running = tuple(one._replace(phase=RUNNING) for one in left)
+            one = known.pop(ending.leaf)
+            known |= {} if one.left else {ending.leaf: self._ended(one, ending.state, ending.result)}
+        running = tuple(known.pop(int(one.id))._replace(phase=RUNNING) for one in step.situation.running)
         return self._managers(step.situation, (*running, *_ordered(known.values())))
 
     def _event(
@@ -229,7 +229,8 @@ def _ordered(executions: Iterable[Execution]) -> tuple[Execution, ...]:
 
 def _with(managers: Managers, execution: Execution, ended: Execution) -> Managers:
     running = [one for one in managers.executions if one.phase == RUNNING]
-    others = [ended if one == execution else one for one in managers.executions if one.phase != RUNNING]
+    others = [one for one in managers.executions if one.phase != RUNNING and one != execution]
+    others += [] if execution.left else [ended]
     return Managers(managers.states, (*running, *_ordered(others)))
 
 

@@ -9,21 +9,27 @@ from typing import NamedTuple
 from alula.missions.director import Director, DirectorMemory, End, Outcome
 from alula.missions.filed.skills import SkillNode
 from alula.model.model import Skillset
-from alula.prove.mission.ahead import Ahead, Looking
+from alula.prove.mission.ahead import RUNS, Ahead, Looking
+from alula.prove.mission.live import Live, Liveness, Place, leaf_place
 from alula.prove.mission.moments import Later, Moment, thawed
 from alula.prove.mission.oracle import UndecidedError
 from alula.prove.mission.reading import ANOTHER, Read
 from alula.prove.mission.robot import Handle, Memory, Robot
 from alula.prove.mission.unknown import UNKNOWN, Unknown, UnknownNumber, UnknownText, is_unknown
+from alula.trees.blackboard import Entry
 from alula.trees.node import Node
 from alula.trees.status import IDLE, RUNNING, Skipped, Status
 from alula.trees.tree import Tree
+from alula.trees.values import ANY, STRING
 
 SEEN = "_seen"
 LEFT = "_left"
 COUNTS = {LEFT: "the attempts left", "_count": "the rounds", "_retries": "the retries"}
 """Attributes of nodes that count: what is left of a number of attempts, or what there was."""
 FEW = 2
+STATUS_OF = {one.value: one for one in Status}
+TAKE_TEXT = (STRING, ANY)
+"""Types of entries that any text can be written into."""
 PLAIN = frozenset({type(None), bool, int, float, str, Status, Skipped, Unknown})
 """Types whose values are kept as they are."""
 
@@ -39,14 +45,13 @@ class TreeMemory(NamedTuple):
     nodes: tuple[Hashable, ...]
     boards: tuple[Hashable, ...]
     leaves: tuple[tuple[int, bool], ...]
-    pending: tuple[int, ...]
     first_failure: str
     ends: frozenset[str]
 
     @property
     def held(self) -> frozenset[int]:
         """The leaves whose executions the tree still hangs on."""
-        return frozenset((*(leaf for leaf, _ in self.leaves), *self.pending))
+        return frozenset(leaf for leaf, _ in self.leaves)
 
 
 @dataclass(frozen=True)
@@ -74,14 +79,15 @@ class Keeper:
         self._body = body
         self._nodes = [(node, node.remembers, node.remembers_running) for node in body.nodes()]
         self.leaves = [node for node in body.nodes() if isinstance(node, SkillNode)]
-        self._boards = [subtree.blackboard for tree in body.trees for subtree in tree.subtrees]
+        self._boards = list(dict.fromkeys(subtree.blackboard for tree in body.trees for subtree in tree.subtrees))
         self._looking = Looking(body.trees, body.read)
-        self._known: dict[tuple[str, bool, tuple[Hashable, ...]], tuple[tuple[Hashable, ...], Ahead]] = {}
+        self._living = Liveness(body.trees, self._looking)
+        self._known: dict[tuple[str, bool, tuple[Hashable, ...]], tuple[tuple[Hashable, ...], Ahead, Live | None]] = {}
         self._places: list[tuple[tuple[str, ...], int, int]] = []
         for _, names, while_running in self._nodes:
             start = self._places[-1][2] if self._places else 0
             self._places.append((("status", *names, *while_running), start, start + 1 + len(names) + len(while_running)))
-        self._first = tuple(self._values())
+        self._first = self._left = tuple(self._values())
 
     # --- out ---------------------------------------------------------------------------------------------------------
 
@@ -89,10 +95,11 @@ class Keeper:
         """Return the memory: of one that is over how it has ended, else what anything that can still be ticked tells apart."""
         director, board = self._body.director.memory, self._body.board
         started = director.start_s is not None
+        self._left = tuple(self._values())
         if director.end is not None:
             outcome = director.end.outcome
-            return TreeMemory(director.phase, outcome, started, None, director.stops, self._first, (), (), (), "", frozenset())
-        nodes, ahead = self._looked(director.phase, director.stops, tuple(self._values()))
+            return TreeMemory(director.phase, outcome, started, None, director.stops, self._first, (), (), "", frozenset())
+        nodes, ahead, live = self._looked(director.phase, director.stops, self._left)
         first = board.failures[0].skill if board.failures and ahead.first else ""
         return TreeMemory(
             director.phase,
@@ -101,29 +108,34 @@ class Keeper:
             _frozen(director.wait_until_s) if director.phase == "_wait" else None,
             director.stops,
             nodes,
-            tuple(self._entries(number, ahead) for number in range(len(self._boards))),
-            tuple((number, node.leaf.interrupted) for number, node in enumerate(self.leaves) if _follows(node, ahead)),
-            tuple(sorted(one.leaf for one in board.pending.handles if isinstance(one, Handle))),
+            tuple(self._entries(number, ahead, live) for number in range(len(self._boards))),
+            tuple((number, node.leaf.interrupted) for number, node in enumerate(self.leaves) if self._follows(number, node, ahead, live)),
             first,
             ahead.ends.intersection(one.result for one in board.failures),
         )
 
-    def _looked(self, phase: str, stops: bool, values: tuple[Hashable, ...]) -> tuple[tuple[Hashable, ...], Ahead]:  # noqa: FBT001
-        """Return the values of the nodes, those of nodes that are not ticked any more as at first, and what is ahead."""
+    def _looked(
+        self,
+        phase: str,
+        stops: bool,  # noqa: FBT001
+        values: tuple[Hashable, ...],
+    ) -> tuple[tuple[Hashable, ...], Ahead, Live | None]:
+        """Return the values of the nodes, those of nodes that are not ticked any more as at first, what is ahead, and what is live."""
         key = (phase, stops, values)
         if key not in self._known:
             by_node = [dict(zip(names, values[start:end], strict=True)) for names, start, end in self._places]
             ahead = self._looking.ahead(phase, stops=stops, values=by_node)
             kept = list(values)
             for number, (_, start, end) in enumerate(self._places):
-                if number and number not in ahead.nodes and values[start] is not RUNNING:  # the root's status says how it ended
+                if number and number not in ahead.nodes and values[start] != RUNS:  # the root's status says how it ended
                     kept[start:end] = self._first[start:end]
-            self._known[key] = tuple(kept), ahead
+            live = None if ahead.everything else self._living.live(phase, stops=stops, values=dict(enumerate(by_node)))
+            self._known[key] = tuple(kept), ahead, live
         return self._known[key]
 
     def _values(self) -> Iterator[Hashable]:
         for node, names, while_running in self._nodes:
-            yield node.status
+            yield node.status._value_  # the hash of an Enum takes long, and each memory has hundreds
             for name in names:
                 yield self._seen(node) if name == SEEN else self._kept(node, name)
             for name in while_running:
@@ -145,14 +157,30 @@ class Keeper:
         entry = node.entry("entry")
         return bool(getattr(node, SEEN) == (0 if entry is None else entry.sequence))
 
-    def _entries(self, number: int, ahead: Ahead) -> Hashable:
-        entries = self._boards[number].entries()
-        return tuple((name, entries[name].type, _frozen(self._needed(name, entries[name].value, ahead))) for name in sorted(entries))
+    def _entries(self, number: int, ahead: Ahead, live: Live | None) -> Hashable:
+        board = self._boards[number]
+        entries = board.entries()
+        return tuple(
+            (name, entries[name].type, _frozen(self._needed((id(board), name), entries[name], ahead, live))) for name in sorted(entries)
+        )
 
-    def _needed(self, name: str, value: object, ahead: Ahead) -> object:
+    def _follows(self, number: int, node: SkillNode, ahead: Ahead, live: Live | None) -> bool:
+        """Tell whether an execution of a leaf matters: of one that was left, where a script asks whether it still runs."""
+        handle = node.leaf.handle
+        if handle is None or node.status is RUNNING:
+            return handle is not None
+        asked = ahead.everything or (node.leaf.skill_name in ahead.followed and (live is None or leaf_place(number) in live.texts))
+        return asked and not handle.done
+
+    def _needed(self, place: Place, entry: Entry, ahead: Ahead, live: Live | None) -> object:
         """Return what is kept of an entry's value: its kind where it is computed with or text is written over it, else nothing."""
+        name, value = place[1], entry.value
+        if live is not None and place not in live.texts:
+            over = name in ahead.written and isinstance(value, str) and entry.type not in TAKE_TEXT
+            return self._body.read.kind(name, value) if over else None
         if ahead.everything or name in ahead.kept:
-            return self._body.read.value(name, value)
+            kept = self._body.read.value(name, value)
+            return kept if live is None or type(kept) is not str else live.text(place, kept)
         if value is None or not (name in ahead.named or (name in ahead.written and isinstance(value, str))):
             return None
         return self._body.read.kind(name, value)
@@ -189,27 +217,23 @@ class Keeper:
         interrupted = dict(memory.leaves)
         for number, node in enumerate(self.leaves):
             node.leaf.recall(handles.get(number) if number in interrupted else None, interrupted=interrupted.get(number, False))  # type: ignore[arg-type]
-        body.board.pending.recall(
-            (handles[leaf].skillset, handles[leaf], self.leaves[leaf].leaf.halt_waits)  # type: ignore[misc]
-            for leaf in memory.pending
-        )
 
     def _put_nodes(self, memory: TreeMemory) -> None:
-        values = iter(memory.nodes)
+        """Put back what is not as the last tick has left it; values that ticks change inside are always put back."""
+        at = 0
         for node, names, of_run in self._nodes:
-            status = next(values)
-            node.status = status  # type: ignore[assignment]
-            for name in names:
-                value = next(values)
+            status = memory.nodes[at]
+            if status != self._left[at]:
+                node.status = STATUS_OF[status]  # type: ignore[index]
+            for name in (*names, *of_run):
+                at += 1
+                value = memory.nodes[at]
                 if name == SEEN:
                     entry = node.entry("entry")
                     setattr(node, SEEN, (0 if entry is None else entry.sequence) if value else -1)
-                else:
+                elif (value != self._left[at] or type(value) is tuple or name in of_run) and (status != IDLE.value or name in names):
                     setattr(node, name, self._thawed(value))
-            for name in of_run:
-                value = next(values)
-                if status is not IDLE:
-                    setattr(node, name, self._thawed(value))
+            at += 1
 
     def _handle(self, leaf: int) -> Handle:
         node = self.leaves[leaf]
@@ -251,11 +275,3 @@ def _frozen(value: object) -> Hashable:
         case dict():
             return UNKNOWN
     raise UndecidedError(f"a node remembers {value!r}, which the search can't keep")
-
-
-def _follows(node: SkillNode, ahead: Ahead) -> bool:
-    """Tell whether an execution of a leaf matters: of one that was left, where a script asks whether it still runs."""
-    handle = node.leaf.handle
-    if handle is None or node.status is RUNNING:
-        return handle is not None
-    return (ahead.everything or node.leaf.skill_name in ahead.followed) and not handle.done

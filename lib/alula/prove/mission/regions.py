@@ -9,7 +9,7 @@ from __future__ import annotations
 
 import math
 from collections import deque
-from collections.abc import Callable, Iterator, Mapping, Sequence
+from collections.abc import Callable, Collection, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field
 
 from alula.prove.limits import Deadline
@@ -34,6 +34,11 @@ class Closure:
     def all(self) -> frozenset[int]:
         """All of them."""
         return frozenset(self.before)
+
+    @property
+    def roots(self) -> frozenset[int]:
+        """Where they begin."""
+        return frozenset(number for number, step in self.before.items() if step is None)
 
     def way(self, number: int) -> tuple[int, list[Event]]:
         """Return where a shortest way to managers begins, and what happens on it."""
@@ -67,16 +72,28 @@ class Ticked:
 
 @dataclass
 class Region:
-    """A memory and what the managers can be; ``origin``: the region before it, and the tick that led here."""
+    """A memory and what the managers can be.
+
+    ``origins``: the managers that ticks led to, one set a skillset, each with the region before and the tick; None for the first.
+    """
 
     memory: int
     closures: tuple[Closure, ...]
-    origin: tuple[int, Ticked] | None
+    origins: list[tuple[Sets, tuple[int, Ticked] | None]]
     sets: Sets
     depth: int = 0
     """How many ticks led here at least."""
     next: list[tuple[int, Ticked]] = field(default_factory=list)
     """Each tick that leads to a region, or into one."""
+
+    @property
+    def origin(self) -> tuple[int, Ticked] | None:
+        """The first of its origins."""
+        return self.origins[0][1]
+
+    def origin_of(self, roots: Sequence[int]) -> tuple[int, Ticked] | None:
+        """Return the first that led to these managers."""
+        return next(origin for sets, origin in self.origins if all(one in known for one, known in zip(roots, sets, strict=True)))
 
 
 class Regions:
@@ -89,6 +106,8 @@ class Regions:
         self.situations = 0
         """How many situations the regions stand for; those of one memory may overlap."""
         self.deadline = deadline
+        self._merged: dict[int, int] = {}
+        """By their numbers regions that others stand for now."""
         self._by_memory: dict[int, list[int]] = {}
         self._closures: dict[tuple[int, frozenset[int], bool], Closure] = {}
         self._commanded: dict[tuple[int, int, int, tuple[int, ...], tuple[int, ...]], int] = {}
@@ -98,12 +117,20 @@ class Regions:
 
         Those that few ticks lead to come first; the last is the one that was looked for.
         """
-        first = begin or self.system.initial()
-        todo = deque([self._add(first.memory, tuple(frozenset({one}) for one in first.managers), None)])
+        try:
+            self.complete = self._explore(begin or self.system.initial(), until)
+        finally:
+            self._forget_merged()
+
+    def _explore(self, first: State, until: Callable[[Region], bool]) -> bool:
+        """Return whether all were found."""
+        todo = dict.fromkeys([self._add(first.memory, tuple(frozenset({one}) for one in first.managers), None)])
         while todo:
-            number = todo.popleft()
+            number = next(iter(todo))
+            del todo[number]
             self.deadline.doing = self._progress(number, len(todo))
             self.deadline.check()
+            self._merge(number, todo)
             region = self.regions[number]
             for act in self._acts(region):
                 for ticked in self.ticks(region.memory, act, region.sets):
@@ -114,11 +141,11 @@ class Regions:
                     known = self._within(memory, after)
                     if known is None:
                         known = self._add(memory, after, (number, ticked))
-                        todo.append(known)
+                        todo[known] = None
                         if until(self.regions[known]):
-                            return
+                            return False
                     region.next.append((known, ticked))
-        self.complete = True
+        return True
 
     def _progress(self, number: int, left: int) -> str:
         """Return how far the search is, in words."""
@@ -198,9 +225,49 @@ class Regions:
         closures = tuple(self.closure(place, numbers, over=over) for place, numbers in enumerate(roots))
         sets = tuple(one.all for one in closures)
         self.situations += math.prod(map(len, sets))
-        self.regions.append(Region(memory, closures, origin, sets, 0 if origin is None else self.regions[origin[0]].depth + 1))
+        depth = 0 if origin is None else self.regions[origin[0]].depth + 1
+        self.regions.append(Region(memory, closures, [(roots, origin)], sets, depth))
         self._by_memory.setdefault(memory, []).append(len(self.regions) - 1)
         return len(self.regions) - 1
+
+    def _merge(self, number: int, todo: dict[int, None]) -> None:
+        """Have a region that is to be looked at stand for others of its memory, too, that begin otherwise in one skillset only.
+
+        All choices of what both began with are choices of one of them, so the union is exact.
+        """
+        region = self.regions[number]
+        while (other := self._mergeable(number, todo)) is not None:
+            del todo[other]
+            self._by_memory[region.memory].remove(other)
+            self._merged[other] = number
+            gone = self.regions[other]
+            over = self.system.ticker.memories[region.memory].end is not None
+            roots = [a.roots | b.roots for a, b in zip(region.closures, gone.closures, strict=True)]
+            region.closures = tuple(self.closure(place, numbers, over=over) for place, numbers in enumerate(roots))
+            region.sets = tuple(one.all for one in region.closures)
+            region.origins += gone.origins
+            region.depth = min(region.depth, gone.depth)
+
+    def _mergeable(self, number: int, todo: Collection[int]) -> int | None:
+        mine = self.regions[number].closures
+        for one in self._by_memory[self.regions[number].memory]:
+            if one in todo and sum(a is not b for a, b in zip(mine, self.regions[one].closures, strict=True)) <= 1:
+                return one
+        return None
+
+    def _forget_merged(self) -> None:
+        """Number the regions anew, without those that others stand for."""
+        numbers = {old: new for new, old in enumerate(one for one in range(len(self.regions)) if one not in self._merged)}
+
+        def number(old: int) -> int:
+            return numbers[self._merged.get(old, old)]
+
+        self.regions = [one for old, one in enumerate(self.regions) if old in numbers]
+        for region in self.regions:
+            region.next = [(number(target), ticked) for target, ticked in region.next]
+            region.origins = [(sets, origin and (number(origin[0]), origin[1])) for sets, origin in region.origins]
+        self._merged.clear()
+        self._by_memory.clear()
 
     def closure(self, place: int, roots: frozenset[int], *, over: bool) -> Closure:
         """Return what can come of managers before the next tick; when the mission is over, only what still runs goes on."""
@@ -228,9 +295,10 @@ class Regions:
         while True:
             ways = [one.way(target) for one, target in zip(region.closures, goal, strict=True)]
             events = [event for _, way in ways for event in way] + events
-            if region.origin is None:
+            origin = region.origin_of([root for root, _ in ways])
+            if origin is None:
                 return events
-            number, ticked = region.origin
+            number, ticked = origin
             region = self.regions[number]
             goal = [self._before(ticked, region, place, root) for place, (root, _) in enumerate(ways)]
             outcome = ticked.way(goal)

@@ -3,11 +3,12 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Collection, Iterator, Mapping
+from collections.abc import Collection, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field
 
 from alula.missions.blackboard import Blackboard, Failure
 from alula.missions.filed.part import MissionPart
+from alula.missions.filed.skills import SkillNode
 from alula.missions.pending import PendingInterrupts
 from alula.missions.skill_types import type_of
 from alula.model.execution_state import ExecutionState
@@ -15,6 +16,7 @@ from alula.model.model import Skillset
 from alula.prove.mission.moments import Moment
 from alula.prove.mission.oracle import Oracle, UndecidedError
 from alula.prove.mission.unknown import UnknownNumber, unknown
+from alula.runtime.handle import SkillHandle
 from alula.trees.node import Node, pointer
 from alula.trees.palette import Direction
 from alula.trees.status import FAILURE, IDLE, RUNNING, SUCCESS, Answer
@@ -158,26 +160,38 @@ def progress_of(skillset: str, skill: str) -> str:
 
 
 class Waits(PendingInterrupts):
-    """Executions that end some time after they were interrupted, always before the bound: the managers see to that."""
+    """Executions that end some time after they were interrupted, always before the bound: the managers know which have not.
 
-    def __init__(self, clock_ns: Callable[[], int]) -> None:
-        super().__init__(clock_ns, math.inf)
+    ``skillsets`` are asked one by one; those of ``holding`` may have one that starts everywhere wait for.
+    """
+
+    def __init__(self, robot: Robot, skillsets: Collection[str], leaves: Sequence[SkillNode]) -> None:
+        super().__init__(robot.clock_ns, math.inf)
+        self._robot = robot
+        self._skillsets = skillsets
+        self._leaves = leaves
+
+    def interrupt(self, skillset: str, skill: str, handle: SkillHandle, *, holds_all: bool = False) -> None:  # noqa: ARG002
+        """Ask for the end of an execution; the managers remember it."""
+        handle.interrupt()
 
     def names(self, skillset: str | None = None) -> list[str]:
-        """Return one that is waited for. Whether the others have ended is not looked at: nobody waits for them, or all wait anyway."""
-        asked = [one for one in self._pending if one.holds_all or skillset in {None, one.skillset}]
-        for one in asked:
-            if not one.handle.done:
-                return [f"{one.skillset}.{one.skill}"]
-        self._pending = [one for one in self._pending if one not in asked]
+        """Return the skillsets whose executions a start waits for, the first of them."""
+        for one in self._skillsets:
+            if skillset in {None, one}:
+                if self._any(one, holds_all=False):
+                    return [one]
+            elif any(leaf.leaf.halt_waits and leaf.skillset == one for leaf in self._leaves) and self._any(one, holds_all=True):
+                return [one]
         return []
+
+    def _any(self, skillset: str, *, holds_all: bool) -> bool:
+        mine = {number for number, one in enumerate(self._leaves) if one.skillset == skillset and (one.leaf.halt_waits or not holds_all)}
+        return not mine.isdisjoint(self._robot.interrupted) or bool(self._robot.oracle.look(("interrupted", skillset, holds_all)))
 
 
 class Memory(Blackboard):
     """A mission's memory: of the failures, what scripts ask for."""
-
-    def __post_init__(self) -> None:
-        self.pending = Waits(self.clock_ns)
 
     def recall_failures(self, first: str, ends: frozenset[str]) -> None:
         """Have had these: the skill that failed first, and all ends that there were."""

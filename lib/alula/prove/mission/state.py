@@ -41,7 +41,8 @@ class Execution(NamedTuple):
     """An execution that the tree has asked for and still hangs on.
 
     ``leaf`` is the number of its leaf (``System.leaves``), ``phase`` "sent", "running" or "ended", ``asked``: its interruption was asked
-    for; ``state`` and ``result`` say how it ended, as a client's handle has them.
+    for; ``state`` and ``result`` say how it ended, as a client's handle has them. ``left``: the tree hangs on it no more, but it is to end
+    before others start; with its end it is gone.
     """
 
     leaf: int
@@ -49,6 +50,7 @@ class Execution(NamedTuple):
     asked: bool = False
     state: str = ""
     result: str = ""
+    left: bool = False
 
 
 class Managers(NamedTuple):

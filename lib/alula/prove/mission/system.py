@@ -28,11 +28,12 @@ from alula.missions.skill_types import OUTCOME_PORT
 from alula.model.execution_state import ExecutionState
 from alula.model.model import Skillset
 from alula.prove.limits import Deadline
+from alula.prove.mission.ahead import RUNS
 from alula.prove.mission.managers import ENDED, RUNNING, SENT, End, Failures, ManagersSteps
 from alula.prove.mission.memory import FEW, Body, TreeMemory
 from alula.prove.mission.oracle import Answer, Oracle, Question
 from alula.prove.mission.reading import what_is_read
-from alula.prove.mission.robot import Client, Memory, Robot, opaque
+from alula.prove.mission.robot import Client, Memory, Robot, Waits, opaque
 from alula.prove.mission.state import Event, Execution, Kind, Managers, State
 from alula.prove.mission.ticking import ABORT, TICK, OneStop, Ticker
 from alula.prove.mission.ticking import Outcome as Ticked
@@ -40,7 +41,6 @@ from alula.prove.mission.unknown import UNKNOWN
 from alula.trees.node import Node, pointer
 from alula.trees.palette import Direction, Port
 from alula.trees.reading import TreeFiles, read_files, type_name
-from alula.trees.status import RUNNING as TICKED
 
 _GIVEN_S = 30.0
 TERMINATED, FAILED = ExecutionState.TERMINATED.value, ExecutionState.FAILED.value
@@ -102,6 +102,7 @@ class System:
         read = what_is_read(files, unread, plan.parameters, oracle, own if known is not None else ())
         body = Body(robot, director, board, trees, {one.name: one for one in skillsets}, read, few)
         ticker = Ticker(body, oracle)
+        board.pending = Waits(robot, [one.name for one in skillsets], ticker.leaves)
         for number, node in enumerate(ticker.leaves):
             node.leaf.with_inputs(_Starting(robot, number))
         return cls(ticker, body, skillsets, failures, deadline or Deadline.after(_GIVEN_S))
@@ -162,9 +163,10 @@ class System:
         skills = self._steps[place].skills
         kept = [one for one in managers.executions if one.leaf not in ticked.started and (one.phase != ENDED or one.leaf in held)]
         kept = [one._replace(asked=True) if one.leaf in ticked.interrupted and one.phase != ENDED else one for one in kept]
-        new = [Execution(leaf, SENT, asked=leaf in ticked.interrupted) for leaf in ticked.started if leaf in skills]
+        kept += [Execution(leaf, SENT, asked=leaf in ticked.interrupted) for leaf in ticked.started if leaf in skills]
+        kept = [one._replace(left=one.leaf not in held) for one in kept]
         running = [one for one in kept if one.phase == RUNNING]
-        others = sorted(one for one in (*kept, *new) if one.phase != RUNNING)
+        others = sorted(one for one in kept if one.phase != RUNNING)
         return self.number(Managers(managers.states, (*running, *others)))
 
     def _commanded(self, state: State, ticked: Ticked) -> tuple[int, ...]:
@@ -212,7 +214,7 @@ class System:
         """Return the nodes that run, from the root down."""
         memory, found, at = self.memory(state), [], 0
         for node in self.nodes:
-            if memory.nodes[at] is TICKED:
+            if memory.nodes[at] == RUNS:
                 found.append(node)
             at += 1 + len(node.remembers) + len(node.remembers_running)
         return found
@@ -230,6 +232,8 @@ class System:
                 return self._steps[self._place[skillset]].resource(managers, name)
             case ("alive", _):
                 return managers.states is not None
+            case ("interrupted", _, bool(holds_all)):
+                return any(one.asked and not (holds_all and not self.leaves[one.leaf].leaf.halt_waits) for one in managers.executions)
             case ("execution", int(leaf)):
                 known = next(one for one in managers.executions if one.leaf == leaf)
                 return (known.phase, known.state, known.result) if known.phase == ENDED else (known.phase,)

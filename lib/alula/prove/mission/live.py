@@ -1,0 +1,405 @@
+"""Which entries of the blackboards still decide something: an entry that is always written before it is read has no value to keep.
+
+Looked at from the end of a node to its begin, as compilers look for live variables: what is read after each of its ends, without what
+it has surely written by then, with what it reads itself. Where a node's own code says too little, all that stands below it is read.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Hashable, Iterator, Mapping, Sequence
+from dataclasses import dataclass
+from typing import NamedTuple
+
+from alula.missions.filed.nodes import RetryAfter, Until
+from alula.missions.filed.skills import SkillNode
+from alula.missions.skill_types import OUTCOME_PORT
+from alula.prove.mission.ahead import AT_ONCE, IN_TURN, RUNS, Looking
+from alula.prove.mission.reading import ANOTHER, OUTCOME, scripts_of
+from alula.trees.node import Action, Node, pointer
+from alula.trees.nodes.decorators import (
+    Delay,
+    ForceFailure,
+    ForceSuccess,
+    Inverter,
+    KeepRunningUntilFailure,
+    Repeat,
+    RetryUntilSuccessful,
+    Timeout,
+)
+from alula.trees.nodes.entries import UnsetBlackboard
+from alula.trees.nodes.leaves import ScriptNode
+from alula.trees.nodes.sequences import Fallback, SequenceWithMemory
+from alula.trees.nodes.subtree import SubTree
+from alula.trees.palette import Direction
+from alula.trees.script import ScriptError, parse
+from alula.trees.script.syntax import Assignment, Call, Chain, Comparison, Literal, Name, walk
+from alula.trees.script.syntax import Node as Part
+from alula.trees.tree import Tree
+
+Place = tuple[int, str]
+"""Where an entry is: the id of its blackboard, and its name there. What scripts ask of a leaf's execution is one, too."""
+Read = tuple[Place, frozenset[str] | None]
+"""An entry with texts of which it is only asked whether it is one of them; None: by its value."""
+Reads = frozenset[Read]
+NOTHING: Reads = frozenset()
+Values = Mapping[int, Mapping[str, Hashable]]
+"""The status and the attributes of nodes, by their numbers."""
+
+
+class Ends(NamedTuple):
+    """What is read after each of a node's ends."""
+
+    success: Reads
+    failure: Reads
+    skipped: Reads
+    halted: Reads
+
+    @property
+    def any(self) -> Reads:
+        """After whichever."""
+        return self.success | self.failure | self.skipped | self.halted
+
+
+@dataclass(frozen=True)
+class Live:
+    """The entries that still decide something.
+
+    ``texts``: what is asked of one is only whether it is among each of these texts; None where its value counts.
+    """
+
+    texts: Mapping[Place, frozenset[frozenset[str]] | None]
+
+    @classmethod
+    def of(cls, reads: Reads) -> Live:
+        """Return what is read, by entry."""
+        found: dict[Place, frozenset[frozenset[str]] | None] = {}
+        for place, texts in reads:
+            known = found.get(place, frozenset())
+            found[place] = None if texts is None or known is None else known | {texts}
+        return cls(found)
+
+    def text(self, place: Place, value: str) -> str:
+        """Return the first of the texts that nothing tells apart from a value, ANOTHER where it is none that is asked for."""
+        asked = self.texts[place]
+        if asked is None:
+            return value
+        alike = frozenset.union(*asked)
+        for one in asked:
+            alike = alike & one if value in one else alike - one
+        return min(alike) if value in alike else ANOTHER
+
+
+class Liveness:
+    """Tells what is live of a mission that is somewhere in its trees."""
+
+    def __init__(self, trees: Sequence[Tree], looking: Looking) -> None:
+        self._looking = looking
+        self._roots = [tree.root for tree in trees]
+        self._nodes = [node for tree in trees for node in tree.nodes]
+        self._number = {id(node): number for number, node in enumerate(self._nodes)}
+        self._unread = looking.read.unread
+        self._leaves: dict[str, list[int]] = {}
+        self._leaf_of: dict[int, int] = {}
+        for leaf, one in enumerate(one for one in self._nodes if isinstance(one, SkillNode)):
+            self._leaves.setdefault(one.wiring.type.name, []).append(leaf)
+            self._leaf_of[id(one)] = leaf
+        self._below = [self._all_read(node) for node in self._nodes]
+        self._begun: dict[tuple[int, Ends], Reads] = {}
+        outcome: Reads = frozenset((_place(tree.root, name), None) for tree in trees for name in OUTCOME)
+        self._always = outcome.union(*(self._kept_always(node) for node in self._nodes))
+        self._stop = NOTHING.union(*(self._begin(root, self._at_end) for root in self._roots[1:]))
+        self._whole = any(isinstance(node, UnsetBlackboard) for node in self._nodes)  # an entry may be another one's from then on
+
+    @property
+    def _at_end(self) -> Ends:
+        return Ends(self._always, self._always, self._always, self._always)
+
+    def live(self, phase: str, *, stops: bool, values: Values) -> Live | None:
+        """Return what is live in a director's phase, None where anything may be; arguments as of ``Looking.ahead``."""
+        if phase == "_wait" or self._whole:
+            return None
+        if phase == "_settle":
+            return Live.of(self._always)
+        if stops:
+            return Live.of(self._always.union(*(self._at(root, self._at_end, values) for root in self._roots[1:])))
+        after = self._always | self._stop  # the tree may break off at any node
+        return Live.of(after | self._at(self._roots[0], Ends(after, after, after, after), values))
+
+    # --- a node that begins ----------------------------------------------------------------------------------------------
+
+    def _begin(self, node: Node, ends: Ends) -> Reads:
+        """Return what is live before a node that begins."""
+        key = (self._number[id(node)], ends)
+        if key not in self._begun:
+            after = self._after(node, ends)
+            found = self._below[key[0]] | ends.any if self._hidden(node) else self._body(node, after)
+            before = node.before
+            for script, end in ((before.failure_if, after.failure), (before.success_if, after.success)) if before is not None else ():
+                found |= end if script is not None else NOTHING
+            self._begun[key] = found | self._asked(node, "_failureIf", "_successIf")
+        return self._begun[key]
+
+    def _body(self, node: Node, ends: Ends) -> Reads:
+        kind = type(node)
+        if not node.children:
+            return self._leaf(node, ends)
+        found = self._ports(node)
+        if kind in IN_TURN:
+            begins = [reads for _, reads in self._in_turn(node, ends, 0, lambda _, child, after: self._begin(child, after))]
+            return found.union(*begins) if kind is SequenceWithMemory else found | begins[0]
+        if kind in AT_ONCE:
+            written: frozenset[Place] = frozenset()
+            for child in node.children:
+                found |= _without(self._begin(child, _whichever(ends.any)), written)
+                written |= self._at_once(child)
+            return found
+        found |= self._again(node, ends)
+        if kind in COUNTED and not node.wiring.ports.get(COUNTED[kind], "").strip().lstrip("-").strip("0").isdigit():
+            found |= ends.any  # perhaps no child is ticked at all
+        return found | ends.halted if kind is Delay else found
+
+    def _in_turn(self, node: Node, ends: Ends, first: int, look: Callable[[int, Node, Ends], Reads]) -> list[tuple[int, Reads]]:
+        """Return what is live before each child from one on."""
+        goes_on = ends.failure if isinstance(node, Fallback) else ends.success
+        found: list[tuple[int, Reads]] = []
+        following, skipped = goes_on, goes_on | ends.skipped
+        for index in range(len(node.children) - 1, first - 1, -1):
+            stop = ends.success if isinstance(node, Fallback) else ends.failure
+            after = (
+                Ends(stop, following, skipped, ends.halted) if isinstance(node, Fallback) else Ends(following, stop, skipped, ends.halted)
+            )
+            following = look(index, node.children[index], after)
+            if getattr(node, "gives_way", False):
+                following |= ends.halted
+            skipped = following
+            found.insert(0, (index, following))
+        return found
+
+    def _again(self, node: Node, ends: Ends) -> Reads:
+        """Return what is live before the child of a decorator, which may begin again and again."""
+        found = NOTHING
+        while True:
+            more = self._begin(node.children[0], self._of_child(node, ends, found)) | found
+            if more == found:
+                return found
+            found = more
+
+    def _of_child(self, node: Node, ends: Ends, again: Reads) -> Ends:
+        """Return what is live after the child of a decorator."""
+        success, failure, skipped, halted = ends
+        again |= halted | self._ports(node)
+        kind = type(node)
+        if kind is Inverter:
+            success, failure = failure, success
+        elif kind is ForceSuccess:
+            failure = success
+        elif kind is ForceFailure:
+            success = failure
+        elif kind is Timeout:
+            halted |= failure
+        elif kind is RetryAfter:
+            failure |= again | self._asked(node, "if")
+        elif kind is Until:
+            success |= again | self._asked(node, "if")
+        elif kind is Repeat:
+            success |= again
+        elif kind is RetryUntilSuccessful:
+            failure |= again
+        elif kind is KeepRunningUntilFailure:
+            success = again
+        return Ends(success, failure, skipped, halted)
+
+    def _leaf(self, node: Node, ends: Ends, *, begins: bool = True) -> Reads:
+        if isinstance(node, ScriptNode):
+            return self._script(node, node.wiring.element.get("code"), ends.success)
+        own = node.wiring.type.name in self._unread
+        reads = NOTHING if own else self._ports(node) | self._asked(node, "code", "if", "otherwise")
+        written = self._written(node) if own else frozenset()
+        halted = frozenset({self._outcome(node)}) if isinstance(node, SkillNode) else frozenset()
+        found = reads | _without(ends.success | ends.failure, written)
+        found |= _without(ends.halted, halted) if own or isinstance(node, Action) else NOTHING
+        return _without(found, self._at_once(node)) if isinstance(node, SkillNode) and begins else found
+
+    def _at_once(self, node: Node) -> frozenset[Place]:
+        """Return what a node writes as soon as it begins, before anything else is ticked."""
+        before = node.before
+        if self._hidden(node) or (before is not None and (before.failure_if is not None or before.success_if is not None)):
+            return frozenset()
+        if isinstance(node, SkillNode):
+            return frozenset({leaf_place(self._leaf_of[id(node)])})
+        kind = type(node)
+        begins = kind in AT_ONCE or (kind in IN_TURN and kind is not SequenceWithMemory)
+        return self._at_once(node.children[0]) if begins or kind in ONE_CHILD - {Delay, *COUNTED} else frozenset()
+
+    # --- a node that runs ------------------------------------------------------------------------------------------------
+
+    def _at(self, node: Node, ends: Ends, values: Values) -> Reads:
+        """Return what is live at a node between two ticks."""
+        number = self._number[id(node)]
+        mine, kind = values[number], type(node)
+        if mine["status"] != RUNS:
+            return self._begin(node, ends)
+        ends = self._after(node, ends)
+        if self._hidden(node):
+            return self._below[number] | ends.any
+        if not node.children:
+            return self._leaf(node, ends, begins=False)
+        found = self._ports(node)
+        if kind in IN_TURN:
+            place = mine["_index"]
+            index = place if isinstance(place, int) else 0
+
+            def look(at: int, child: Node, after: Ends) -> Reads:
+                return self._at(child, after, values) if at == index else self._begin(child, after)
+
+            ways = self._in_turn(node, ends, 0 if kind is SequenceWithMemory else index, look)
+            return found.union(*(reads for _, reads in ways)) if kind is SequenceWithMemory else found | ways[0][1]
+        if kind in AT_ONCE:
+            left = list(self._left(node, values))
+            after = _whichever(_without(ends.any, frozenset().union(*(self._surely(child, values) for child in left))))
+            return found.union(*(self._at(child, after, values) for child in left))
+        again = self._again(node, ends)
+        child = node.children[0]
+        if values[self._number[id(child)]]["status"] != RUNS:
+            return found | again | ends.halted
+        return found | self._at(child, self._of_child(node, ends, again), values)
+
+    def _left(self, node: Node, values: Values) -> Iterator[Node]:
+        """Yield the children of a Parallel that have not ended."""
+        done = values[self._number[id(node)]]["_done"]
+        ended = done[1] if isinstance(done, tuple) else ()
+        yield from (child for index, child in enumerate(node.children) if index not in ended)
+
+    def _surely(self, node: Node, values: Values) -> frozenset[Place]:
+        """Return what a node that runs writes before it ends, whether by itself or halted."""
+        mine, kind = values[self._number[id(node)]], type(node)
+        if mine["status"] != RUNS or self._hidden(node):
+            return frozenset()
+        if isinstance(node, SkillNode):
+            return frozenset({self._outcome(node)})
+        if not node.children:
+            return frozenset()
+        if kind in AT_ONCE:
+            return frozenset().union(*(self._surely(child, values) for child in self._left(node, values)))
+        index = mine["_index"] if kind in IN_TURN else 0
+        return self._surely(node.children[index], values) if isinstance(index, int) and index < len(node.children) else frozenset()
+
+    # --- what a node reads and writes ------------------------------------------------------------------------------------
+
+    def _hidden(self, node: Node) -> bool:
+        """Tell whether what is below a node may go on otherwise than is known here."""
+        number = self._number[id(node)]
+        known = not node.children or type(node) in IN_TURN | AT_ONCE | ONE_CHILD
+        return not known or self._looking.may_be_skipped(number)
+
+    def _after(self, node: Node, ends: Ends) -> Ends:
+        """Return what is live after a node, before its postconditions."""
+        element = node.wiring.element
+        always = [self._script(node, element.get("_post"), end) for end in (ends.success, ends.failure)]
+        success = self._script(node, element.get("_onSuccess"), always[0])
+        failure = self._script(node, element.get("_onFailure"), always[1])
+        return Ends(success, failure, ends.skipped, ends.halted)
+
+    def _kept_always(self, node: Node) -> Reads:
+        """Return what may be read at any time: in a halt, or by nodes that ask how often an entry was written."""
+        counted = NOTHING if "_seen" not in node.remembers else self._ports(node)
+        return counted | self._asked(node, "_onHalted")
+
+    def _all_read(self, node: Node) -> Reads:
+        found = NOTHING
+        for one in (node, *_below(node)):
+            if one.wiring.type.name not in self._unread:
+                found |= self._ports(one)
+            for text in scripts_of(one.wiring.element):
+                found |= self._script(one, text, NOTHING)
+        return found
+
+    def _ports(self, node: Node) -> Reads:
+        names = (pointer(text, name) for name, text in node.wiring.ports.items()) if not isinstance(node, SubTree) else ()
+        return frozenset((_place(node, name), None) for name in names if name is not None)
+
+    def _asked(self, node: Node, *attributes: str) -> Reads:
+        return NOTHING.union(*(self._script(node, node.wiring.element.get(one), NOTHING) for one in attributes))
+
+    def _written(self, node: Node) -> frozenset[Place]:
+        """Return what a leaf writes whenever it answers."""
+        found = set()
+        for port in node.wiring.type.ports.values():
+            name = pointer(node.wiring.ports.get(port.name, ""), port.name) if port.direction is not Direction.INPUT else None
+            found |= {_place(node, name)} if name is not None else set()
+        return frozenset(found)
+
+    @staticmethod
+    def _outcome(node: Node) -> Place:
+        name = pointer(node.wiring.ports.get(OUTCOME_PORT, ""), OUTCOME_PORT)
+        return (0, "") if name is None else _place(node, name)
+
+    def _script(self, node: Node, text: str, after: Reads) -> Reads:
+        """Return what is live before a script; what is no script reads nothing here (``Looking`` says that it may ask for anything)."""
+        try:
+            program = parse(text) if text.strip() else None
+        except ScriptError:
+            return after
+        for statement in reversed(program.statements if program is not None else ()):
+            if isinstance(statement, Assignment) and isinstance(statement.target, Name) and statement.operator in {":=", "="}:
+                after = _without(after, frozenset({_place(node, statement.target.name)})) | self._read_by(node, statement.value)
+            else:
+                after |= self._read_by(node, statement)
+        return after
+
+    def _read_by(self, node: Node, part: Part) -> Reads:
+        compared: dict[int, frozenset[str]] = {}
+        found: set[Read] = set()
+        for one in walk(part):  # from the top down
+            match one:
+                case Chain() | Comparison():
+                    names, texts = _one_of(one)
+                    compared |= {} if names is None else {id(name): texts for name in names if id(name) not in compared}
+                case Name():
+                    found.add((_place(node, one.name), compared.get(id(one))))
+                case Call():
+                    skills = (str(getattr(name, "name", getattr(name, "value", ""))) for name in one.arguments)
+                    found |= {(leaf_place(leaf), None) for skill in skills for leaf in self._leaves.get(skill, ())}
+        return frozenset(found)
+
+
+def _one_of(part: Part) -> tuple[list[Name] | None, frozenset[str]]:
+    """Return the names in a condition that asks whether one entry is one of some texts, and these; None where it is no such condition."""
+    match part:
+        case Comparison(operands=(Name() as name, Literal(value=str(text))), operators=("==" | "!=",)):
+            return [name], frozenset({text})
+        case Chain(operators=operators) if set(operators) == {"||"}:
+            parts = [_one_of(one) for one in part.operands if isinstance(one, Comparison) and one.operators == ("==",)]
+            names = [name for known, _ in parts for name in known or ()]
+            if len(names) == len(part.operands) and len({name.name for name in names}) == 1:
+                return names, frozenset().union(*(texts for _, texts in parts))
+    return None, frozenset()
+
+
+COUNTED = {Repeat: Repeat.port, RetryUntilSuccessful: RetryUntilSuccessful.port}
+ONE_CHILD = frozenset({SubTree, Inverter, ForceSuccess, ForceFailure, Delay, Timeout, Until, RetryAfter, KeepRunningUntilFailure, *COUNTED})
+"""Nodes whose child's ends are known to lead on to their own, or to the child again."""
+
+
+def leaf_place(leaf: int) -> Place:
+    """Return the place of what scripts may ask of a leaf's execution."""
+    return -1 - leaf, ""
+
+
+def _place(node: Node, name: str) -> Place:
+    board, key = node.blackboard.where(name)
+    return id(board), key
+
+
+def _without(reads: Reads, places: frozenset[Place]) -> Reads:
+    return frozenset(one for one in reads if one[0] not in places) if places else reads
+
+
+def _whichever(reads: Reads) -> Ends:
+    return Ends(reads, reads, reads, reads)
+
+
+def _below(node: Node) -> Iterator[Node]:
+    for child in node.children:
+        yield child
+        yield from _below(child)
