@@ -40,8 +40,10 @@ FOUND, EQUAL, MISSED = "found", "equal", "missed"
 ANSWERS, ANOTHER_RUN, ACCOUNT = "answers", "another run", "account"
 COMPARED = frozenset({ANSWERS, ANOTHER_RUN, ACCOUNT})
 """What is seen only beside the mission as it is."""
-CANDIDATES = 4
-"""So many runs that may tell two missions apart are flown at most."""
+CANDIDATES = 40
+"""So many runs that may tell two missions apart are flown at most: of those that leave them soon, many can't be flown."""
+ACCOUNTS = 4
+"""So many runs are flown to their end at most, to compare what is told there."""
 GIVEN_S = 900.0
 
 
@@ -210,7 +212,7 @@ class Judge:
     def _account(self, looked: Looked) -> str:
         """Return what both tell otherwise of a run that both fly; empty where there is no such run."""
         for one, other in ((looked, self.original), (self.original, looked)):
-            for run in writing(one.seen, other.seen, CANDIDATES):
+            for run in writing(one.seen, other.seen, ACCOUNTS):
                 told = [self._flown(run, one, each) for each in (self.original, looked)]
                 before, after = map(_told_at_end, told)
                 if all(told) and before != after:

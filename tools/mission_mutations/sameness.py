@@ -2,8 +2,9 @@
 
 Both are searched side by side, as one: pairs of memories of their trees, with what the managers can be there. Between two ticks both must
 have the same managers, which can do the same: starts, refusals, ends with their results, resources. A tick must ask for the same in both,
-with the same managers, for the same answers of what nobody knows, tick the same of those nodes that write on the blackboard or give inputs,
-and end the mission alike. A tick hangs on nothing else; so each run of one is a run of the other, step for step.
+with the same managers, for the same answers of what nobody knows (one of both may ask less), tick the same of those nodes that write on
+the blackboard or give inputs, and end the mission alike. A tick hangs on nothing else; so each run of one is a run of the other, step for
+step.
 
 Numbers and texts that the search does not know have no values here. So the nodes that write or read them must also be the same, in the same
 order in the file, and what both need to start must be the same, in any order: it is told together. Otherwise nothing is claimed. Missions
@@ -13,7 +14,7 @@ that do the same may be told apart all the same: this shows sameness only.
 from __future__ import annotations
 
 from collections import deque
-from collections.abc import Hashable, Iterable, Mapping
+from collections.abc import Hashable, Mapping
 from dataclasses import dataclass
 from functools import cached_property
 from pathlib import Path
@@ -164,12 +165,9 @@ class Seen:
         return (*requests, memory.started, memory.end)
 
     def tick(self, outcome: Outcome) -> int:
-        """Return the number of all that a tick shows but the managers with which it is taken: of each question all its answers."""
-        chosen: dict[Question, tuple[Answer, ...]] = {}
-        for one in outcome.choices:
-            chosen[one.question] = (*chosen.get(one.question, ()), one.answer)
+        """Return the number of all that a tick shows but the managers with which it is taken, and what nobody knows."""
         wrote = frozenset((self._values[number], status) for number, status in outcome.touched if number in self._values)
-        return self._number(("tick", self._asked(outcome), frozenset(chosen.items()), wrote))
+        return self._number(("tick", self._asked(outcome), wrote))
 
     def common(self, sets: Sets) -> Products:
         """Return managers by the numbers that they have in all missions."""
@@ -288,20 +286,17 @@ class _Both:
         """Return what the next tick leads to; None where it is not the same."""
         if self._both[0].regions.system.ticker.memories[pair.memories[0]].end is not None:
             return []
-        ways: list[dict[int, list[tuple[Outcome, Products]]]] = [{}, {}]
-        for found, seen, memory, sets in zip(ways, self._both, pair.memories, pair.sets, strict=True):
-            for outcome, left in seen.regions.split(memory, TICK, sets):
-                found.setdefault(seen.tick(outcome), []).append((outcome, seen.common(left)))
-        mine, theirs = ways
-        if mine.keys() != theirs.keys() or any(_all(known) != _all(theirs[tick]) for tick, known in mine.items()):
-            return None
+        mine, theirs = (
+            [(outcome, _chosen(outcome), seen.tick(outcome), seen.common(left)) for outcome, left in seen.regions.split(memory, TICK, sets)]
+            for seen, memory, sets in zip(self._both, pair.memories, pair.sets, strict=True)
+        )
         pairs = []
-        for tick, known in mine.items():
-            for a, those in known:
-                for b, these in theirs[tick]:
-                    managers = tuple(x & y for x, y in zip(those, these, strict=True))
-                    if all(managers):
-                        pairs.append(self._ticked(pair, (a, b), managers))
+        for a, answers, shown, those in mine:
+            for b, others, shows, these in theirs:
+                if _agree(answers, others) and all(managers := tuple(x & y for x, y in zip(those, these, strict=True))):
+                    if shown != shows:
+                        return None
+                    pairs.append(self._ticked(pair, (a, b), managers))
         return pairs
 
     def _ticked(self, pair: _Pair, outcomes: tuple[Outcome, Outcome], managers: Products) -> _Pair:
@@ -312,25 +307,17 @@ class _Both:
         return _Pair((outcomes[0].memory, outcomes[1].memory), (found[0], found[1]))
 
 
-def _all(ways: Iterable[tuple[Outcome, Products]]) -> Hashable:
-    return union(frozenset(sets for _, sets in ways))
+def _chosen(outcome: Outcome) -> Mapping[Question, tuple[Answer, ...]]:
+    """Return the answers of what nobody knows: of a question that was asked several times all of them, in order."""
+    chosen: dict[Question, tuple[Answer, ...]] = {}
+    for one in outcome.choices:
+        chosen[one.question] = (*chosen.get(one.question, ()), one.answer)
+    return chosen
 
 
-def union(products: frozenset[Products]) -> Hashable:
-    """Return a union of products, the same however it was divided: managers of the first skillset by what they go together with."""
-    if products <= {()}:
-        return bool(products)
-    rests: dict[int, list[Products]] = {}
-    for first, *rest in products:
-        for one in first:
-            rests.setdefault(one, []).append(tuple(rest))
-    alike: dict[frozenset[Products], set[int]] = {}
-    for one, others in rests.items():
-        alike.setdefault(frozenset(others), set()).add(one)
-    found: dict[Hashable, set[int]] = {}
-    for together, some in alike.items():
-        found.setdefault(union(together), set()).update(some)
-    return frozenset((frozenset(some), rest) for rest, some in found.items())
+def _agree(one: Mapping[Question, tuple[Answer, ...]], other: Mapping[Question, tuple[Answer, ...]]) -> bool:
+    """Tell whether two ticks can have been given the same answers, though one has asked more than the other."""
+    return all(a == b for question in one.keys() & other.keys() for a, b in zip(one[question], other[question], strict=False))
 
 
 def _attributes(element: Element) -> tuple[str | tuple[str, str], ...]:
