@@ -28,15 +28,26 @@ class Timer:
         self.job = None
 
 
+FEW = 16
+
+
 class TimerQueue:
-    """Timers in the order of their moments; those of one moment in the order in which they were put in. Not safe for threads."""
+    """Timers in the order of their moments; those of one moment in the order in which they were put in. Not safe for threads.
+
+    Cancelled timers are taken out when they may be half of all: what is put in and cancelled again and again leaves nothing behind.
+    """
 
     def __init__(self) -> None:
         self._timers: list[tuple[int, int, Timer]] = []
         self._numbers = itertools.count()
+        self._look_at = FEW
 
     def put(self, when_ns: int, job: Job) -> Timer:
         """Have a job run at ``when_ns`` (mission clock); jobs of one moment run in the order in which they were put."""
+        if len(self._timers) >= self._look_at:
+            self._timers = [one for one in self._timers if one[2].pending]
+            heapq.heapify(self._timers)
+            self._look_at = FEW + 2 * len(self._timers)
         timer = Timer(when_ns, job)
         heapq.heappush(self._timers, (when_ns, next(self._numbers), timer))
         return timer

@@ -5,6 +5,7 @@ from __future__ import annotations
 import gc
 import os
 from collections import Counter
+from collections.abc import Iterator
 from pathlib import Path
 
 import pytest
@@ -21,6 +22,9 @@ WARM, MEASURED = 300, 1000
 """The events' topic keeps the last 1000 of them: four of each execution, and it is full."""
 GROWTH_KB = 8000
 """Of all of the process, rclpy and DDS included; goals that rcl keeps for late questions are part of it."""
+
+PYTHONS_OWN = (700, 10, 10)
+"""The collector's thresholds in CPython 3.11 (documentation of ``gc.set_threshold``)."""
 
 
 def rss_kb() -> int:
@@ -40,6 +44,16 @@ def own_objects() -> Counter[str]:
     return Counter(kind.__name__ for kind in classes if str(kind.__module__).startswith("alula.runtime."))
 
 
+@pytest.fixture
+def collects_as_managers_do() -> Iterator[None]:
+    """Have Python's collector look as often as in a process of managers: tests have it look less often."""
+    before = gc.get_threshold()
+    gc.set_threshold(*PYTHONS_OWN)
+    yield
+    gc.set_threshold(*before)
+
+
+@pytest.mark.usefixtures("collects_as_managers_do")
 def test_a_thousand_executions_leave_nothing_behind(navigation):
     navigation.bring(FLYING)
     navigation.hooks["hover"].acts["on_dispatch"] = lambda execution: execution.terminate("DONE")
