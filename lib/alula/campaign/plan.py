@@ -11,7 +11,7 @@ from pathlib import Path
 
 from alula.common.faults import FaultError, FaultRequest, parse_fault
 from alula.common.located_yaml import Located, choices, read_yaml
-from alula.common.scenarios import scenario_names
+from alula.common.scenarios import mission_names
 from alula.records.errors import AnalysisError
 
 KEYS = ("about", "over", "scenarios", "seeds", "faults", "runs", "seed", "draw", "worlds", "options", "behaviour", "at_once")
@@ -75,7 +75,8 @@ def load_campaign(path: Path) -> Campaign:
         if wanted in said and other in said:
             raise said[other].wrong(f"`{other}` lists runs, `{wanted}` draws them; use only one of both")
     over = _choice(said["over"], (MOCKS, SIMULATOR)) if "over" in said else MOCKS
-    scenarios = tuple(_choice(part, scenario_names()) for part in said["scenarios"].elements()) if "scenarios" in said else ("mapping",)
+    missions = mission_names()
+    scenarios = tuple(_choice(part, missions) for part in said["scenarios"].elements()) if "scenarios" in said else tuple(missions)
     drawn = "draw" in said or "runs" in said
     for key in ("scenarios", "seeds", "faults"):
         if key in said and not said[key].elements():

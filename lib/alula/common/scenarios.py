@@ -63,6 +63,11 @@ def scenario_names(folder: Path | None = None) -> list[str]:
     return sorted(path.stem for path in (folder or scenarios_folder()).glob("*.yaml"))
 
 
+def mission_names(folder: Path | None = None) -> list[str]:
+    """Return the scenarios with a mission: all that do not only serve the robot's skills; raises ScenarioError."""
+    return [name for name in scenario_names(folder) if load_scenario(name, folder).mission]
+
+
 def load_scenario(name: str, folder: Path | None = None) -> Scenario:
     """Read a scenario; raises ScenarioError."""
     names = scenario_names(folder)

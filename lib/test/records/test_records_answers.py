@@ -5,6 +5,7 @@ from __future__ import annotations
 import json
 import re
 import shutil
+from dataclasses import replace
 from pathlib import Path
 
 import pytest
@@ -134,7 +135,7 @@ def test_a_proof_that_is_not_whole_makes_no_error() -> None:
 
 def test_a_mission_that_is_no_file_is_not_proved() -> None:
     scenario = load_scenario("mapping")
-    python = type(scenario)(scenario.name, scenario.about, "a.module:function", scenario.skillsets)
+    python = replace(scenario, mission="a.module:function")
     assert proved(python, [], effects_of_robot(), print).unproved == "a.module:function is no file of a tree"
 
 

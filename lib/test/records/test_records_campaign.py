@@ -122,7 +122,7 @@ WRONG = {
     "runs: 2\ndraw: {at_s: [0, 9]}": "a.yaml:2: `draw` needs `faults` to draw from, or `in_turn`",
     "runs: 2\ndraw: {faults: [zed], in_turn: [zed]}": "a.yaml:2: `draw` needs `faults` to draw from, or `in_turn`",
     "runs: 2\ndraw: {in_turn: [zed], most: 2}": "a.yaml:2: `most` says how many of `faults` are drawn",
-    "runs: 2\ndraw: {in_turn: []}": "a.yaml:2: `in_turn` has no list for mapping",
+    "runs: 2\ndraw: {in_turn: []}": "a.yaml:2: `in_turn` has no list for inspection",
     "runs: 2\ndraw: {in_turn: [zed@3]}": "a.yaml:2: `zed@3` has a time",
     "runs: 2\ndraw: {in_turn: [{zed: 3, lidar: 4}]}": "a.yaml:2: a fault with its time is `{NAME: SECONDS}`",
     "runs: 2\ndraw: {in_turn: [{zed: 0}]}": "a.yaml:2: how long a fault lasts should be a number from 0.1",
@@ -130,11 +130,11 @@ WRONG = {
     "behaviour: no.yaml": "a.yaml:1: there is no file ",
     "worlds: {mapping: no.yaml}": "a.yaml:1: `worlds` is for the simulator only",
     "over: simulator\nworlds: {mapping: no.yaml}": "a.yaml:2: there is no file ",
-    "over: simulator\nworlds: {inspection: no.yaml}": "a.yaml:2: `worlds` has no `inspection`; it may have mapping",
+    "scenarios: [mapping]\nover: simulator\nworlds: {inspection: no.yaml}": "a.yaml:3: `worlds` has no `inspection`; it may have mapping",
     "over: simulator\nbehaviour: no.yaml": "a.yaml:2: `behaviour` is for mocks only",
     "seeds: []": "a.yaml:1: `seeds` is empty, so there would be no run",
     "scenarios: []": "a.yaml:1: `scenarios` is empty, so there would be no run",
-    "runs: 2\ndraw: {faults: []}": "a.yaml:2: `faults` has no fault to draw for mapping",
+    "runs: 2\ndraw: {faults: []}": "a.yaml:2: `faults` has no fault to draw for inspection",
     "faults: [[rotor@3]]": "there is no fault 'rotor' in the behaviour; it has zed",
 }
 

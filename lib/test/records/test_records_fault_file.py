@@ -10,7 +10,7 @@ import pytest
 
 from alula.campaign.coverage import processes
 from alula.campaign.mocked_scenarios import load_mocked_scenario
-from alula.common.scenarios import load_scenario, scenario_names
+from alula.common.scenarios import load_scenario, mission_names
 from alula.records.causes.effects import FaultEffects
 from alula.records.causes.fault_file import effects_of_robot, load_effects
 from alula.records.errors import AnalysisError
@@ -79,7 +79,7 @@ def test_what_is_wrong_is_told_with_file_and_line(text, line, complaint, tmp_pat
 
 def test_the_drones_file_is_right_and_names_what_there_is():
     known = effects_of_robot().known
-    scenarios = [load_scenario(name) for name in scenario_names()]
+    scenarios = [load_scenario(name) for name in mission_names()]
     faults = {what for scenario in scenarios for what, _ in scenario.faults}
     faults |= {name.partition(":")[0] for scenario in scenarios for name in load_mocked_scenario(scenario.name).behaviour.faults}
     assert known.keys() - faults - set(processes(scenarios)) == {"master"}
