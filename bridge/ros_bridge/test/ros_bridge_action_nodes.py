@@ -9,12 +9,11 @@ from bridge_test_interfaces.action import Count
 from rclpy.action import ActionServer, CancelResponse, GoalResponse
 from rclpy.callback_groups import ReentrantCallbackGroup
 from rclpy.executors import MultiThreadedExecutor
-from ros_bridge_harness import wait_until
 
 from alula_testing.ros2 import spin
+from alula_testing.waits import HANGS_S, until
 from skillset_ros2 import ActionClient
 
-WITHIN_S = 20.0
 MET_S = 3.0
 
 
@@ -27,7 +26,7 @@ class Sent:
         self.result_future = None
 
     def answered(self):
-        wait_until(self.future.done, "the goal is answered", WITHIN_S)
+        until(self.future.done, "the goal is answered")
         return self.future.result()
 
     def accepted(self):
@@ -36,15 +35,15 @@ class Sent:
         self.result_future = handle.get_result_async()
         return handle
 
-    def result(self, within_s: float = WITHIN_S):
+    def result(self, within_s: float = HANGS_S):
         if self.result_future is None:
             self.accepted()
-        wait_until(self.result_future.done, "the goal has a result", within_s)
+        until(self.result_future.done, "the goal has a result", within_s)
         return self.result_future.result()
 
     def cancel(self):
         future = self.future.result().cancel_goal_async()
-        wait_until(future.done, "the cancel request is answered", WITHIN_S)
+        until(future.done, "the cancel request is answered")
         return future.result()
 
 
@@ -85,7 +84,7 @@ class ActionNode:
     def client(self, name: str) -> ActionClient:
         if name not in self.clients:
             self.clients[name] = ActionClient(self.node, Count, name, callback_group=self.group)
-        assert self.clients[name].wait_for_server(WITHIN_S)
+        assert self.clients[name].wait_for_server(HANGS_S)
         return self.clients[name]
 
     def server(self, name: str) -> "CountServer":
@@ -149,7 +148,7 @@ class CountServer:
                 counted.append(len(counted) + 1)
                 handle.publish_feedback(Count.Feedback(count=counted[-1], fraction=counted[-1] / goal.target))
         if goal.behaviour == "held":
-            self.finish.wait(WITHIN_S)
+            self.finish.wait(HANGS_S)
         if goal.behaviour == "abort":
             handle.abort()
         else:

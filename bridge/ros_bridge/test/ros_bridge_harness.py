@@ -9,15 +9,15 @@ import subprocess
 import sys
 import threading
 import time
-from collections.abc import Callable, Sequence
+from collections.abc import Sequence
 from pathlib import Path
 from xmlrpc.client import ServerProxy
 
 import pytest
 
+from alula_testing.waits import HANGS_S, until
+
 HERE = Path(__file__).resolve().parent
-WITHIN_S = 10.0
-LOOK_S = 0.005
 PROBE_S = 0.05  # between messages that are sent until the first of them arrives
 
 
@@ -28,15 +28,6 @@ def alula_root() -> Path:
 def bag_folder() -> Path:
     """Return the folder of recordings made by others, beside the checkout; ALULA_DATA names another place."""
     return Path(os.environ.get("ALULA_DATA", alula_root().parent / "shared" / "data")) / "bags"
-
-
-def wait_until(condition: Callable[[], object], what: str, within_s: float = WITHIN_S, every_s: float = LOOK_S) -> None:
-    """Return as soon as the condition holds. It is asked again and again, as what it looks at changes in other threads and processes."""
-    end = time.monotonic() + within_s
-    while not condition():
-        if time.monotonic() > end:
-            pytest.fail(f"not within {within_s} s: {what}")
-        time.sleep(every_s)
 
 
 def end(process: subprocess.Popen, within_s: float = 5.0) -> float:
@@ -66,7 +57,7 @@ class Master:
     def start(self) -> None:
         command = [str(alula_root() / "setup/in_ros1"), "rosmaster", "--core", "-p", str(self.port)]
         self.process = subprocess.Popen(command, env=self.environment, start_new_session=True, stdout=subprocess.DEVNULL)
-        wait_until(self.answers, "the ROS master answers")
+        until(self.answers, "the ROS master answers")
 
     def answers(self) -> bool:
         try:
@@ -129,7 +120,7 @@ class Ros1Peer(Lines):
         self.process.stdin.write(json.dumps({"do": command, **arguments}) + "\n")
         self.process.stdin.flush()
 
-    def expect(self, *kinds: str, within_s: float = WITHIN_S, **wanted: object) -> dict:
+    def expect(self, *kinds: str, within_s: float = HANGS_S, **wanted: object) -> dict:
         """Return the next event of one of the kinds that has the wanted values; others in between are passed over."""
         deadline = time.monotonic() + within_s
         while True:
@@ -150,4 +141,4 @@ class BridgeProcess(Lines):
         super().__init__([*command, f"__log:={folder}/bridge.log"], master.environment, errors=True)
 
     def wait_running(self) -> None:
-        wait_until(lambda: any("bridging" in line for line in self.lines), f"the bridge runs: {self.lines}", 20.0)
+        until(lambda: any("bridging" in line for line in self.lines), f"the bridge runs: {self.lines}")

@@ -8,11 +8,12 @@ from collections.abc import Callable
 import rclpy
 from rclpy.executors import SingleThreadedExecutor
 from rclpy.qos import DurabilityPolicy, QoSProfile, ReliabilityPolicy
-from ros_bridge_harness import PROBE_S, wait_until
+from ros_bridge_harness import PROBE_S
 from std_msgs.msg import String
 from std_srvs.srv import SetBool
 
 from alula_testing.ros2 import spin
+from alula_testing.waits import HANGS_S, until
 
 RELIABLE = QoSProfile(depth=20)
 BEST_EFFORT = QoSProfile(depth=20, reliability=ReliabilityPolicy.BEST_EFFORT)
@@ -42,7 +43,7 @@ class Ros2Peer:
     def publisher(self, topic: str, kind: type, qos: QoSProfile | int = 100):
         publisher = self.node.create_publisher(kind, topic, qos)
         self.ends.append((self.node.destroy_publisher, publisher))
-        wait_until(lambda: publisher.get_subscription_count() > 0, f"the bridge subscribes to {topic} in ROS 2")
+        until(lambda: publisher.get_subscription_count() > 0, f"the bridge subscribes to {topic} in ROS 2")
         return publisher
 
     def serve(self, service: str, handle: Callable) -> object:
@@ -50,11 +51,11 @@ class Ros2Peer:
         self.ends.append((self.node.destroy_service, server))
         return server
 
-    def call(self, service: str, kind: type, request: object, within_s: float = 10.0):
+    def call(self, service: str, kind: type, request: object, within_s: float = HANGS_S):
         """Return the response, or None when there was none in time."""
         client = self.node.create_client(kind, service)
         self.ends.append((self.node.destroy_client, client))
-        assert client.wait_for_service(20.0)
+        assert client.wait_for_service(HANGS_S)
         return client.call(request, timeout_sec=within_s)
 
     def tidy(self) -> None:
@@ -76,12 +77,12 @@ class Ros2Node:
         self.executor = SingleThreadedExecutor()
         self.executor.add_node(self.node)
 
-    def until(self, condition, what, within_s=15.0):
+    def until(self, condition, what, timeout_s=HANGS_S):
         def spin_and_ask():
             self.executor.spin_once(timeout_sec=0.02)
             return condition()
 
-        wait_until(spin_and_ask, what, within_s, every_s=0.0)
+        until(spin_and_ask, what, timeout_s, every_s=0.0)
 
     def subscribe(self, topic, kind, qos=RELIABLE, **options):
         received: list = []
@@ -115,7 +116,7 @@ def open_up(ros1, ros2, topic, kind, ros1_type, *, ros2_topic=None, values=None,
         ros1.do("publish", topic=topic, values=values or {})
         return received
 
-    wait_until(arrives, f"the first message on {topic} arrives in ROS 2", every_s=PROBE_S)
+    until(arrives, f"the first message on {topic} arrives in ROS 2", every_s=PROBE_S)
     return received
 
 
@@ -141,7 +142,7 @@ def wait_for_figures(bridge, topic, count):
     def figures():
         return json.loads(bridge.stats_file.read_text())["topics"][topic] if bridge.stats_file.is_file() else {"count": 0}
 
-    wait_until(lambda: figures()["count"] >= count, f"the statistics count {count} of {topic}")
+    until(lambda: figures()["count"] >= count, f"the statistics count {count} of {topic}")
     return figures()
 
 

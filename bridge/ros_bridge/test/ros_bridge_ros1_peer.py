@@ -144,7 +144,7 @@ def call(service, type, values):  # noqa: A002
     service_class = roslib.message.get_service_class(type)
 
     def run():
-        rospy.wait_for_service(service, 10.0)
+        rospy.wait_for_service(service)
         try:
             response = rospy.ServiceProxy(service, service_class)(filled(service_class._request_class(), values))
         except rospy.ServiceException as error:

@@ -6,15 +6,14 @@ import struct
 import threading
 from xmlrpc.client import ServerProxy
 
-from ros_bridge_harness import wait_until
 from ros_bridge_wire import exactly, header, read_header
 from std_srvs.srv import SetBool
 from uav_msgs.srv import SetSensor
 
+from alula_testing.waits import HANGS_S, until
 from ros_bridge.conversion import Types, ament_prefixes
 from ros_bridge.deferred_service import DeferredService
 
-LIMIT_S = 20.0
 BIG_BYTES = 4_000_000
 SET_BOOL_SUM = "09fb03525b03e7ea1fd3992bafd87e16"
 TYPES = Types(ament_prefixes())
@@ -36,7 +35,7 @@ class Client:
         code, _, uri = world.proxy.lookupService("/bv_client", service)
         assert code == 1
         host, _, port = uri.removeprefix("rosrpc://").rstrip("/").rpartition(":")
-        self.socket = socket.create_connection((host, int(port)), LIMIT_S)
+        self.socket = socket.create_connection((host, int(port)), HANGS_S)
         self.socket.sendall(header(**{"callerid": "/bv_client", "service": service, "md5sum": "*", **fields}))
         self.answer = read_header(self.socket)
 
@@ -122,7 +121,7 @@ def serve_echo(world):
     """Serve in ROS 2, and return when the bridge reaches the server."""
     server = world.ros2.node.create_service(SetSensor, "/bv/in_ros2", echo)
     world.ros2.ends.append((world.ros2.node.destroy_service, server))
-    wait_until(lambda: answers(world, "/bv/in_ros2", sensor_request("")), "the service answers", LIMIT_S)
+    until(lambda: answers(world, "/bv/in_ros2", sensor_request("")), "the service answers")
 
 
 def answers(world, service, body):
@@ -141,7 +140,7 @@ class HeldService:
     def __init__(self, world, name):
         self.taken, self.holds = [], False
         self.service = DeferredService(world.ros2.node, SetBool, name, self.take)
-        wait_until(lambda: answers(world, name, b"\0"), "the service answers", LIMIT_S)
+        until(lambda: answers(world, name, b"\0"), "the service answers")
         self.holds = True
 
     def take(self, request, asker):

@@ -10,8 +10,10 @@ from action_msgs.msg import GoalStatus, GoalStatusArray
 from action_msgs.srv import CancelGoal
 from bridge_test_interfaces.action import Count
 from rclpy.qos import qos_profile_action_status_default
-from ros_bridge_action_nodes import WITHIN_S, ActionNode, Sent, feedback_arrives
-from ros_bridge_harness import Ros1Peer, wait_until
+from ros_bridge_action_nodes import ActionNode, Sent, feedback_arrives
+from ros_bridge_harness import Ros1Peer
+
+from alula_testing.waits import HANGS_S, until
 
 CONFIG = """
 topics: []
@@ -37,9 +39,9 @@ def ros2(ros1, action_ros2):
 
 def test_goal_feedback_and_result_cross_from_an_actionlib_server(ros1, ros2):
     client = ros2.client("/ba/in_ros1")
-    wait_until(lambda: feedback_arrives(client), "the bridge knows the client's reader of feedback")
+    until(lambda: feedback_arrives(client), "the bridge knows the client's reader of feedback")
     sent = Sent(client, target=5, period_s=0.02, behaviour="held")
-    wait_until(lambda: len(sent.feedback) == 5, "all feedback arrives", WITHIN_S)
+    until(lambda: len(sent.feedback) == 5, "all feedback arrives")
     ros1.do("finish")  # neither world keeps the order of the last feedback and the result
     answer = sent.result()
     assert answer.status == GoalStatus.STATUS_SUCCEEDED
@@ -85,13 +87,13 @@ def test_several_goals_at_once_and_cancelling_by_stamp_and_all(ros2):
     cancel = ros2.node.create_client(CancelGoal, "/ba/in_ros1/_action/cancel_goal", callback_group=ros2.group)
     request = CancelGoal.Request()
     request.goal_info.stamp = max((handle.stamp for handle in handles), key=lambda stamp: (stamp.sec, stamp.nanosec))
-    response = cancel.call(request, timeout_sec=WITHIN_S)
+    response = cancel.call(request, timeout_sec=HANGS_S)
     assert {bytes(info.goal_id.uuid) for info in response.goals_canceling} == {bytes(handle.goal_id.uuid) for handle in handles}
     assert [goal.result().status for goal in goals] == [GoalStatus.STATUS_CANCELED] * 2
     assert not later.result_future.done()
     last = Sent(client, behaviour="hang", period_s=10.0)
     last.accepted()
-    assert len(cancel.call(CancelGoal.Request(), timeout_sec=WITHIN_S).goals_canceling) == 2
+    assert len(cancel.call(CancelGoal.Request(), timeout_sec=HANGS_S).goals_canceling) == 2
     assert [later.result().status, last.result().status] == [GoalStatus.STATUS_CANCELED] * 2
     ros2.node.destroy_client(cancel)
 
@@ -119,9 +121,9 @@ def test_states_in_ros2_go_from_accepted_to_executing_to_the_end(ros2):
     )
     sent = Sent(client, behaviour="hang", period_s=10.0)
     wanted = bytes(sent.accepted().goal_id.uuid)
-    wait_until(lambda: (wanted, GoalStatus.STATUS_EXECUTING) in seen, "it is executing", WITHIN_S)
+    until(lambda: (wanted, GoalStatus.STATUS_EXECUTING) in seen, "it is executing")
     sent.cancel()
-    wait_until(lambda: (wanted, GoalStatus.STATUS_CANCELED) in seen, "it is cancelled", WITHIN_S)
+    until(lambda: (wanted, GoalStatus.STATUS_CANCELED) in seen, "it is cancelled")
     states = [status for goal, status in seen if goal == wanted]
     assert states == sorted(states)
     ros2.node.destroy_subscription(subscription)
@@ -156,8 +158,8 @@ def test_killed_actionlib_server_aborts_its_goals_and_its_successor_gets_the_nex
 
 def test_result_of_an_unknown_goal_is_unknown(ros2):
     client = ros2.node.create_client(Count.Impl.GetResultService, "/ba/in_ros1/_action/get_result", callback_group=ros2.group)
-    assert client.wait_for_service(WITHIN_S)
-    assert client.call(Count.Impl.GetResultService.Request(), timeout_sec=WITHIN_S).status == GoalStatus.STATUS_UNKNOWN
+    assert client.wait_for_service(HANGS_S)
+    assert client.call(Count.Impl.GetResultService.Request(), timeout_sec=HANGS_S).status == GoalStatus.STATUS_UNKNOWN
     ros2.node.destroy_client(client)
 
 

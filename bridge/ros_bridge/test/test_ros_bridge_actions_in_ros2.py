@@ -4,8 +4,9 @@ import threading
 
 import pytest
 from action_msgs.msg import GoalStatus
-from ros_bridge_action_nodes import WITHIN_S, Sent
-from ros_bridge_harness import wait_until
+from ros_bridge_action_nodes import Sent
+
+from alula_testing.waits import until
 
 CONFIG = """
 topics: []
@@ -36,7 +37,7 @@ def send(ros1, name, key, **fields):
 
 
 def ending(ros1, key):
-    return ros1.expect("transition", key=key, state="DONE", within_s=WITHIN_S)
+    return ros1.expect("transition", key=key, state="DONE")
 
 
 def test_goal_feedback_and_result_cross_from_a_ros2_server(ros1, ros2):
@@ -87,7 +88,7 @@ def test_several_goals_of_ros1_and_cancelling_by_stamp_and_all(ros1, ros2):
     server = ros2.server("/ba/in_ros2")
     first, second, third = (send(ros1, "/ba/in_ros2", key, behaviour="hang", period_s=0.05) for key in ("one", "two", "three"))
     assert first["stamp_ns"] < second["stamp_ns"] < third["stamp_ns"]
-    wait_until(lambda: len(server.goals) == 3, "all run at once", WITHIN_S)
+    until(lambda: len(server.goals) == 3, "all run at once")
     ros1.do("cancel_before", name="/ba/in_ros2", stamp_ns=second["stamp_ns"])
     assert {ros1.expect("transition", state="DONE", terminal="PREEMPTED")["key"] for _ in range(2)} == {"one", "two"}
     assert sum(handle.is_active for handle in server.goals) == 1

@@ -4,11 +4,12 @@ import json
 import signal
 from xmlrpc.client import ServerProxy
 
-from ros_bridge_harness import WITHIN_S, BridgeProcess, Master, Ros1Peer, wait_until
+from ros_bridge_harness import BridgeProcess, Master, Ros1Peer
 from ros_bridge_nodes import Ros2Peer, open_up
 from std_msgs.msg import String
 
 from alula.common.network import free_port
+from alula_testing.waits import HANGS_S, until
 
 
 def test_interrupt_ends_the_bridge_with_its_figures(master, ros2_domain, tmp_path):
@@ -17,7 +18,7 @@ def test_interrupt_ends_the_bridge_with_its_figures(master, ros2_domain, tmp_pat
         process = BridgeProcess(master, tmp_path / number.name, config)
         process.wait_running()
         process.process.send_signal(number)
-        assert process.process.wait(WITHIN_S) == 0
+        assert process.process.wait(HANGS_S) == 0
         about = {"ros2_name": "/bt_end", "direction": "ros1_to_ros2", "type": "std_msgs/String", "rate_hz": 0.0}
         figures = {"count": 0, "bytes": 0, "p50_ms": None, "p95_ms": None, "dropped": 0, "errors": 0, "dropped_why": {}}
         assert json.loads(process.stats_file.read_text()) == {"topics": {"/bt_end": about | figures}, "services": {}, "actions": {}}
@@ -52,7 +53,7 @@ def test_bridge_is_one_node_of_each_world_and_imports_no_ros1(ros2_domain, maste
         return sorted(name for name in ros2.node.get_node_names() if name.startswith("ros") and "peer" not in name)
 
     # Bridges that other tests have killed stay in the domain until their lease ends, after 20 s.
-    wait_until(lambda: own_nodes() == ["ros1_parameters", "ros_bridge"], f"one node of ours: {own_nodes()}", 60.0)
+    until(lambda: own_nodes() == ["ros1_parameters", "ros_bridge"], f"one node of ours: {own_nodes()}")
     ros2.tidy()
     ros2.close()
     assert process.close() < 5.0
@@ -61,7 +62,7 @@ def test_bridge_is_one_node_of_each_world_and_imports_no_ros1(ros2_domain, maste
 def test_interrupt_ends_a_bridge_that_waits_for_its_master(ros2_domain, tmp_path):
     no_master = Master(free_port())
     process = BridgeProcess(no_master, tmp_path, "topics: []\n")
-    wait_until(lambda: any("waiting for a ROS master" in line for line in process.lines), "it says that it waits", 20.0)
+    until(lambda: any("waiting for a ROS master" in line for line in process.lines), "it says that it waits")
     process.process.send_signal(signal.SIGTERM)
     assert process.process.wait(2.0) == 0
 
@@ -73,19 +74,19 @@ def test_wrong_configuration_ends_with_2_and_wrong_type_with_1(master, ros2_doma
     ]:
         process = BridgeProcess(master, tmp_path / str(code), config)
         assert process.process.wait(20.0) == code
-        wait_until(lambda process=process, words=words: any(words in line for line in process.lines), f"{words} in {process.lines}")
+        until(lambda process=process, words=words: any(words in line for line in process.lines), f"{words} in {process.lines}")
 
 
 def test_waits_for_the_master_with_one_message_and_survives_its_restart(ros2_domain, tmp_path):
     master = Master(free_port())
     process = BridgeProcess(master, tmp_path, "topics:\n  - {name: /bt_restart, direction: ros1_to_ros2, type: std_msgs/String}\n")
-    wait_until(lambda: process.lines, "it says that it waits", 20.0)
+    until(lambda: process.lines, "it says that it waits")
     ros2 = Ros2Peer()
     master.start()
     process.wait_running()
     assert sum("waiting for a ROS master" in line for line in process.lines) == 1
     master.close()
-    wait_until(lambda: any("does not answer" in line for line in process.lines), "it notices")
+    until(lambda: any("does not answer" in line for line in process.lines), "it notices")
     master.start()
     peer = Ros1Peer(master)
     received = open_up(peer, ros2, "/bt_restart", String, "std_msgs/String", values={"data": "after the restart"})

@@ -5,11 +5,13 @@ import struct
 
 from geometry_msgs.msg import PoseStamped
 from rclpy.qos import QoSProfile
-from ros_bridge_harness import PROBE_S, wait_until
+from ros_bridge_harness import PROBE_S
 from ros_bridge_nodes import open_up, wait_ros1_receives
 from ros_bridge_wire import FakePublisher, header
 from std_msgs.msg import Float64
 from uav_msgs.srv import Takeoff
+
+from alula_testing.waits import until
 
 CONFIG = """
 types:
@@ -32,7 +34,6 @@ services:
   - {name: /bm/in_ros2, server: ros2, type: std_srvs/SetBool, timeout_s: 10.0}
 """
 FLOAT32_SUM = "73fcbf46b49191e672908e50842a83d4"
-LIMIT_S = 20.0
 
 
 def test_a_burst_keeps_its_order_both_ways(ros1, ros2):
@@ -44,7 +45,7 @@ def test_a_burst_keeps_its_order_both_ways(ros1, ros2):
     for number in numbers:
         ros1.do("publish", topic="/bm/up", values={"data": number})
         publisher.publish(Float64(data=number))
-    wait_until(lambda: received[-1].data == numbers[-1], "the last one arrives")
+    until(lambda: received[-1].data == numbers[-1], "the last one arrives")
     assert [message.data for message in received if message.data > 0] == numbers
     for number in numbers:
         ros1.expect("message", topic="/bm/down", hex=struct.pack("<f", number).hex())
@@ -55,9 +56,9 @@ def test_late_joiner_gets_the_latched_message(ros1, ros2):
     ros1.do("advertise", topic="/bm/latched", type="std_msgs/Float32", latch=True)
     ros1.do("publish", topic="/bm/latched", values={"data": 2.5})
     early = ros2.subscribe("/bm/latched", Float64, latched)
-    wait_until(lambda: early, "it crosses")
+    until(lambda: early, "it crosses")
     late = ros2.subscribe("/bm/latched", Float64, latched)
-    wait_until(lambda: late, "a late joiner gets it")
+    until(lambda: late, "a late joiner gets it")
     assert late[0].data == 2.5
 
 
@@ -77,14 +78,14 @@ def test_a_message_that_is_none_is_counted_and_the_next_one_crosses(ros2, master
     hello = header(callerid="/fake", type="std_msgs/Float32", md5sum=FLOAT32_SUM, latching="0", topic="/bm/fake")
     bad, good = struct.pack("<I", 2) + b"xx", struct.pack("<If", 4, 1.5)
     fake = FakePublisher(master, [hello + bad + good], topic="/bm/fake", type_name="std_msgs/Float32")
-    wait_until(lambda: received, "the good one arrives", LIMIT_S, PROBE_S)
+    until(lambda: received, "the good one arrives", every_s=PROBE_S)
     fake.close()
     assert {message.data for message in received} == {1.5}
 
     def counted():
         return bridge.stats_file.is_file() and json.loads(bridge.stats_file.read_text())["topics"]["/bm/fake"]["errors"] > 0
 
-    wait_until(counted, "the bad one is counted", LIMIT_S)
+    until(counted, "the bad one is counted")
 
 
 def test_ros2_client_calls_a_ros1_server(ros1, ros2):

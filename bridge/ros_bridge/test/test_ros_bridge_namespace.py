@@ -4,11 +4,12 @@ import json
 import struct
 
 from diagnostic_msgs.msg import DiagnosticArray
-from ros_bridge_harness import wait_until
 from ros_bridge_nodes import LATCHED, open_up, wait_ros1_receives
 from rosgraph_msgs.msg import Clock
 from std_msgs.msg import String
 from std_srvs.srv import SetBool
+
+from alula_testing.waits import until
 
 CONFIG = """
 topics:
@@ -33,7 +34,7 @@ def test_names_of_ros1_are_below_the_namespace_in_ros2_and_nowhere_else(ros1, ro
         ros1.do("publish", topic="/clock", values={"clock": {"secs": 7}})
         return ticks
 
-    wait_until(ticked, "the clock comes")
+    until(ticked, "the clock comes")
     names = ("/clock", "/bn/up", "/bn/found", "/bn/down", "/ros_bridge/state", "/diagnostics")
     ends = [end for name in names for end in ros2.node.get_publishers_info_by_topic(name)]
     assert not [end.topic_type for end in ends if end.node_namespace == "/rover"]
@@ -65,5 +66,5 @@ def test_a_service_is_called_in_the_namespace(ros1, ros2):
 def test_what_the_bridge_tells_of_itself_is_in_the_namespace(ros1, ros2):
     beats = ros2.subscribe("/rover/ros_bridge/state", String, LATCHED)
     told = ros2.subscribe("/rover/diagnostics", DiagnosticArray)
-    wait_until(lambda: beats and told, "state and diagnostics come")
+    until(lambda: beats and told, "state and diagnostics come")
     assert json.loads(beats[-1].data)["state"] == "running"

@@ -11,10 +11,12 @@ import sys
 import threading
 from xmlrpc.client import ServerProxy
 
-from ros_bridge_harness import HERE, PROBE_S, Lines, Ros1Peer, wait_until
+from ros_bridge_harness import HERE, PROBE_S, Lines, Ros1Peer
 from ros_bridge_nodes import LATCHED
 from ros_bridge_wire import STRING_SUM, FakePublisher, frame, greeting, read_frame, read_header, until_it_arrives, wish
 from std_msgs.msg import String
+
+from alula_testing.waits import HANGS_S, until
 
 CONFIG = """
 topics:
@@ -29,7 +31,6 @@ topics:
   - {name: /bp/fake, direction: ros1_to_ros2, type: std_msgs/String, depth: 100}
   - {ros1_name: /bp/fake, ros2_name: /bp/fake_too, direction: ros1_to_ros2, type: std_msgs/String, depth: 100}
 """
-LIMIT_S = 20.0
 
 
 def texts(ros2, topic, qos=100):
@@ -56,9 +57,9 @@ def test_each_latching_publisher_in_ros1_keeps_its_message_for_late_joiners(ros2
         peer.do("advertise", topic="/bp/up_latched", type="std_msgs/String", latch=True)
         peer.do("publish", topic="/bp/up_latched", values={"data": "old " + text})
         peer.do("publish", topic="/bp/up_latched", values={"data": text})
-    wait_until(lambda: set(peers) <= set(early), f"all have crossed: {early}", LIMIT_S)
+    until(lambda: set(peers) <= set(early), f"all have crossed: {early}")
     late = texts(ros2, "/bp/up_latched", LATCHED)
-    wait_until(lambda: set(late) == set(peers), f"a late joiner gets all of them: {late}", LIMIT_S)
+    until(lambda: set(late) == set(peers), f"a late joiner gets all of them: {late}")
     assert len(late) == 3
 
 
@@ -72,10 +73,10 @@ def test_each_transient_local_publisher_in_ros2_keeps_its_message_for_late_joine
     first.do("subscribe", topic="/bp/down_latched", type="std_msgs/String")
     seen = set()
     while not wanted <= seen:
-        seen.add(first.expect("message", topic="/bp/down_latched", within_s=LIMIT_S)["hex"])
+        seen.add(first.expect("message", topic="/bp/down_latched")["hex"])
     late = Ros1Peer(master)
     late.do("subscribe", topic="/bp/down_latched", type="std_msgs/String")
-    assert {late.expect("message", topic="/bp/down_latched", within_s=LIMIT_S)["hex"] for _ in wanted} == wanted
+    assert {late.expect("message", topic="/bp/down_latched")["hex"] for _ in wanted} == wanted
 
 
 def test_large_and_small_messages_keep_their_order_both_ways(ros2, master, bridge):
@@ -88,14 +89,14 @@ def test_large_and_small_messages_keep_their_order_both_ways(ros2, master, bridg
         peer.do("publish", topic="/bp/up", values={"data": "probe"})
         return received
 
-    wait_until(arrives, "the first message arrives", LIMIT_S, PROBE_S)
+    until(arrives, "the first message arrives", every_s=PROBE_S)
     sent = [f"{number:03}" + "x" * (number % 3 * 200_000) for number in range(30)]
     for text in sent:
         peer.do("publish", topic="/bp/up", values={"data": text})
-    wait_until(lambda: received[-1] == sent[-1], "the last arrives", LIMIT_S)
+    until(lambda: received[-1] == sent[-1], "the last arrives")
     assert [text for text in received if text != "probe"] == sent
     place = place_in_ros1(master, "/bp/down")
-    with socket.create_connection(place, LIMIT_S) as connection:
+    with socket.create_connection(place, HANGS_S) as connection:
         connection.sendall(wish(type="*", md5sum="*"))
         read_header(connection)
         until_it_arrives(publisher, connection, "probe")
@@ -114,12 +115,12 @@ def test_subscribers_are_checked_and_answered(ros2, master, bridge):
         ({"type": "std_msgs/Int32"}, "std_msgs/Int32"),
         ({"topic": "/bp/nothing"}, "/bp/nothing"),
     ]:
-        with socket.create_connection(place, LIMIT_S) as connection:
+        with socket.create_connection(place, HANGS_S) as connection:
             connection.sendall(wish(**wrong))
             assert words in read_header(connection)["error"]
             assert connection.recv(1) == b""
     for accepted in ({}, {"type": "*", "md5sum": "*"}):
-        with socket.create_connection(place, LIMIT_S) as connection:
+        with socket.create_connection(place, HANGS_S) as connection:
             connection.sendall(wish(**accepted))
             answer = read_header(connection)
             assert (answer["type"], answer["md5sum"], answer["latching"]) == ("std_msgs/String", STRING_SUM, "0")
@@ -133,7 +134,7 @@ def test_garbage_on_the_listening_socket_harms_no_subscriber(ros2, master, bridg
     publisher = ros2.publisher("/bp/down", String, 10)
     chance = random.Random(7)  # noqa: S311
     whole = wish()
-    with socket.create_connection(place, LIMIT_S) as bystander:
+    with socket.create_connection(place, HANGS_S) as bystander:
         bystander.sendall(whole)
         read_header(bystander)
         for number in range(200):
@@ -142,7 +143,7 @@ def test_garbage_on_the_listening_socket_harms_no_subscriber(ros2, master, bridg
                 garbage[chance.randrange(len(garbage))] = chance.randrange(256)
             kind = number % 4
             data = [bytes(garbage), whole[: chance.randrange(len(whole))], chance.randbytes(300), whole + chance.randbytes(5000)][kind]
-            with socket.create_connection(place, LIMIT_S) as connection:
+            with socket.create_connection(place, HANGS_S) as connection:
                 connection.sendall(data)
         until_it_arrives(publisher, bystander, "still here")
     assert bridge.process.poll() is None
@@ -164,10 +165,10 @@ def test_publisher_that_breaks_off_or_talks_nonsense_is_tried_again_and_harms_no
     # A reply that does not fit makes the bridge wait 5 s, and that is not what is tested: each such reply has a publisher of its own.
     for index, reply in enumerate(replies):
         fake = FakePublisher(master, [reply])
-        wait_until(lambda fake=fake: fake.answered >= 2, f"both routes connect for reply {index}", LIMIT_S)
+        until(lambda fake=fake: fake.answered >= 2, f"both routes connect for reply {index}")
         if index >= 5:
             words = "good" if index == 6 else "behind nonsense"
-            wait_until(lambda words=words: words in received and words in too, f"'{words}' arrives on both", LIMIT_S)
+            until(lambda words=words: words in received and words in too, f"'{words}' arrives on both")
         fake.close()
     assert {"good", "behind nonsense"} == set(received) == set(too)
     figures = {}
@@ -176,14 +177,14 @@ def test_publisher_that_breaks_off_or_talks_nonsense_is_tried_again_and_harms_no
         figures.update(json.loads(bridge.stats_file.read_text())["topics"]) if bridge.stats_file.is_file() else None
         return figures.get("/bp/fake", {}).get("errors", 0) >= 1
 
-    wait_until(counted, "the message that is none is counted", LIMIT_S)
+    until(counted, "the message that is none is counted")
 
 
 def test_lost_publisher_is_found_again(ros2, master, bridge):
     received = texts(ros2, "/bp/fake")
     hello = greeting("/bp/fake")
     fake = FakePublisher(master, [b"", b"", b"", hello + frame("again")])
-    wait_until(lambda: "again" in received, "it is tried again", LIMIT_S)
+    until(lambda: "again" in received, "it is tried again")
     fake.close()
 
 
@@ -196,11 +197,11 @@ def test_burst_goes_out_as_fast_as_subscribers_keep_up_and_none_of_it_is_lost(ro
     ros2.listen("/bp/burst", String, lambda message, info: received.append((message.data, info["source_timestamp"])), 2000)
     hello = greeting("/bp/burst")
     probe = FakePublisher(master, [hello + frame("(probe)")], "/bp/burst")
-    wait_until(lambda: received, "a probe arrives: the ends in ROS 2 know each other", LIMIT_S)
+    until(lambda: received, "a probe arrives: the ends in ROS 2 know each other")
     probe.close()
     sent = [f"{number:03}" for number in range(900)]
     fake = FakePublisher(master, [hello + b"".join(frame(text) for text in sent), hello], "/bp/burst")
-    wait_until(lambda: received[-1][0] == sent[-1], "the last one arrives", LIMIT_S)
+    until(lambda: received[-1][0] == sent[-1], "the last one arrives")
     fake.close()
     burst = [(text, stamp_ns) for text, stamp_ns in received if text != "(probe)"]
     assert [text for text, _ in burst] == sent
@@ -219,12 +220,12 @@ def test_subscriber_whose_process_stands_still_gets_the_whole_burst_afterwards(r
     peer = Lines([sys.executable, str(HERE / "ros_bridge_counting_peer.py"), "/bp/stopped", "2000"], dict(os.environ), errors=False)
     hello = greeting("/bp/stopped")
     probe = FakePublisher(master, [hello + frame("(probe)")], "/bp/stopped")
-    wait_until(lambda: beside and peer.lines, "a probe arrives at both", LIMIT_S)
+    until(lambda: beside and peer.lines, "a probe arrives at both")
     probe.close()
     os.kill(peer.process.pid, signal.SIGSTOP)
     try:
         fake = FakePublisher(master, [hello + b"".join(frame(text) for text in sent), hello], "/bp/stopped")
-        wait_until(lambda: beside[-1] == sent[-1], "all have left the bridge", LIMIT_S)
+        until(lambda: beside[-1] == sent[-1], "all have left the bridge")
         fake.close()
     finally:
         os.kill(peer.process.pid, signal.SIGCONT)
@@ -232,7 +233,7 @@ def test_subscriber_whose_process_stands_still_gets_the_whole_burst_afterwards(r
     def came():
         return [(text, number) for text, number in map(json.loads, list(peer.lines)) if text != "(probe)"]
 
-    wait_until(lambda: came() and came()[-1][0] == sent[-1], "the last one arrives", LIMIT_S)
+    until(lambda: came() and came()[-1][0] == sent[-1], "the last one arrives")
     numbers = [number for _, number in came()]
     gaps = [(before, after) for before, after in itertools.pairwise(numbers) if after != before + 1]
     assert [text for text, _ in came()] == sent, f"lost behind the writer, between its numbers {gaps}"
@@ -249,21 +250,21 @@ def test_subscriber_that_stalls_loses_what_its_own_queue_has_no_room_for_as_with
     peer = Lines([sys.executable, str(HERE / "ros_bridge_counting_peer.py"), "/bp/stalled", "200"], dict(os.environ), errors=False)
     hello = greeting("/bp/stalled")
     probe = FakePublisher(master, [hello + frame("(probe)")], "/bp/stalled")
-    wait_until(lambda: peer.lines and short and roomy and within.get_subscription_count() == 2, "all know each other", LIMIT_S)
+    until(lambda: peer.lines and short and roomy and within.get_subscription_count() == 2, "all know each other")
     probe.close()
     go_on = threading.Event()
-    ros2.executor.create_task(go_on.wait, LIMIT_S)
+    ros2.executor.create_task(go_on.wait, HANGS_S)
     ros2.executor.wake()
     try:
         fake = FakePublisher(master, [hello + b"".join(frame(text) for text in sent), hello], "/bp/stalled")
         for text in sent:
             within.publish(String(data=text))
-        wait_until(lambda: json.loads(list(peer.lines)[-1])[0] == sent[-1], "all have left the bridge", LIMIT_S)
+        until(lambda: json.loads(list(peer.lines)[-1])[0] == sent[-1], "all have left the bridge")
         fake.close()
     finally:
         go_on.set()
     for heard in (short, roomy, short_within, roomy_within):
-        wait_until(lambda heard=heard: heard[-1:] == sent[-1:], "the last one arrives", LIMIT_S)
+        until(lambda heard=heard: heard[-1:] == sent[-1:], "the last one arrives")
     for heard in (short, short_within):
         assert len(set(heard) & set(sent)) < len(sent)
     for heard in (roomy, roomy_within):
@@ -275,10 +276,10 @@ def test_flood_crosses_in_order_and_what_has_to_go_is_counted(ros2, master, brid
     received = texts(ros2, "/bp/flood", 20_000)
     hello = greeting("/bp/flood")
     probe = FakePublisher(master, [hello + frame("(probe)")], "/bp/flood")
-    wait_until(lambda: received, "a probe arrives: the ends in ROS 2 know each other", LIMIT_S)
+    until(lambda: received, "a probe arrives: the ends in ROS 2 know each other")
     probe.close()
     fake = FakePublisher(master, [hello + b"".join(frame(f"{number:05}") for number in range(20_000)), hello], "/bp/flood")
-    wait_until(lambda: received[-1] == "19999", "the last one arrives", LIMIT_S)
+    until(lambda: received[-1] == "19999", "the last one arrives")
     assert received == sorted(received)
     figures = {}
     sent = 20_000 + probe.answered
@@ -287,7 +288,7 @@ def test_flood_crosses_in_order_and_what_has_to_go_is_counted(ros2, master, brid
         figures.update(json.loads(bridge.stats_file.read_text())["topics"]["/bp/flood"])
         return figures["count"] + figures["dropped"] >= sent
 
-    wait_until(counted, f"all are counted: {figures}", LIMIT_S)
+    until(counted, f"all are counted: {figures}")
     assert figures["count"] + figures["dropped"] == sent
     assert len(received) <= figures["count"]
     fake.close()

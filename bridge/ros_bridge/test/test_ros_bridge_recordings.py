@@ -27,7 +27,6 @@ IN_ROS2 = {
     "turtlesim/Pose": "bridge_test_interfaces/Pose",
 }
 BACK_IN_ROS1 = {"tf/tfMessage": "tf2_msgs/TFMessage"}
-WITHIN_S = 30.0
 
 
 def full(name):
@@ -114,7 +113,7 @@ def test_recordings_of_others_cross_both_ways_byte_for_byte(name, ros2_node, mas
             ways[connection.topic].recorded.append(bytes(data))
             order.append(connection.topic)
     player.do("advertise_bag", path=str(path), prefix=f"/{path.stem}/there")
-    assert player.expect("advertised", within_s=WITHIN_S)["number"] == len(order) == BAGS[name]
+    assert player.expect("advertised")["number"] == len(order) == BAGS[name]
     for way in ways.values():
         wait_open(player, ros2_node, way)
     of_back = {way.back: way for way in ways.values()}
@@ -124,10 +123,10 @@ def test_recordings_of_others_cross_both_ways_byte_for_byte(name, ros2_node, mas
         for topic, number in numbers.items():
             way = ways[topic]
             wanted = way.compared + number
-            ros2_node.until(lambda way=way, wanted=wanted: len(way.arrived) >= wanted, f"{wanted} of {topic} arrive", WITHIN_S)
+            ros2_node.until(lambda way=way, wanted=wanted: len(way.arrived) >= wanted, f"{wanted} of {topic} arrive")
             way.compare_in_ros2(number)
         for _ in range(numbers.total()):
-            event = player.expect("message", within_s=WITHIN_S)
+            event = player.expect("message")
             of_back[event["topic"]].compare_in_ros1(event)
     assert all(way.compared == len(way.arrived) == len(way.recorded) for way in ways.values())
 
@@ -139,4 +138,4 @@ def wait_open(player, ros2_node, way):
         player.do("connections", topic=way.there)
         return player.expect("connections", topic=way.there)["number"] and way.publisher.get_subscription_count()
 
-    ros2_node.until(connected, f"the bridge is connected to {way.there} and {way.back}", WITHIN_S)
+    ros2_node.until(connected, f"the bridge is connected to {way.there} and {way.back}")

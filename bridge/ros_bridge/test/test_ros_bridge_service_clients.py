@@ -5,10 +5,8 @@ import random
 import socket
 import struct
 
-from ros_bridge_harness import wait_until
 from ros_bridge_service_peers import (
     BIG_BYTES,
-    LIMIT_S,
     SERVICES,
     SET_SENSOR,
     Client,
@@ -25,6 +23,8 @@ from ros_bridge_service_peers import (
 from ros_bridge_wire import header, read_header
 from std_srvs.srv import SetBool
 from uav_msgs.srv import SetSensor
+
+from alula_testing.waits import HANGS_S, until
 
 CONFIG = SERVICES
 
@@ -51,7 +51,7 @@ def test_clients_in_ros1_are_checked_and_answered(world):
 def test_service_that_is_not_provided_is_refused(world):
     with Client(world, "/bv/in_ros2") as known:
         place = known.socket.getpeername()
-    with socket.create_connection(place, LIMIT_S) as connection:
+    with socket.create_connection(place, HANGS_S) as connection:
         connection.sendall(header(callerid="/t", service="/bv/nothing", md5sum="*"))
         assert "/bv/nothing" in read_header(connection)["error"]
         assert connection.recv(1) == b""
@@ -82,7 +82,7 @@ def test_big_requests_and_responses_cross_both_ways(world):
 
     with Server(world, "/bv/in_ros1", talk):
         for sent in (words, "small", words):
-            response = world.ros2.call("/bv/in_ros1", SetSensor, SetSensor.Request(sensor=sent), within_s=LIMIT_S)
+            response = world.ros2.call("/bv/in_ros1", SetSensor, SetSensor.Request(sensor=sent))
             assert response.accepted
             assert response.reason == sent
 
@@ -94,7 +94,7 @@ def test_calls_that_are_held_hold_up_no_others(world):
     clients = [Client(world, "/bv/held_in_ros2", persistent="1") for _ in range(3)]
     for number, client in enumerate(clients):
         client.send(b"\1" if number % 2 else b"\0")
-        wait_until(lambda number=number: len(held.taken) == number + 1, "the request arrives in ROS 2", LIMIT_S)
+        until(lambda number=number: len(held.taken) == number + 1, "the request arrives in ROS 2")
     with Client(world, "/bv/in_ros2") as quick:
         assert quick.call(sensor_request("quick")) == echoed("quick")
     clients[0].socket.close()
@@ -123,7 +123,7 @@ def test_garbage_on_the_service_socket_harms_no_client(world):
                 whole + request[: chance.randrange(len(request))],
                 whole + chance.randbytes(5000),
             ]
-            with contextlib.suppress(ConnectionError), socket.create_connection(place, LIMIT_S) as connection:
+            with contextlib.suppress(ConnectionError), socket.create_connection(place, HANGS_S) as connection:
                 connection.sendall(kinds[number % 4])
         assert bystander.call(sensor_request("still here")) == echoed("still here")
         good, reason = bystander.call(b"\xff\xff\xff\xff")

@@ -2,9 +2,8 @@
 
 import signal
 
-from ros_bridge_harness import BridgeProcess, wait_until
+from ros_bridge_harness import BridgeProcess
 from ros_bridge_service_peers import (
-    LIMIT_S,
     SERVICES,
     Client,
     HeldService,
@@ -19,6 +18,8 @@ from ros_bridge_service_peers import (
 )
 from std_srvs.srv import SetBool
 
+from alula_testing.waits import HANGS_S, until
+
 CONFIG = SERVICES
 
 
@@ -29,7 +30,7 @@ def test_restarted_master_learns_where_services_are(world):
         world.master.close()
         assert old.call(sensor_request("no master")) == echoed("no master")
         world.master.start()
-        wait_until(lambda: world.proxy.lookupService("/t", "/bv/in_ros2")[0] == 1, "the service is registered again", LIMIT_S)
+        until(lambda: world.proxy.lookupService("/t", "/bv/in_ros2")[0] == 1, "the service is registered again")
         assert world.proxy.lookupService("/t", "/bv/in_ros2")[2] == before
     with Client(world, "/bv/in_ros2") as new:
         assert new.call(sensor_request("again")) == echoed("again")
@@ -52,17 +53,17 @@ def test_end_of_the_bridge_answers_every_call_under_way_and_unregisters(world, t
 
     in_ros1 = world.ros2.node.create_client(SetBool, "/bv_end/in_ros1")
     with Client(world, "/bv_end/in_ros2") as client, Server(world, "/bv_end/in_ros1", talk):
-        assert in_ros1.wait_for_service(LIMIT_S)
-        assert in_ros1.call(SetBool.Request(), timeout_sec=LIMIT_S).success
+        assert in_ros1.wait_for_service(HANGS_S)
+        assert in_ros1.call(SetBool.Request(), timeout_sec=HANGS_S).success
         future = in_ros1.call_async(SetBool.Request())
         client.send(b"\1")
-        wait_until(lambda: len(arrived) == 2 and held.taken, "both calls arrive", LIMIT_S)
+        until(lambda: len(arrived) == 2 and held.taken, "both calls arrive")
         bridge.process.send_signal(signal.SIGINT)
         good, reason = client.receive()
         assert (good, b"the bridge is shutting down" in reason) == (False, True)
-        wait_until(future.done, "the call from ROS 2 ends", LIMIT_S)
+        until(future.done, "the call from ROS 2 ends")
         assert "the bridge is shutting down" in future.result().message
-        assert bridge.process.wait(LIMIT_S) == 0
+        assert bridge.process.wait(HANGS_S) == 0
     assert world.proxy.lookupService("/t", "/bv_end/in_ros2")[0] == -1
     world.ros2.node.destroy_client(in_ros1)
     held.service.close()

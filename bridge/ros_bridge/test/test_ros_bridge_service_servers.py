@@ -5,9 +5,7 @@ import struct
 import threading
 
 import pytest
-from ros_bridge_harness import wait_until
 from ros_bridge_service_peers import (
-    LIMIT_S,
     SERVICES,
     SET_BOOL_SUM,
     Server,
@@ -19,6 +17,8 @@ from ros_bridge_service_peers import (
 from ros_bridge_wire import header
 from std_srvs.srv import SetBool
 from uav_msgs.srv import SetSensor
+
+from alula_testing.waits import HANGS_S, until
 
 CONFIG = SERVICES
 
@@ -51,7 +51,7 @@ ODD_SERVERS = {
 @pytest.mark.parametrize("reason", ODD_SERVERS)
 def test_odd_server_in_ros1_gives_a_refusal_with_the_reason(world, reason):
     with Server(world, "/bv/odd_in_ros1", ODD_SERVERS[reason]) as server:
-        response = world.ros2.call("/bv/odd_in_ros1", SetBool, SetBool.Request(data=True), within_s=LIMIT_S)
+        response = world.ros2.call("/bv/odd_in_ros1", SetBool, SetBool.Request(data=True))
         assert not response.success
         assert response.message.startswith("/bv/odd_in_ros1 by the bridge: ")
         assert reason in response.message
@@ -61,7 +61,7 @@ def test_odd_server_in_ros1_gives_a_refusal_with_the_reason(world, reason):
 
 def test_length_that_cannot_be_ends_the_call_and_no_more(world):
     with Server(world, "/bv/odd_in_ros1", say(struct.pack("<BI", 1, 0xFFFFFFFF), b"x" * 1000)):
-        response = world.ros2.call("/bv/odd_in_ros1", SetBool, SetBool.Request(data=True), within_s=LIMIT_S)
+        response = world.ros2.call("/bv/odd_in_ros1", SetBool, SetBool.Request(data=True))
         assert not response.success
         assert "that can't be" in response.message
 
@@ -74,7 +74,7 @@ def test_request_is_sent_once_when_the_server_dies_in_the_call(world):
         requests.append(request_from(connection))
 
     with Server(world, "/bv/odd_in_ros1", talk):
-        response = world.ros2.call("/bv/odd_in_ros1", SetBool, SetBool.Request(data=True), within_s=LIMIT_S)
+        response = world.ros2.call("/bv/odd_in_ros1", SetBool, SetBool.Request(data=True))
         assert not response.success
         assert requests == [b"\1"]
 
@@ -91,12 +91,12 @@ def test_connection_is_kept_for_the_next_call_and_dropped_when_none_comes(world)
 
     with Server(world, "/bv/in_ros1", talk) as server:
         for _ in range(5):
-            response = world.ros2.call("/bv/in_ros1", SetSensor, SetSensor.Request(), within_s=LIMIT_S)
+            response = world.ros2.call("/bv/in_ros1", SetSensor, SetSensor.Request())
             assert response.accepted
         assert server.connections == 1
         assert not ended.is_set()
-        assert ended.wait(LIMIT_S)
-        assert world.ros2.call("/bv/in_ros1", SetSensor, SetSensor.Request(), within_s=LIMIT_S).accepted
+        assert ended.wait(HANGS_S)
+        assert world.ros2.call("/bv/in_ros1", SetSensor, SetSensor.Request()).accepted
         assert server.connections == 2
 
 
@@ -107,24 +107,24 @@ def test_sixteen_calls_run_side_by_side_thirty_two_wait_and_more_are_refused(wor
         greet(connection)
         while True:
             arrived.append(request_from(connection))
-            assert go.acquire(timeout=LIMIT_S)
+            assert go.acquire(timeout=HANGS_S)
             answer(connection, b"\1" + text("held"))
 
     client = world.ros2.node.create_client(SetBool, "/bv/held_in_ros1")
     with Server(world, "/bv/held_in_ros1", talk) as server:
-        assert client.wait_for_service(LIMIT_S)
+        assert client.wait_for_service(HANGS_S)
         futures = []
         for number in range(48):
             futures.append(client.call_async(SetBool.Request()))
-            wait_until(lambda number=number: len(arrived) >= min(number + 1, 16), "16 calls arrive, one after the other", LIMIT_S)
-        refused = client.call(SetBool.Request(), timeout_sec=LIMIT_S)
+            until(lambda number=number: len(arrived) >= min(number + 1, 16), "16 calls arrive, one after the other")
+        refused = client.call(SetBool.Request(), timeout_sec=HANGS_S)
         assert not refused.success
         assert "48 calls of this service waiting" in refused.message
         assert (len(arrived), server.connections) == (16, 16)
         assert not any(future.done() for future in futures)
         for number in range(48):  # one by one, as a client in ROS 2 keeps ten responses that it has not taken
             go.release()
-            wait_until(lambda number=number: sum(future.done() for future in futures) > number, "one more is answered", LIMIT_S)
+            until(lambda number=number: sum(future.done() for future in futures) > number, "one more is answered")
         assert {future.result().message for future in futures} == {"held"}
         assert len(arrived) == 48
     world.ros2.node.destroy_client(client)

@@ -9,9 +9,8 @@ from rclpy.exceptions import InvalidHandle
 from rclpy.executors import SingleThreadedExecutor
 from std_msgs.msg import String
 
+from alula_testing.waits import HANGS_S
 from ros_bridge.spinning import spin
-
-WITHIN_S = 20.0
 
 
 class ToldExecutor(SingleThreadedExecutor):
@@ -40,7 +39,7 @@ def world(ros2_domain):
     thread = threading.Thread(target=spin, args=(executor,))
     yield node, executor, thread
     executor.shutdown(timeout_sec=0.0)
-    thread.join(WITHIN_S)
+    thread.join(HANGS_S)
     node.destroy_node()
     context.try_shutdown()
 
@@ -49,7 +48,7 @@ def works(node):
     """Tell whether a callback runs."""
     called = threading.Event()
     timer = node.create_timer(0.01, called.set)
-    done = called.wait(WITHIN_S)
+    done = called.wait(HANGS_S)
     node.destroy_timer(timer)
     return done
 
@@ -60,7 +59,7 @@ def test_spinning_goes_on_after_an_end_was_closed_under_the_executor(world, capl
     subscription = node.create_subscription(String, "/bridge_spinning", print, 1)
     subscription.event_handlers[0].destroy()
     thread.start()
-    assert executor.raised.wait(WITHIN_S)
+    assert executor.raised.wait(HANGS_S)
     assert thread.is_alive()
     node.destroy_subscription(subscription)
     assert works(node)
@@ -77,7 +76,7 @@ def test_spinning_goes_on_after_a_callback_has_raised(world, caplog):
 
     timer = node.create_timer(0.01, fail)
     thread.start()
-    assert raised.wait(WITHIN_S)
+    assert raised.wait(HANGS_S)
     node.destroy_timer(timer)
     assert works(node)
     assert any(record.exc_info and "broken" in str(record.exc_info[1]) for record in caplog.records)
@@ -89,5 +88,5 @@ def test_spinning_ends_when_the_executor_or_its_context_is_shut_down(world, what
     thread.start()
     assert works(node)
     executor.shutdown() if what == "executor" else node.context.shutdown()
-    thread.join(WITHIN_S)
+    thread.join(HANGS_S)
     assert not thread.is_alive()

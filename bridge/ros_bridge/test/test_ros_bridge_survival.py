@@ -8,13 +8,14 @@ import threading
 from types import SimpleNamespace
 
 import pytest
-from ros_bridge_harness import PROBE_S, BridgeProcess, Master, Ros1Peer, wait_until
+from ros_bridge_harness import PROBE_S, BridgeProcess, Master, Ros1Peer
 from ros_bridge_nodes import LATCHED, Ros2Peer, open_up, wait_ros1_receives
 from sensor_msgs.msg import Image
 from std_msgs.msg import String
 from std_srvs.srv import SetBool
 
 from alula.common.network import free_port
+from alula_testing.waits import HANGS_S, until
 from bridge_tools.fuzz import Fuzzer
 from bridge_tools.hostile import LENGTH, HostilePublisher
 from ros_bridge.tcpros import encode_header
@@ -117,7 +118,7 @@ def steady(world, peer):
     def check(word: str) -> None:
         for number in range(20):
             peer.do("publish", topic="/bs/up", values={"data": f"{word} {number}"})
-        wait_until(lambda: received and received[-1].data == f"{word} 19", f"the last of '{word}' arrives")
+        until(lambda: received and received[-1].data == f"{word} 19", f"the last of '{word}' arrives")
         assert [message.data for message in received if message.data.startswith(word)] == [f"{word} {number}" for number in range(20)]
 
     return check
@@ -126,7 +127,7 @@ def steady(world, peer):
 def hear_master(world):
     """Return a function that tells what the last heartbeat says of the master."""
     beats = world.ros2.subscribe("/ros_bridge/state", String, LATCHED)
-    wait_until(lambda: beats, "a heartbeat")
+    until(lambda: beats, "a heartbeat")
     return lambda: json.loads(beats[-1].data)["ros1_master"]
 
 
@@ -141,11 +142,11 @@ def test_link_to_the_master_goes_and_comes_back(world, how):
         world.link.break_off()
     else:
         world.link.flows.clear()
-    wait_until(lambda: not master_there(), "the heartbeat says that the master is gone")
+    until(lambda: not master_there(), "the heartbeat says that the master is gone")
     check(f"without {how}")
     world.link.cut = False
     world.link.flows.set()
-    wait_until(master_there, "the heartbeat says that the master is back")
+    until(master_there, "the heartbeat says that the master is back")
     check(f"again {how}")
     late = Ros1Peer(world.master)
     late.do("advertise", topic="/bs/up", type="std_msgs/String")
@@ -155,7 +156,7 @@ def test_link_to_the_master_goes_and_comes_back(world, how):
         late.do("publish", topic="/bs/up", values={"data": "late"})
         return any(message.data == "late" for message in late_received)
 
-    wait_until(arrives, "a publisher that came later is bridged", every_s=PROBE_S)
+    until(arrives, "a publisher that came later is bridged", every_s=PROBE_S)
     complaints = [line for line in world.bridge.lines[said:] if "does not answer" in line]
     assert len(complaints) == 1
 
@@ -166,12 +167,12 @@ def test_restarted_master_learns_everything_again_while_old_connections_go_on(wo
     world.master.close()
     check("no master")
     world.master.start()
-    wait_until(lambda: any("registering everything again" in line for line in world.bridge.lines), "the bridge registers again")
+    until(lambda: any("registering everything again" in line for line in world.bridge.lines), "the bridge registers again")
     new = Ros1Peer(world.master)
     new.do("subscribe", topic="/bs/down", type="std_msgs/String")
     wait_ros1_receives(new, world.ros2.publisher("/bs/down", String, 200), "/bs/down")
     new.do("serve", service="/bs/in_ros1", type="std_srvs/SetBool", behaviour="echo")
-    response = world.ros2.call("/bs/in_ros1", SetBool, SetBool.Request(data=True), within_s=15.0)
+    response = world.ros2.call("/bs/in_ros1", SetBool, SetBool.Request(data=True))
     assert response.success
     check("old connection")
 
@@ -199,7 +200,7 @@ def test_publisher_killed_in_the_middle_of_a_4_mb_message(world):
         publisher = HostilePublisher(world.master.uri, "/bs/image", "sensor_msgs/Image", name=name, reply=encode_header(IMAGE), talk=talk)
         assert publisher.served.wait(15.0)
         publisher.close()
-    wait_until(lambda: images, "the whole image arrives")
+    until(lambda: images, "the whole image arrives")
     assert {(image.width, image.encoding, len(image.data)) for image in images} == {(1000, "rgba8", IMAGE_BYTES)}
 
 
@@ -214,7 +215,7 @@ def test_subscriber_killed_in_the_middle_of_4_mb_messages(world):
     publisher.publish(big)
     mortal.process.kill()
     publisher.publish(String(data="after"))
-    alive.expect("message", topic="/bs/down", hex=(struct.pack("<I", 5) + b"after").hex(), within_s=20.0)
+    alive.expect("message", topic="/bs/down", hex=(struct.pack("<I", 5) + b"after").hex())
 
 
 def test_garbage_on_all_sockets_leaves_the_bridge_alive_and_its_memory_flat(world):
@@ -236,15 +237,15 @@ def test_slow_calls_run_side_by_side_and_hold_up_no_other_service(world):
     server = Ros1Peer(world.master)
     server.do("serve", service="/bs/in_ros1", type="std_srvs/SetBool", behaviour="slow", seconds=2.0)
     server.do("serve", service="/bs/quick", type="std_srvs/SetBool", behaviour="echo")
-    world.ros2.call("/bs/quick", SetBool, SetBool.Request(data=True), within_s=15.0)
+    world.ros2.call("/bs/quick", SetBool, SetBool.Request(data=True))
     slow, quick = (world.ros2.node.create_client(SetBool, name) for name in ("/bs/in_ros1", "/bs/quick"))
     assert slow.wait_for_service(15.0)
     futures = [slow.call_async(SetBool.Request(data=True)) for _ in range(10)]
     for _ in futures:
-        server.expect("request", service="/bs/in_ros1", within_s=30.0)
+        server.expect("request", service="/bs/in_ros1")
     assert sum(future.done() for future in futures) < len(futures) / 2  # one behind the other, nine would have ended
-    assert quick.call(SetBool.Request(data=True), timeout_sec=15.0).success
-    wait_until(lambda: all(future.done() for future in futures), "all slow calls are answered", 20.0)
+    assert quick.call(SetBool.Request(data=True), timeout_sec=HANGS_S).success
+    until(lambda: all(future.done() for future in futures), "all slow calls are answered")
     assert all(future.result().success for future in futures)
     for client in (slow, quick):
         world.ros2.node.destroy_client(client)

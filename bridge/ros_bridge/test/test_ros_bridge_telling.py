@@ -6,11 +6,12 @@ import sys
 
 import pytest
 from diagnostic_msgs.msg import DiagnosticArray, DiagnosticStatus
-from ros_bridge_harness import Master, wait_until
+from ros_bridge_harness import Master
 from ros_bridge_nodes import BEST_EFFORT
 from std_msgs.msg import String
 
 from alula.common.network import free_port
+from alula_testing.waits import until
 
 CONFIG = "discover: {all: true}"
 
@@ -18,7 +19,7 @@ CONFIG = "discover: {all: true}"
 def test_a_type_that_can_not_cross_is_told_once_by_its_name(ros1, ros2_node, bridge):
     for topic in ("/d/none_1", "/d/none_2"):
         ros1.do("advertise", topic=topic, type="rosgraph_msgs/TopicStatistics")
-    wait_until(lambda: any("rosgraph_msgs/TopicStatistics" in line for line in bridge.lines), "it is told")
+    until(lambda: any("rosgraph_msgs/TopicStatistics" in line for line in bridge.lines), "it is told")
     statuses = ros2_node.subscribe("/diagnostics", DiagnosticArray)
     ros2_node.until(lambda: statuses and any("/d/none_2" in status.name for status in statuses[-1].status), "the diagnostics name both")
     assert sum("rosgraph_msgs/TopicStatistics" in line for line in bridge.lines) == 1
@@ -39,7 +40,7 @@ def test_diagnostics_tell_every_route_in_both_worlds(ros1, ros2_node, bridge):
     ros2_node.until(told, "the count arrives")
     while b"ros_bridge: topic /d/told" not in bytes.fromhex(ros1.expect("message", topic="/diagnostics")["hex"]):
         pass
-    wait_until(lambda: json.loads(bridge.stats_file.read_text())["topics"].get("/d/told", {}).get("count") == 1, "the file has it")
+    until(lambda: json.loads(bridge.stats_file.read_text())["topics"].get("/d/told", {}).get("count") == 1, "the file has it")
 
 
 def test_a_topic_that_the_bridge_publishes_itself_crosses_beside_its_own_messages(ros1, ros2_node, bridge):
@@ -77,7 +78,7 @@ def listed(master, topic):
         rows.update({line.split()[1]: " ".join(line.split()) for line in run.stdout.splitlines()})
         return topic in rows
 
-    wait_until(has_topic, f"the list has {topic}", 60.0)
+    until(has_topic, f"the list has {topic}")
     return rows
 
 
@@ -98,7 +99,7 @@ def test_a_type_that_the_worlds_lay_out_differently_is_told_and_listed_with_the_
     definition = "float64 uuid\n"  # ROS 1 does not have the type: the publisher's definition counts
     ros1.do("advertise_own", topic="/d/differs", type="unique_identifier_msgs/UUID", definition=definition)
     reason = "message type unique_identifier_msgs/UUID differs: field 'uuid' is float64 in ROS 1, 'uuid' is uint8[16] in ROS 2"
-    wait_until(lambda: any(reason in line for line in bridge.lines), "it is told")
+    until(lambda: any(reason in line for line in bridge.lines), "it is told")
     statuses = ros2_node.subscribe("/diagnostics", DiagnosticArray)
 
     def shown():
@@ -111,7 +112,7 @@ def test_a_type_that_the_worlds_lay_out_differently_is_told_and_listed_with_the_
 
 def test_a_type_that_only_its_publisher_has_is_told_by_its_name(ros1, bridge):
     ros1.do("advertise_own", topic="/d/foreign", type="turtlesim/Pose", definition="float32 x\nfloat32 y\n")
-    wait_until(lambda: any("message type turtlesim/Pose" in line for line in bridge.lines), "it is told")
+    until(lambda: any("message type turtlesim/Pose" in line for line in bridge.lines), "it is told")
 
 
 @pytest.mark.parametrize("arguments", [["--all"], ["--list"], ["--include", "/a*"]])

@@ -7,12 +7,13 @@ import struct
 
 from geometry_msgs.msg import PoseStamped
 from rclpy.serialization import deserialize_message, serialize_message
-from ros_bridge_harness import Ros1Peer, wait_until
+from ros_bridge_harness import Ros1Peer
 from ros_bridge_nodes import LATCHED, open_up, wait_for_figures, wait_ros1_receives
 from rosgraph_msgs.msg import Clock
 from std_msgs.msg import String
 from uav_msgs.msg import GuidanceState
 
+from alula_testing.waits import until
 from ros_bridge.conversion import Types, ament_prefixes
 
 CONFIG = """
@@ -43,7 +44,7 @@ def test_every_message_of_a_burst_crosses_to_ros2_in_order(ros1, ros2):
     texts = [f"ü{number}" for number in range(50)]
     for text in texts:
         ros1.do("publish", topic="/bt/up", values={"data": text})
-    wait_until(lambda: received[-1].data == texts[-1], "the last one arrives")
+    until(lambda: received[-1].data == texts[-1], "the last one arrives")
     assert [message.data for message in received if message.data] == texts
 
 
@@ -65,9 +66,9 @@ def test_late_joiner_in_ros2_gets_the_latched_message(ros1, ros2):
     ros1.do("publish", topic="/bt/up_latched", values={"data": "old"})
     ros1.do("publish", topic="/bt/up_latched", values={"data": "the last"})
     first = ros2.subscribe("/bt/up_latched", String, LATCHED)
-    wait_until(lambda: first and first[-1].data == "the last", "the first late joiner gets it")
+    until(lambda: first and first[-1].data == "the last", "the first late joiner gets it")
     second = ros2.subscribe("/bt/up_latched", String, LATCHED)
-    wait_until(lambda: second, "the second late joiner gets it too")
+    until(lambda: second, "the second late joiner gets it too")
     assert [message.data for message in second] == ["the last"]
 
 
@@ -87,7 +88,7 @@ def test_clock_crosses_whole_and_in_order(ros1, ros2, bridge):
     received = open_up(ros1, ros2, "/clock", Clock, "rosgraph_msgs/Clock")
     for tick in range(1, 101):
         ros1.do("publish", topic="/clock", values={"clock": {"secs": tick, "nsecs": 5}})
-    wait_until(lambda: received[-1].clock.sec == 100, "the last tick arrives")
+    until(lambda: received[-1].clock.sec == 100, "the last tick arrives")
     ticks = [(message.clock.sec, message.clock.nanosec) for message in received if message.clock.sec]
     assert ticks == [(tick, 5) for tick in range(1, 101)]
     figures = wait_for_figures(bridge, "/clock", 100)
@@ -140,7 +141,7 @@ def test_publisher_of_another_type_is_refused_and_the_route_lives(ros1, ros2, ma
 def test_heartbeat_in_both_worlds(ros1, ros2):
     beats = ros2.subscribe("/ros_bridge/state", String, LATCHED)
     ros1.do("subscribe", topic="/ros_bridge/state", type="std_msgs/String")
-    wait_until(lambda: len(beats) >= 3, "three heartbeats in ROS 2")
+    until(lambda: len(beats) >= 3, "three heartbeats in ROS 2")
     states = [json.loads(beat.data) for beat in beats[:3]]
     assert [state["sequence"] - states[0]["sequence"] for state in states] == [0, 1, 2]
     assert {state["state"] for state in states} == {"running"}
@@ -167,7 +168,7 @@ def test_subscriber_that_does_not_read_loses_the_oldest_and_stalls_no_other(ros2
             if len(received) > 1_000_000:
                 break
         assert struct.unpack("<d", received[-56:-48])[0] == number
-    wait_until(lambda: wait_for_figures(bridge, "/bt/pose_down", 20)["dropped"] > 0, "drops are counted")
+    until(lambda: wait_for_figures(bridge, "/bt/pose_down", 20)["dropped"] > 0, "drops are counted")
     os.killpg(stopped.process.pid, signal.SIGCONT)
     stopped.close()
     alive.close()
