@@ -149,7 +149,8 @@ def check_measurements(seen):
     """The first of each kind are what the real drivers send; the IMU was broken before."""
     right = seen.wait("right")
     seen.wait("lidar")
-    # Topics are connected one after the other: the first image of one eye may have no fellow.
+    # Topics are connected one after the other: another may be heard later, and the first image of one eye may have no fellow.
+    until(lambda: seen.count("info") and seen.count("tf"), what="camera infos and transforms")
     until(lambda: set.intersection(*({m.header.stamp.to_nsec() for m in seen.messages[eye]} for eye in ("left", "right"))), what="pair")
     assert (right.width, right.height, right.encoding, len(right.data)) == (480, 270, "mono8", 480 * 270)
     assert seen.messages["info"][-1].P[3] == pytest.approx(-240.0 * 0.12)
@@ -238,7 +239,11 @@ def test_time_begins_when_all_that_work_for_it_are_there(start_simulator, collec
     until(lambda: second.get_num_connections() > 0, what="the simulator listens")
     seen.wait("clock", seen.count("clock") + 3)
     assert not seen.count("imu")
-    third = rospy.Publisher(states, Header, queue_size=1)  # never says anything
+    third = rospy.Publisher(states, String, queue_size=1, latch=True)
+    until(lambda: third.get_num_connections() > 0, what="the simulator listens")
+    seen.wait("clock", seen.count("clock") + 3)
+    assert not seen.count("imu"), "it has not said anything yet"
+    third.publish(String(""))
     seen.wait("imu")
     assert seen.messages["imu"][0].header.stamp.to_sec() < 0.05, "the first measurements are heard"
     first.publish(Header(stamp=rospy.Time(100)))

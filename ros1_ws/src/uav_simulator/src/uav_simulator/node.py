@@ -83,7 +83,9 @@ class SimulatorNode:
             rospy.set_param(f"~{name}", port)
         rospy.Service("/sim/set_sensor", SetSensor, self._on_set_sensor)
         rospy.Subscriber("/sim/pilot", String, lambda m: self._pilot_words.put(m.data))
-        paced = [word.partition("=")[0] for word in settings.pace_topics]
+        paced = {topic: against for topic, _, against in (word.partition("=") for word in settings.pace_topics)}
+        self._only_at_start = frozenset(topic for topic, against in paced.items() if against == "inf")
+        self._heard_at_start: set[str] = set()
         self._paced = {
             topic: rospy.Subscriber(topic, rospy.AnyMsg, self._on_paced, callback_args=topic, tcp_nodelay=True) for topic in paced
         }
@@ -123,7 +125,7 @@ class SimulatorNode:
         if self._settings.followed_url:
             return
         end = time.monotonic() + self._settings.start_timeout_s
-        while (missing := [*self._absent(), *unconnected()]) and time.monotonic() < end and not self._ended:
+        while (missing := [*self._absent(), *self._unheard(), *unconnected()]) and time.monotonic() < end and not self._ended:
             self._publish_clock()
             again = time.monotonic() + START_CLOCK_S
             while (rest := again - time.monotonic()) > 0.0:
@@ -134,6 +136,9 @@ class SimulatorNode:
 
     def _absent(self) -> list[str]:
         return [topic for topic, subscriber in self._paced.items() if not subscriber.get_num_connections()]
+
+    def _unheard(self) -> list[str]:
+        return sorted(self._only_at_start - self._heard_at_start)
 
     def _wait(self, due: float) -> None:
         """Serve the link until wall time and the paced topics have come far enough."""
@@ -194,6 +199,9 @@ class SimulatorNode:
         return SetSensorResponse(accepted=True, reason="")
 
     def _on_paced(self, message: rospy.AnyMsg, topic: str) -> None:
+        if topic in self._only_at_start:
+            self._heard_at_start.add(topic)  # it may be of a type without a header
+            return
         self._pacer.heard(topic, header_stamp_s(message._buff))  # noqa: SLF001 - AnyMsg has no other access to its bytes
 
     def _leave_out_the_dead(self) -> None:

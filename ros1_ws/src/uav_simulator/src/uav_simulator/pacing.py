@@ -3,7 +3,7 @@
 A topic is held against the simulated clock, or, written ``TOPIC=SENSOR``, against the last measurement that the sensor published: a
 node that works on images has done its share when the last image is dealt with, and need not say anything while there are none. It has
 nearly the sensor's period for that, as on a machine that is fast enough: so its verdicts come as regularly as the measurements.
-``TOPIC=0.06`` sets the seconds by which a topic may lag behind the clock; ``TOPIC=inf`` is waited for only until it has a publisher.
+``TOPIC=0.06`` sets the seconds by which a topic may lag behind the clock; ``TOPIC=inf`` is waited for at the beginning only.
 """
 
 from __future__ import annotations
