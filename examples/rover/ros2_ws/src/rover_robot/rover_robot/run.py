@@ -1,23 +1,27 @@
-"""The rover's part of a live run: how fast it goes."""
+"""The rover's part of a live run: how fast it goes, and what ends it."""
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from typing import TYPE_CHECKING, Any
 
-from alula.live.part import RunPart
+from alula.live.part import Consequence, RunPart
 from alula.live.spec import RequestError
 
 if TYPE_CHECKING:
     from argparse import ArgumentParser, Namespace
-    from collections.abc import Mapping
 
     from alula.common.scenarios import Scenario
+    from alula.live.spec import RunSpec
 
 MAX_RATE = 1000.0
 
 
 class RoverRun(RunPart):
     """Adds ``--rate``, which the launch file takes by that name."""
+
+    # Time ends with the simulator. All else is started again; what stays dead the hooks and the mission notice: README, Drives.
+    consequences: Mapping[str, Consequence] = {"simulator": Consequence.END}
 
     def add_options(self, parser: ArgumentParser) -> None:
         """Add it."""
@@ -28,3 +32,7 @@ class RoverRun(RunPart):
         if not 0.0 <= given.rate <= MAX_RATE:  # also refuses nan
             raise RequestError(f"--rate {given.rate:g}: must be 0 (no limit) or a positive factor up to {MAX_RATE:g}")
         return {"rate": given.rate}
+
+    def clock_source(self, spec: RunSpec) -> str:
+        """Say where ``/clock`` comes from."""
+        return "the simulator"
