@@ -5,6 +5,7 @@ from __future__ import annotations
 import json
 from collections.abc import Iterator
 from dataclasses import replace
+from functools import partial
 from pathlib import Path
 
 import pytest
@@ -13,12 +14,17 @@ from alula.campaign.plan import load_campaign
 from alula.common.robots import find_robot
 from alula.language.models import ModelFile, check_texts
 from alula.missions.check.page import whole
+from alula.missions.director import Outcome
 from alula.missions.filed.part import NO_PART, MissionPart
+from alula.missions.filed.plan import plan_of_file
+from alula.missions.mocked import MockedMission
 from alula.model.model import Skillset
 from alula.prove.mission.page import ROBOT
 from alula.prove.mission.prover import LOOKED_AT
 from alula.prove.mission.state import State
 from alula.prove.mission.system import System
+from alula.runtime.core.events import ExecutionEvent
+from alula.runtime.mock import Behaviour
 from alula.trees.node import SyncAction
 from alula.trees.palette import output_port
 from alula.trees.status import Answer
@@ -202,6 +208,37 @@ def test_one_may_ask_less_than_the_other_where_that_decides_nothing(tmp_path: Pa
     judge = judge_of(tmp_path, EITHER)
     swapped = next(text for kind, what, text in trees.altered(whole(EITHER)) if kind == trees.CHILDREN_SWAPPED and "'Parallel'" in what)
     assert judge.judge(Mutant("example", "by hand", "", "example.xml", swapped)).verdict == EQUAL
+
+
+SOONER = EITHER.replace('THEIRS" within="9"', 'THEIRS" within="4"')
+LATER = EITHER.replace('<Awaits name="it is ours"', '<Sequence><Sleep msec="2000"/><Awaits name="it is ours"').replace(
+    "</Parallel>", "</Sequence></Parallel>"
+)
+
+
+def courses(folder: Path, text: str) -> list[list[object]]:
+    """Return what happens, and when, in flights in which control is given and taken, last at another moment in each."""
+    (folder / "flown.xml").write_text(text)
+    plan = plan_of_file(folder / "flown.xml", "flown", (DRONE,), {}, NO_PART)
+    found = []
+    for last_s in (6.7, 7.3, 7.9, 8.5, 9.1, 9.7, 10.3):
+        mission = MockedMission((DRONE,), Behaviour(), plan)
+        for number, at_s in enumerate((1.5, 3.5, 5.5, last_s)):
+            change = partial(mission.world.managers["drone"].transition, "control", ("THEIRS", "OURS")[number % 2])
+            mission.world.clock.after(at_s, change)
+        assert mission.run().outcome in {Outcome.ACCOMPLISHED, Outcome.GIVEN_UP}
+        found.append([(one.stamp_ns, one.skill, one.state) for one in mission.events if isinstance(one, ExecutionEvent)])
+    return found
+
+
+@pytest.mark.parametrize(("before", "equal"), [(EITHER, True), (SOONER, False), (LATER, False)], ids=["at once", "sooner", "later"])
+def test_waits_of_one_length_that_begin_at_once_are_over_at_once(before: str, equal: bool, tmp_path: Path) -> None:  # noqa: FBT001
+    """So a Parallel that ends when one of them fails does what one does that ends when both fail; flights by the clock show the same."""
+    judge = judge_of(tmp_path, before)
+    both = next(text for kind, what, text in trees.altered(whole(before)) if kind == trees.POLICY_CHANGED and "failure_count" in what)
+    one = judge.judge(Mutant("example", "by hand", "", "example.xml", both))
+    assert (one.verdict, one.flown) == ((EQUAL, None) if equal else (FOUND, True)), one
+    assert (courses(tmp_path, whole(before)) == courses(tmp_path, both)) is equal
 
 
 def observed(folder: Path, text: str, skillset: Skillset) -> set[object]:

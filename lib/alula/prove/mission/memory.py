@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Hashable, Iterator, Mapping
+from collections.abc import Hashable, Mapping
 from dataclasses import dataclass
 from typing import NamedTuple
 
@@ -11,7 +11,7 @@ from alula.missions.filed.skills import SkillNode
 from alula.model.model import Skillset
 from alula.prove.mission.ahead import RUNS, Ahead, Looking
 from alula.prove.mission.live import Live, Liveness, Place, leaf_place
-from alula.prove.mission.moments import Later, Moment, thawed
+from alula.prove.mission.moments import Later, Moment, Thawing, numbered
 from alula.prove.mission.oracle import UndecidedError
 from alula.prove.mission.reading import ANOTHER, Read
 from alula.prove.mission.robot import Handle, Memory, Robot
@@ -87,7 +87,8 @@ class Keeper:
         for _, names, while_running in self._nodes:
             start = self._places[-1][2] if self._places else 0
             self._places.append((("status", *names, *while_running), start, start + 1 + len(names) + len(while_running)))
-        self._first = self._left = tuple(self._values())
+        self._thawing = Thawing(body.robot.oracle)
+        self._first = self._left = self._values()[0]
 
     # --- out ---------------------------------------------------------------------------------------------------------
 
@@ -95,7 +96,7 @@ class Keeper:
         """Return the memory: of one that is over how it has ended, else what anything that can still be ticked tells apart."""
         director, board = self._body.director.memory, self._body.board
         started = director.start_s is not None
-        self._left = tuple(self._values())
+        self._left, moments = self._values()
         if director.end is not None:
             outcome = director.end.outcome
             return TreeMemory(director.phase, outcome, started, None, director.stops, self._first, (), (), "", frozenset())
@@ -107,7 +108,7 @@ class Keeper:
             started,
             _frozen(director.wait_until_s) if director.phase == "_wait" else None,
             director.stops,
-            nodes,
+            numbered(nodes, moments) if len(moments) > 1 else nodes,
             tuple(self._entries(number, ahead, live) for number in range(len(self._boards))),
             tuple((number, node.leaf.interrupted) for number, node in enumerate(self.leaves) if self._follows(number, node, ahead, live)),
             first,
@@ -133,13 +134,19 @@ class Keeper:
             self._known[key] = tuple(kept), ahead, live
         return self._known[key]
 
-    def _values(self) -> Iterator[Hashable]:
+    def _values(self) -> tuple[tuple[Hashable, ...], dict[int, tuple[str, Moment | Later]]]:
+        """Return the values of the nodes, and by their places what was a moment, with its name."""
+        values: list[Hashable] = []
+        moments: dict[int, tuple[str, Moment | Later]] = {}
         for node, names, while_running in self._nodes:
-            yield node.status._value_  # the hash of an Enum takes long, and each memory has hundreds
-            for name in names:
-                yield self._seen(node) if name == SEEN else self._kept(node, name)
-            for name in while_running:
-                yield None if node.status is IDLE else self._kept(node, name)
+            values.append(node.status._value_)  # the hash of an Enum takes long, and each memory has hundreds
+            for name in names if node.status is IDLE else (*names, *while_running):
+                if isinstance(value := getattr(node, name), Moment | Later):
+                    moments[len(values)] = name, value
+                values.append(self._seen(node) if name == SEEN else self._kept(node, name))
+            if node.status is IDLE:
+                values += [None] * len(while_running)
+        return tuple(values), moments
 
     def _kept(self, node: Node, name: str) -> Hashable:
         """Return an attribute; counts of attempts and rounds are kept up to a few: from then on there may be more, or not."""
@@ -200,6 +207,7 @@ class Keeper:
         """Put a memory back."""
         body = self._body
         body.robot.begin()
+        self._thawing = Thawing(body.robot.oracle)
         body.director.recall(
             DirectorMemory(
                 memory.phase,
@@ -254,7 +262,7 @@ class Keeper:
             case ("text", str(what)):
                 return UnknownText(self._body.robot.oracle, what)
             case (_, *_):
-                return thawed(self._body.robot.oracle, value)
+                return self._thawing.moment(value)
         return value
 
 

@@ -3,22 +3,28 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Hashable
+from collections.abc import Hashable, Mapping, Sequence
+from typing import Final
 
 from alula.prove.mission.oracle import Oracle
+
+OVER: Final = ("over",)
+"""A later moment that has come."""
 
 
 class Moment:
     """A moment, now or in the past. ``passed`` is the longest time that has passed since, as far as was asked; in the askers' unit.
 
     Nodes compute with it as with the nanoseconds of a clock: ``now + duration`` is when something is over, ``now - since`` how long
-    ago it was. Time that nobody has asked for may have passed or not.
+    ago it was. Time that nobody has asked for may have passed or not. ``told`` is what was answered of this moment by duration, whoever has
+    asked: two waits of one length that began in one tick are over in one tick.
     """
 
-    __slots__ = ("_not_passed", "oracle", "passed")
+    __slots__ = ("_not_passed", "oracle", "passed", "told")
 
-    def __init__(self, oracle: Oracle, passed: float = -math.inf, *, now: bool = False) -> None:
+    def __init__(self, oracle: Oracle, passed: float = -math.inf, *, now: bool = False, told: dict[float, bool] | None = None) -> None:
         self.oracle = oracle
+        self.told = {} if told is None else told
         self.passed = 0.0 if now else max(passed, 0.0)
         self._not_passed = 0.0 if now else math.inf
 
@@ -28,7 +34,9 @@ class Moment:
             return True
         if duration > self._not_passed or duration == math.inf:
             return False
-        if self.oracle.choose(("time", f"{duration:g}")):
+        if duration not in self.told:
+            self.told[duration] = bool(self.oracle.choose(("time", f"{duration:g}")))
+        if self.told[duration]:
             self.passed = duration
             return True
         self._not_passed = math.nextafter(duration, 0.0)
@@ -78,7 +86,7 @@ class Later:
     @property
     def frozen(self) -> Hashable:
         """What is known of it."""
-        return ("over",) if self.since.passed >= self.duration else ("until", self.duration)
+        return OVER if self.since.passed >= self.duration else ("until", self.duration)
 
 
 class Elapsed:
@@ -109,13 +117,45 @@ class Elapsed:
         return Elapsed(self._since, self._factor * factor)
 
 
-def thawed(oracle: Oracle, frozen: Hashable) -> Moment | Later:
-    """Return what a frozen moment was; raises TypeError for anything else."""
-    match frozen:
-        case ("since", float(passed)):
-            return Moment(oracle, passed)
-        case ("over",):
-            return Later(Moment(oracle, math.inf), 0.0)
-        case ("until", float(duration)):
-            return Later(Moment(oracle), duration)
-    raise TypeError(frozen)
+def numbered(values: Sequence[Hashable], moments: Mapping[int, tuple[str, Moment | Later]]) -> tuple[Hashable, ...]:
+    """Return frozen values with a number for each moment that several are of, as far as these may ask for the same duration.
+
+    ``moments`` are what they were, by their places, with the names of the nodes' attributes: what is counted for another reason is asked
+    for another duration, and to know that it is of the same moment would only make more memories.
+    """
+    places: dict[Hashable, list[int]] = {}
+    for place, (name, one) in moments.items():
+        if values[place] == one.frozen != OVER:
+            key = (id(one.since.told), one.duration) if isinstance(one, Later) else (id(one.told), name)
+            places.setdefault(key, []).append(place)
+    found = list(values)
+    for number, several in enumerate(known for known in places.values() if len(known) > 1):
+        for place in several:
+            found[place] = ("shared", values[place], number)
+    return tuple(found)
+
+
+class Thawing:
+    """Makes the moments of one memory of what they were frozen to; of those that were one, all know what is told of one."""
+
+    def __init__(self, oracle: Oracle) -> None:
+        self._oracle = oracle
+        self._told: dict[Hashable, dict[float, bool]] = {}
+
+    def moment(self, frozen: Hashable) -> Moment | Later:
+        """Return what a frozen moment was; raises TypeError for anything else."""
+        match frozen:
+            case ("shared", one, number):
+                return self._moment(one, self._told.setdefault(number, {}))
+        return self._moment(frozen, {})
+
+    def _moment(self, frozen: Hashable, told: dict[float, bool]) -> Moment | Later:
+        match frozen:
+            case ("since", float(passed)):
+                told[passed] = True
+                return Moment(self._oracle, passed, told=told)
+            case ("over",):
+                return Later(Moment(self._oracle, math.inf), 0.0)
+            case ("until", float(duration)):
+                return Later(Moment(self._oracle, told=told), duration)
+        raise TypeError(frozen)
