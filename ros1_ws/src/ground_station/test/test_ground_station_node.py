@@ -186,8 +186,8 @@ def stage(ros_master, start_node, tmp_path):
         return lambda: nodes.update({name: start_node([str(SOURCES / name / f"scripts/{name}_node"), *parameters[name]])})
 
     yield flight, nodes, video, kill
-    for subscriber in subscribers:
-        subscriber.unregister()
+    for topic in (*subscribers, flight._clock, flight._camera):
+        topic.unregister()
     for tamperer in (video, report):
         tamperer.close()
     rospy.set_param("/use_sim_time", False)

@@ -27,7 +27,7 @@ class MissionTime:
         rospy.set_param("/use_sim_time", True)
         self.now_ns = 100 * NS
         self._done_ns = 0
-        self._clock = rospy.Publisher("/clock", Clock, queue_size=1, latch=True)
+        self._clock = rospy.Publisher("/clock", Clock, queue_size=100)
         self._done = rospy.Subscriber("/radio_link/done", Header, self._hear, queue_size=1)
 
     def _hear(self, done: Header) -> None:
@@ -49,6 +49,7 @@ class MissionTime:
     def close(self) -> None:
         self._clock.unregister()
         self._done.unregister()
+        rospy.set_param("/use_sim_time", False)
 
 
 @pytest.fixture

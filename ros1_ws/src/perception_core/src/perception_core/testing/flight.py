@@ -161,6 +161,7 @@ class FakeFlight:
         if self._steps % SENSOR_STEPS == 0:
             self._done.clear()
             self._measured = False
+            self._wait_for_health()  # else a measurement may come to a node whose clock is behind by more than it believes
             self.at_10_hz(self.now_ns)
             if self._measured:
                 self._done.wait(LONGEST_WORK_WALL_S)
