@@ -18,7 +18,6 @@ from alula.missions.filed.part import NO_PART
 from alula.missions.filed.plan import plan_of_file
 from alula.missions.mocked import MockedMission
 from alula.model.ros_types import RosType
-from alula.prove.mission.prover import prove_mission
 from alula.runtime.mock import load_behaviour
 from alula.trees.script import parse
 from alula.trees.script.scope import Unknown
@@ -118,14 +117,6 @@ def test_a_wait_for_data_ends_with_the_value_and_every_value_is_recorded(tmp_pat
 def test_a_mission_begins_when_the_data_that_it_needs_are_told(tmp_path):
     needs = '<Needs name="told" if="fresh(rover.battery)" otherwise="\'nothing is told\'"/>'  # asked before the managers were heard of, too
     assert flown('<ScriptCondition code="fresh(rover.battery)"/>', tmp_path, ready=needs).outcome is Outcome.ACCOMPLISHED
-
-
-def test_runs_of_a_mission_that_asks_for_data_are_not_looked_at_and_that_is_told(tmp_path):
-    (tmp_path / "m.xml").write_text(
-        text_of('<Sequence><rover.drive/><ScriptCondition code="fresh(rover.battery)"/></Sequence>'), encoding="utf-8"
-    )
-    (finding,) = prove_mission(tmp_path / "m.xml", skillsets(), NO_PART).findings
-    assert (finding.code, finding.message) == ("ALU711", "its runs can't be looked at: the data rover.battery")
 
 
 def test_data_end_a_skill_by_an_attribute(tmp_path):

@@ -3,12 +3,14 @@
 from __future__ import annotations
 
 import contextlib
+import math
 import random
 import re
 from collections import deque
-from collections.abc import Iterator, Mapping
+from collections.abc import Iterator, Mapping, Sequence
 from itertools import product
 from pathlib import Path
+from types import SimpleNamespace
 
 import pytest
 
@@ -51,7 +53,11 @@ DOCS = ROOT / "docs"
 EXAMPLES = examples(RUNS)
 SHOWN = [code for code, example in EXAMPLES.items() if example.broken]
 TWO = """
+type Status
 skillset eyes {
+  data level: float64 period 0.1 sec
+  data state: Status period 0.1 sec
+  data mode: string
   resource lens { state { CLEAR DIRTY } initial CLEAR transition { extern CLEAR -> DIRTY  extern DIRTY -> CLEAR } }
   skill watch {
     precondition clear: lens == CLEAR
@@ -267,24 +273,24 @@ def robots() -> list[Skillset]:
     return [one for file in check_texts([ModelFile("a.rl", ROBOT), ModelFile("b.rl", TWO)]) for one in file.skillsets]
 
 
-def tree(chance: random.Random, depth: int) -> str:
+def tree(chance: random.Random, depth: int, leaves: Sequence[str] = LEAVES) -> str:
     if depth == 0:
-        return chance.choice(LEAVES)
+        return chance.choice(leaves)
     if chance.random() < 0.3:
         tag = chance.choice(ROUND)
-        return f"<{tag}>{tree(chance, depth - 1)}</{tag.split()[0]}>"
+        return f"<{tag}>{tree(chance, depth - 1, leaves)}</{tag.split()[0]}>"
     tag = chance.choice(ABOVE)
-    return f"<{tag}>{''.join(tree(chance, depth - 1) for _ in range(2))}</{tag.split()[0]}>"
+    return f"<{tag}>{''.join(tree(chance, depth - 1, leaves) for _ in range(2))}</{tag.split()[0]}>"
 
 
 def with_visit(inside: str) -> str:
     return whole(inside).replace("</root>", VISIT).replace("<root", '<root main_tree_to_execute="mission"')
 
 
-def mission(chance: random.Random, folder: Path, depth: int) -> Path:
+def mission(chance: random.Random, folder: Path, depth: int, leaves: Sequence[str] = LEAVES) -> Path:
     path = folder / "mission.xml"
     first = f"""<Script code="tries := 0; last := ''"/>{PICKED}<drone.hover/><Sleep msec="150"/>"""
-    path.write_text(with_visit(f"<Sequence>{first}{tree(chance, depth)}</Sequence>"))
+    path.write_text(with_visit(f"<Sequence>{first}{tree(chance, depth, leaves)}</Sequence>"))
     return path
 
 
@@ -540,12 +546,34 @@ def act(chance: random.Random, world: LocalWorld, running: list[Execution]) -> N
         state = managers.engine.resources[resource].state
         targets = managers.skillset.resource(resource).targets(state, extern=True)
         managers.transition(resource, chance.choice(list(targets)))
+    measured = world.managers.get("eyes")
+    if measured is not None and chance.random() < 0.5:
+        value = chance.choice((math.nan, 0.05, 0.1, 0.15, 0.2, 0.9))
+        status = SimpleNamespace(level=value, on=chance.random() < 0.5, count=chance.randrange(3))
+        name, told = chance.choice((("level", value), ("state", status), ("mode", chance.choice(("AUTO", "HAND", "")))))
+        measured.publish(name, told)
 
 
-@pytest.mark.parametrize("seed", range(24))
-def test_what_the_engine_does_is_within_the_search(seed: int, tmp_path: Path) -> None:
+MEASURED = (
+    '<WaitFor if="eyes.level &gt; 0.1"/>',
+    '<ScriptCondition code="eyes.level &lt; 0.2 &amp;&amp; eyes.level != 0.15"/>',
+    '<ScriptCondition code="eyes.level &gt;= 0.2 || eyes.level == 0.1"/>',
+    '<ScriptCondition code="fresh(eyes.level) &amp;&amp; fresh(eyes.state)"/>',
+    '<WaitFor if="fresh(eyes.state) &amp;&amp; eyes.state.level &lt; 0.15"/>',
+    '<ScriptCondition code="eyes.state.count == 1 || !eyes.state.on"/>',
+    "<WaitFor if=\"eyes.mode == 'AUTO'\"/>",
+    "<ScriptCondition code=\"eyes.mode != 'HAND'\"/>",
+    '<drone.hover _while="eyes.level &gt; 0.1"/>',
+    '<drone.lift _skipIf="eyes.state.on"/>',
+    '<eyes.watch _failureIf="eyes.state.level &gt; 0.15"/>',
+)
+"""Leaves that ask data."""
+
+
+@pytest.mark.parametrize(("seed", "leaves"), [*((seed, LEAVES) for seed in range(24)), *((seed, MEASURED) for seed in range(24, 48))])
+def test_what_the_engine_does_is_within_the_search(seed: int, leaves: Sequence[str], tmp_path: Path) -> None:
     chance = random.Random(100 + seed)  # noqa: S311 - for tests
-    path = mission(chance, tmp_path, 2)
+    path = mission(chance, tmp_path, 2, leaves)
     system = System.read(path, robots(), PART, Failures(hooks=False, refusals=False, aborts=False))
     states = reached(system, 40_000)
     if states is None:

@@ -1,7 +1,8 @@
 """What must come when the world is calm: nothing fails any more, and the functional layer changes nothing by itself.
 
-What was asked for arrives, interruptions are done, times pass, and what nobody knows is not against the mission for ever. Failures may
-have happened before, any number of them. So something never comes after a situation where no calm step, one after another, leads to it.
+What was asked for arrives, interruptions are done, times pass, data stay as they are, and what else nobody knows is not against the
+mission for ever. Failures may have happened before, any number of them. So something never comes after a situation where no calm step,
+one after another, leads to it.
 """
 
 from __future__ import annotations

@@ -111,9 +111,9 @@ def _never_ticked(regions: Regions) -> Iterator[Diagnostic]:
 
 def waits(looked: Waits, system: System, deadline: Deadline) -> Iterator[Diagnostic]:
     """Yield ALU704 for situations after which the mission never ends, with a run to each; raises OutOfTimeError."""
-    for node, events, state, stays in looked.found(deadline):
+    for node, events, state, stays, data in looked.found(deadline):
         how = f"waits in '{node.name}' for ever" if stays else f"goes round '{node.name}' without end"
-        message = f"the mission {how}, though nothing fails any more: {situation(system, state)}"
+        message = f"the mission {how}, though nothing fails any more: {situation(system, state)}{f', {data}' if data else ''}"
         cure = "wait with Timeout, Awaits or `within`, try again a number of times, or leave the loop"
         yield _finding("ALU704", message, node, cure, told(system, events), run_of(system, events, state))
 

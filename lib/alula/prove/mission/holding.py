@@ -19,6 +19,7 @@ from alula.model.model import Property, PropertyKind
 from alula.prove.limits import Deadline, OutOfTimeError
 from alula.prove.mission.calm import calm_of, reaching
 from alula.prove.mission.conditions import Faults, faults_shown, true_in
+from alula.prove.mission.measured import Values, agree, all_values
 from alula.prove.mission.regions import Regions
 from alula.prove.mission.run import MissionFinding, run_of
 from alula.prove.mission.state import Event, Kind, State
@@ -126,7 +127,7 @@ class _Search:
         self._begins = Constant(value=True) if one.kind is PropertyKind.EVENTUALLY else one.condition
         self._goal = _goal(one)
         self._before: dict[Awaiting, tuple[Awaiting, Event] | None] = {}
-        self._calm_before: dict[Awaiting, list[Awaiting]] = {}
+        self._calm_before: dict[Awaiting, list[tuple[Event, Awaiting]]] = {}
         self._calm_after: dict[Awaiting, list[tuple[Event, Awaiting]]] = {}
         self._open: set[Awaiting] = set()
         self._late: Awaiting | None = None
@@ -145,7 +146,7 @@ class _Search:
             for event, after in self._steps(here):
                 there = (after, self._awaits(after, here[1], event))
                 if here[1] and calm(event):
-                    self._calm_before.setdefault(there, []).append(here)
+                    self._calm_before.setdefault(there, []).append((event, here))
                     self._calm_after.setdefault(here, []).append((event, there))
                 if there not in self._before:
                     self._before[there] = (here, event)
@@ -178,20 +179,24 @@ class _Search:
     def against(self) -> tuple[list[Event], State] | None:
         """Return a run after which it never comes, or comes too late."""
         if self._one.within:
-            found = self._late
-        else:
-            # What was not looked at any further may lead anywhere.
-            good = reaching({one for one in self._before if not one[1]} | self._open, self._calm_before)
-            found = next((one for one in self._before if one not in good), None)
-        return None if found is None else self._at_rest(found)
+            return None if self._late is None else (_way(self._before, self._late), self._late[0])
+        several = all_values(self._system.ticker.about_data)
+        return next((self._at_rest(one, values) for values in several for one in self._never(values)), None)
 
-    def _at_rest(self, found: Awaiting) -> tuple[list[Event], State]:
+    def _never(self, values: Values) -> Iterator[Awaiting]:
+        """Yield where it never comes while data have these values."""
+        before = {there: [here for event, here in ways if agree(values, event.choices)] for there, ways in self._calm_before.items()}
+        # What was not looked at any further may lead anywhere.
+        good = reaching({one for one in self._before if not one[1]} | self._open, before)
+        yield from (one for one in self._before if one not in good)
+
+    def _at_rest(self, found: Awaiting, values: Values) -> tuple[list[Event], State]:
         """Return a run that goes on until nothing calm happens any more, where that is possible: one sees best there what is waited for."""
         ways: dict[Awaiting, tuple[Awaiting, Event] | None] = {found: None}
-        todo = deque([found] if not self._one.within else [])
+        todo = deque([found])
         while todo:
             here = todo.popleft()
-            after = self._calm_after.get(here, ())
+            after = [one for one in self._calm_after.get(here, ()) if agree(values, one[0].choices)]
             if not after:
                 return _way(self._before, found) + _way(ways, here), here[0]
             for event, there in after:

@@ -1,13 +1,14 @@
 """Plays a run of the search: the real mission and the real managers, in virtual time, with the ends, faults and moments of the run.
 
 The tree is ticked when the run ticks it, requests arrive when they arrive there, and functions end when and as the run says. Models are
-those of the search: without inputs and outputs, and what data say is one resource more (``playable``).
+those of the search: without inputs and outputs, and what data say to their conditions is one resource more (``playable``). What data
+say to the conditions of the mission it is told before each tick: values that fit the run's answers.
 """
 
 from __future__ import annotations
 
 import operator
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Collection, Mapping, Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
 
@@ -19,6 +20,8 @@ from alula.missions.filed.skills import SkillNode
 from alula.missions.record import MissionRecord
 from alula.missions.skillset import MissionClient
 from alula.model.execution_state import ExecutionState
+from alula.prove.mission.measured import COMPARE, of_data
+from alula.prove.mission.measured import told as values_told
 from alula.prove.mission.oracle import Answer, Asked, Oracle, Question
 from alula.prove.mission.playable import AS_WANTED, breaks, playable, refuses
 from alula.prove.mission.robot import Robot, opaque, progress_of
@@ -33,7 +36,6 @@ from alula.runtime.local import LocalWorld
 from alula.runtime.local.middleware import Bus, VirtualLink, VirtualMiddleware
 from alula.runtime.middleware import GoalListener
 
-COMPARISONS = {"<": operator.lt, "<=": operator.le, ">": operator.gt, ">=": operator.ge, "==": operator.eq}
 FLIPPED = {"<": ">", "<=": ">=", ">": "<", ">=": "<=", "==": "=="}
 STEP_S = 0.01
 """Between two ticks; times that the run says are over pass before the tick that sees it."""
@@ -134,6 +136,18 @@ class _HeldMiddleware(VirtualMiddleware):
         return link
 
 
+class _Told(MissionClient):
+    """A client to whose mission the run says what is measured."""
+
+    said: dict[str, object]
+
+    def follow(self, data: Collection[str]) -> None:
+        """Follow nothing: the managers of a play have no data."""
+
+    def value(self, data: str) -> object | None:
+        return self.said.get(f"{self.skillset}.{data}")
+
+
 class _Player:
     def __init__(self, path: Path, run: MissionRun, part: MissionPart, out: Path | None) -> None:
         self._run = run
@@ -156,7 +170,15 @@ class _Player:
         clock_ns = lambda: self.world.clock.now_ns  # noqa: E731
         record = None if out is None else MissionRecord(out, plan, clock_ns, plan.parameters)
         bus = self.world.bus
-        client = lambda name, wake: MissionClient(Client(_HeldMiddleware(bus, name, self._held), name), wake, record)  # noqa: E731
+        self._record = record
+        self._said: dict[str, object] = {}
+        """The data that are told, None for one that is not fresh."""
+
+        def client(name: str, wake: Callable[[], None]) -> _Told:
+            made = _Told(Client(_HeldMiddleware(bus, name, self._held), name), wake, record)
+            made.said = self._said
+            return made
+
         self._driver = MissionDriver(plan, client, clock_ns, plan.parameters, record=record)
         self._driver.woken_by_events = False
         self._leaves = [node for node in self._driver.director.root.iterate() if isinstance(node, SkillNode)]
@@ -225,6 +247,7 @@ class _Player:
         self.world.run_for(max([STEP_S, *(one / 1e9 for one in over_ns)]))
         for one in event.choices:
             self._progress(one)
+        self._tell_data(event)
         before = {leaf: node.leaf.handle for leaf, node in enumerate(self._leaves)}
         self._oracle.begin(lambda _: None)
         self._oracle.choices = list(event.choices)
@@ -238,6 +261,17 @@ class _Player:
         if sorted(started) != sorted(event.started):
             raise LeftError(f"the tree asks for {self._names(started)}, and for {self._names(event.started)} in the counterexample")
 
+    def _tell_data(self, event: Event) -> None:
+        """Tell values that fit what the tick answers about data."""
+        values = values_told(of_data(event.choices))
+        if values is None:
+            raise LeftError("no values of data fit what the counterexample says of them")
+        self._said.update(values)
+        for name, value in values.items():
+            if self._record is not None and value is not None:
+                skillset, _, data = name.partition(".")
+                self._record.sample(skillset, data, value, None)
+
     def _progress(self, choice: Asked) -> None:
         """Have a function tell progress that a script answers as the run does; what is told arrives before the tick."""
         for leaf, handle in self._handles.items():
@@ -246,7 +280,7 @@ class _Player:
                 continue
             period = node.model.progress
             _, _, symbol, other = choice.question
-            compare, limit = COMPARISONS[str(symbol)], float(str(other))
+            compare, limit = COMPARE[str(symbol)], float(str(other))
             fitting = [one for one in (handle.progress, 0.0, limit, 1.0) if 0.0 <= one <= 1.0 and compare(one, limit) == choice.answer]
             if period is not None and fitting and fitting[0] != handle.progress:
                 self._told[handle.id] = fitting[0]

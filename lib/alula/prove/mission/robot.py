@@ -13,8 +13,9 @@ from alula.missions.pending import PendingInterrupts
 from alula.missions.skill_types import type_of
 from alula.model.execution_state import ExecutionState
 from alula.model.model import Skillset
+from alula.prove.mission.measured import Conditions, Measurements
 from alula.prove.mission.moments import Moment
-from alula.prove.mission.oracle import Oracle, UndecidedError
+from alula.prove.mission.oracle import Oracle
 from alula.prove.mission.unknown import UnknownNumber, unknown
 from alula.runtime.handle import SkillHandle
 from alula.trees.node import Node, pointer
@@ -29,14 +30,18 @@ class Robot:
     """What all of it shares: the oracle of the tick, and what the tree asks for in it."""
 
     oracle: Oracle
+    conditions: Conditions = Conditions()  # noqa: RUF009 - a value
+    """What the mission's conditions ask of data."""
     starting: int = -1
     """The leaf that starts a skill now."""
     started: list[int] = field(default_factory=list)
     interrupted: list[int] = field(default_factory=list)
     now: Moment = field(init=False)
+    measurements: Measurements = field(init=False)
 
     def __post_init__(self) -> None:
         self.now = Moment(self.oracle, now=True)
+        self.measurements = Measurements(self.oracle, self.conditions)
 
     def clock_ns(self) -> int:
         """Return now, which is no number but computes with times as one."""
@@ -45,6 +50,7 @@ class Robot:
     def begin(self) -> None:
         """Begin another tick."""
         self.started, self.interrupted = [], []
+        self.measurements.begin()
         self.now = Moment(self.oracle, now=True)
 
 
@@ -142,8 +148,8 @@ class Client:
         """No data come to a search."""
 
     def value(self, data: str) -> object | None:
-        """Refuse: the models say nothing of what is measured, and one value that never changes would show too little."""
-        raise UndecidedError(f"the data {self.skillset}.{data}")
+        """Return a value of which no more is known than what this tick has asked of it."""
+        return self._robot.measurements.value(f"{self.skillset}.{data}")
 
     def start(self, skill: str, **_inputs: object) -> Handle:
         """Ask for an execution; one that nobody can be asked for has FAILED."""

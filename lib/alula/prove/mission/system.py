@@ -30,6 +30,7 @@ from alula.model.model import Skillset
 from alula.prove.limits import Deadline
 from alula.prove.mission.ahead import RUNS
 from alula.prove.mission.managers import ENDED, RUNNING, SENT, End, Failures, ManagersSteps
+from alula.prove.mission.measured import Conditions
 from alula.prove.mission.memory import FEW, Body, TreeMemory
 from alula.prove.mission.oracle import Answer, Oracle, Question
 from alula.prove.mission.reading import what_is_read
@@ -85,7 +86,7 @@ class System:
         files = read_files(path)
         skillsets = [one for one in models if one.name in _named(files)]
         oracle = Oracle()
-        robot = Robot(oracle)
+        robot = Robot(oracle, Conditions.of(files, skillsets))
         inputs = {port.name: UNKNOWN for port in _ports(files)} if known is None else known
         nodes = opaque(robot, part) if known is None else MissionPart(part.nodes, memory=Memory)
         plan = plan_of_file(path, path.stem, skillsets, inputs, nodes)

@@ -12,6 +12,7 @@ from typing import NamedTuple
 
 from alula.missions.director import Director
 from alula.missions.filed.plan import STOP_HERE, FiledMission
+from alula.prove.mission.measured import of_data
 from alula.prove.mission.memory import Body, Keeper, TreeMemory
 from alula.prove.mission.oracle import Answer, Asked, Oracle, Question, UndecidedError, View
 from alula.trees.node import Node
@@ -78,6 +79,8 @@ class Ticker:
         self.memories: list[TreeMemory] = []
         self.runs = 0
         """How many ticks were done by the engine."""
+        self.about_data: dict[Question, None] = {}
+        """All that ticks have asked of data."""
         self._numbers: dict[TreeMemory, int] = {}
         self._known: dict[tuple[int, str], Decision | Outcome] = {}
         self._touched: set[tuple[int, str]] = set()
@@ -133,6 +136,7 @@ class Ticker:
         asked = self._oracle.asked
         robot = self._body.robot
         choices = tuple(one for one in asked if one.options)
+        self.about_data.update(dict.fromkeys(one.question for one in of_data(choices)))
         outcome = Outcome(after, tuple(robot.started), tuple(robot.interrupted), choices, frozenset(self._touched))
         self._keep(memory, act, asked, outcome)
 
@@ -146,7 +150,7 @@ class Ticker:
         except UndecidedError:
             raise
         except Exception as error:
-            if self._keeper.unknown:
+            if self._keeper.unknown or self._body.robot.measurements.any:
                 raise UndecidedError(str(error)) from error
             director.abort(f"the tree raised {type(error).__name__}: {error}")
 

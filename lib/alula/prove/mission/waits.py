@@ -7,13 +7,15 @@ at situations at rest, from one tick to the next: the mission never ends after o
 from __future__ import annotations
 
 from collections import deque
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Iterator, Mapping
 from itertools import product
 
 from alula.prove.limits import Deadline, OutOfTimeError
 from alula.prove.mission.calm import calm_of, reaching
+from alula.prove.mission.measured import Values, agree, all_values, answers
 from alula.prove.mission.regions import Regions
 from alula.prove.mission.state import Event, State
+from alula.prove.mission.words import choice
 from alula.trees.node import Node
 
 
@@ -34,23 +36,42 @@ class Waits:
         self.always_ends = False
         """Whether all were looked at, and the mission can come to an end from each: known once ``found`` is through."""
 
-    def found(self, deadline: Deadline) -> Iterator[tuple[Node, list[Event], State, bool]]:
-        """Yield each node that it stays in for ever, with a run to there, the situation, and whether all stays as it is.
+    def found(self, deadline: Deadline) -> Iterator[tuple[Node, list[Event], State, bool, str]]:
+        """Yield each node that it stays in for ever, a run to there, the situation, whether all stays as it is, and what data say.
 
         When the time is over, it yields those of what was looked at by then, and raises OutOfTimeError.
         """
         first: dict[State, int] = {}
+        told: set[tuple[int, bool]] = set()
+        questions = tuple(self._system.ticker.about_data)
         over: OutOfTimeError | None = None
+        ends = self._regions.complete
         try:
             self._situations(first, deadline)
-            self._explore(list(first), deadline)
         except OutOfTimeError as error:
             over = error
-        good: set[State] = reaching(self._ends | self._open, self._before)
-        never = set(self._after) - good
-        self.always_ends = not never and over is None and self._regions.complete
+        for values in all_values(questions):
+            if over is not None:
+                break
+            try:
+                self._explore(list(first), deadline, values)
+            except OutOfTimeError as error:
+                over = error
+            good: set[State] = reaching(self._ends | self._open, self._before)
+            never = set(self._after) - good
+            ends = ends and not never
+            data = ", ".join(words for one in answers(values, questions) if (words := choice(one)))
+            for found in self._never_over(first, never, told):
+                yield (*found, data)
+        if over is not None:
+            raise over
+        self.always_ends = ends
+
+    def _never_over(
+        self, first: Mapping[State, int], never: set[State], told: set[tuple[int, bool]]
+    ) -> Iterator[tuple[Node, list[Event], State, bool]]:
+        """Yield what was not ``told`` yet of the situations after which the mission never ends."""
         known: set[State] = set()
-        told: set[tuple[int, bool]] = set()
         for begin in (state for state in first if state in never):
             if begin in known:
                 continue
@@ -63,8 +84,6 @@ class Waits:
             if active and (id(active[-1]), stays) not in told:
                 told.add((id(active[-1]), stays))
                 yield active[-1], self._regions.run(first[state], dict(enumerate(state.managers))), state, stays
-        if over is not None:
-            raise over
 
     def _last(self, state: State) -> set[State]:
         """Return situations that are come to from there, each of which leads to all others of them and to nothing else."""
@@ -89,14 +108,16 @@ class Waits:
                 found.setdefault(State(region.memory, managers), number)
                 deadline.check()
 
-    def _explore(self, todo: list[State], deadline: Deadline) -> None:
+    def _explore(self, todo: list[State], deadline: Deadline, values: Values) -> None:
+        """Look at what comes after situations while data have these values."""
+        self._before, self._after, self._ends, self._asking = {}, {}, set(), set()
         seen, waiting = set(todo), deque(todo)
         self._open = seen.copy()
         while waiting:
             deadline.doing = f"waits: {len(waiting)} situations to look at"
             deadline.check()
             state = waiting.popleft()
-            for after in self._next(state):
+            for after in self._next(state, values):
                 self._before.setdefault(after, []).append(state)
                 self._after.setdefault(state, []).append(after)
                 if self._over(after.memory):
@@ -107,13 +128,15 @@ class Waits:
                     waiting.append(after)
             self._open.discard(state)
 
-    def _next(self, state: State) -> Iterator[State]:
+    def _next(self, state: State, values: Values) -> Iterator[State]:
         """Yield the situations at rest after a tick."""
         system, regions = self._system, self._regions
         view: Callable[[tuple[object, ...]], object] = lambda question: system.answer(  # noqa: E731
             state.managers[system.place_of(question)], question
         )
         for ticked in system.ticker.outcomes(state.memory, view):
+            if not agree(values, ticked.choices):
+                continue
             if ticked.started:
                 self._asking.add(state)
             after = [self._resting(place, regions.after(place, one, ticked)) for place, one in enumerate(state.managers)]

@@ -32,7 +32,7 @@ def _lines(system: System, event: Event) -> Iterator[str]:
         case Kind.TICK | Kind.ABORT:
             asked = [f"asks for {_leaf(system, leaf)}" for leaf in event.started]
             asked += [f"asks for the end of {_leaf(system, leaf)}" for leaf in event.interrupted]
-            chosen = [words for one in event.choices if (words := _choice(one))]
+            chosen = [words for one in event.choices if (words := choice(one))]
             begins = "someone aborts the mission" if event.kind is Kind.ABORT else "the tree is ticked"
             if asked or chosen or event.kind is Kind.ABORT:
                 yield "; ".join([begins, *chosen, *asked])
@@ -65,13 +65,18 @@ def _leaf(system: System, leaf: int) -> str:
     return f"{node.skillset}.{node.model.name} ('{node.name}')"
 
 
-def _choice(one: Asked) -> str:
+def choice(one: Asked) -> str:
+    """Return what a tick has found, or what its nodes answer; empty where that tells nothing."""
     match one.question:
         case ("time", str(duration)):
             return f"{float(duration) / 1e9:g} s are over" if one.answer and float(duration) >= 1e6 else ""
         case ("answer", str(name)):
             return f"'{name}' answers {one.answer}"
-        case ("compare", str(what), str(symbol), str(other)):
+        case ("data", str(what), "fresh", _):
+            return "" if one.answer else f"{what} is not fresh"
+        case ("data", str(what), "number", _):
+            return "" if one.answer else f"{what} is no number"
+        case (("compare" | "data"), str(what), str(symbol), str(other)):
             return f"{what} is {'' if one.answer else 'not '}{symbol} {other}"
     return ""
 

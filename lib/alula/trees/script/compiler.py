@@ -17,7 +17,7 @@ from alula.trees.script.values import ValueMismatch, as_float, as_integer, as_te
 
 Code: TypeAlias = Callable[[Scope], Value]
 
-_EPSILON = 2.0**-23
+EPSILON = 2.0**-23
 """Numbers that differ by no more are equal: C++'s ``std::numeric_limits<float>::epsilon()``."""
 
 
@@ -182,7 +182,7 @@ def _chain(node: Chain) -> Code:
 
 
 def _same(left: float, right: float) -> bool:
-    return abs(left - right) <= _EPSILON
+    return abs(left - right) <= EPSILON
 
 
 # Orders are written as what they exclude: with a number that is none, every order holds, as in BT.CPP.

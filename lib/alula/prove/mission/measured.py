@@ -1,0 +1,405 @@
+"""Data that a mission's conditions ask: of each value as much as they can tell apart, which may be otherwise at every tick.
+
+    ("data", "rover.battery", "fresh", "")                 # is there a value that is not stale?
+    ("data", "rover.battery.volts", "number", "")          # was a number measured?
+    ("data", "rover.battery.level", "<", "0.15")           # questions of a tick; their answers fit together
+
+All that is asked in one tick is asked of one value: each answer narrows down where it is, so that only what is open is a choice.
+"""
+
+from __future__ import annotations
+
+import math
+import operator
+from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
+from dataclasses import dataclass, field
+from enum import Enum
+from itertools import pairwise, product
+from types import SimpleNamespace
+from typing import Self
+
+from alula.model.model import Skillset
+from alula.prove.mission.oracle import Answer, Asked, Oracle, Question, UndecidedError
+from alula.prove.mission.reading import scripts_of
+from alula.prove.mission.unknown import UnknownNumber, UnknownText
+from alula.trees.document import Element
+from alula.trees.reading import TreeFiles
+from alula.trees.script import ScriptError, parse
+from alula.trees.script.compiler import EPSILON
+from alula.trees.script.syntax import Assignment, Call, Chain, Comparison, Conditional, Literal, Name, Node, Prefix, children
+
+DATA, FRESH, NUMBER = "data", "fresh", "number"
+LOGIC = frozenset({"&&", "||"})
+COMPARE: Mapping[str, Callable[[float, float], bool]] = {
+    "<": operator.lt,
+    "<=": operator.le,
+    ">": operator.gt,
+    ">=": operator.ge,
+    "==": lambda left, right: abs(left - right) <= EPSILON,
+}
+ANOTHER = "another"
+
+
+class Kind(Enum):
+    """What the value of a name is to the conditions; one that is asked alone is true or false."""
+
+    NUMBER = "number"
+    FLAG = "flag"
+    TEXT = "text"
+
+
+@dataclass(frozen=True)
+class Conditions:
+    """What conditions ask of data: ``kinds`` by whole names (``rover.battery.level``), and the data of which ``fresh`` is asked."""
+
+    kinds: Mapping[str, Kind] = field(default_factory=dict)
+    fresh: frozenset[str] = frozenset()
+
+    @classmethod
+    def of(cls, files: TreeFiles, skillsets: Iterable[Skillset]) -> Conditions:
+        """Read those of a mission; raises UndecidedError for what computes with data, or copies them."""
+        types = {f"{one.name}.{data.name}": data.type for one in skillsets for data in one.data}
+        asking = _Asking(types)
+        for tree in files.trees.values():
+            for element in tree.iterate():
+                for text in scripts_of(element):
+                    asking.script(element, text)
+        return cls(asking.kinds, frozenset(asking.fresh))
+
+
+def data_in(name: str) -> str:
+    """Return ``skillset.data`` of a name of it or of one of its fields."""
+    return ".".join(name.split(".", 2)[:2])
+
+
+class _Asking:
+    """Collects what scripts ask of data."""
+
+    def __init__(self, types: Mapping[str, str]) -> None:
+        self.kinds: dict[str, Kind] = {}
+        self.fresh: set[str] = set()
+        self._types = types
+        self._place = ""
+
+    def script(self, element: Element, text: str) -> None:
+        try:
+            program = parse(text)
+        except ScriptError:
+            return
+        self._place = f"line {element.place.line}, `{text}`"
+        for statement in program.statements:
+            self._look(statement, asked=text != element.get("otherwise"))
+
+    def _look(self, node: Node, *, asked: bool) -> None:
+        """Look at a part of a script, of whose value no more is ``asked`` than whether it is true, or which goes on as it is."""
+        match node:
+            case Name() if self._is_data(node):
+                if not asked:
+                    raise UndecidedError(f"{self._place}: computes with the data {node.name}")
+                self._told(node.name, Kind.FLAG)
+            case Comparison():
+                self._compared(node)
+            case Call():
+                names = (str(getattr(one, "name", getattr(one, "value", ""))) for one in node.arguments)
+                self.fresh.update(name for name in names if name in self._types and node.function == FRESH)
+            case Conditional():
+                self._look(node.condition, asked=True)
+                self._look(node.then, asked=asked)
+                self._look(node.otherwise, asked=asked)
+            case Assignment():
+                self._look(node.value, asked=False)
+            case _:
+                logic = (isinstance(node, Chain) and LOGIC.issuperset(node.operators)) or (
+                    isinstance(node, Prefix) and node.operator == "!"
+                )
+                for child in children(node):
+                    self._look(child, asked=logic)
+
+    def _compared(self, node: Comparison) -> None:
+        several = [one for one in node.operands if isinstance(one, Name) and self._is_data(one)]
+        if len(several) > 1:
+            raise UndecidedError(f"{self._place}: compares the data {several[0].name} with the data {several[1].name}")
+        for one in node.operands:
+            if one not in several:
+                self._look(one, asked=False)
+        text = any(isinstance(one, Literal) and isinstance(one.value, str) for one in node.operands)
+        for name in several:
+            self._told(name.name, Kind.TEXT if text or self._types.get(name.name) == "string" else Kind.NUMBER)
+
+    def _told(self, name: str, kind: Kind) -> None:
+        declared = self._types.get(name, "")
+        if declared == "bool":
+            kind = Kind.FLAG
+        elif kind is Kind.FLAG and declared:
+            raise UndecidedError(f"{self._place}: the data {name} is neither true nor false, but a {declared}")
+        if self.kinds.setdefault(name, kind) is not kind:
+            raise UndecidedError(f"{self._place}: the data {name} is asked as a {kind.value}, and as a {self.kinds[name].value} elsewhere")
+
+    def _is_data(self, node: Name) -> bool:
+        return data_in(node.name) in self._types
+
+
+# --- in a tick ---------------------------------------------------------------------------------------------------------
+
+
+class Measurements:
+    """The data as one tick sees them."""
+
+    def __init__(self, oracle: Oracle, conditions: Conditions) -> None:
+        self._oracle = oracle
+        self._conditions = conditions
+        self._known: dict[str, object] = {}
+
+    def begin(self) -> None:
+        """Begin another tick: anything may have come."""
+        self._known = {}
+
+    @property
+    def any(self) -> bool:
+        """Tell whether any were asked in this tick."""
+        return bool(self._known)
+
+    def value(self, data: str) -> object | None:
+        """Return a value of ``skillset.data``, or what has its fields; None where there is no fresh one."""
+        if data not in self._known:
+            self._known[data] = self._oracle.choose((DATA, data, FRESH, ""))
+        return self.part(data) if self._known[data] else None
+
+    def part(self, name: str) -> object:
+        """Return the value of a field, or what has fields; NaN where no number was measured."""
+        if name not in self._conditions.kinds:
+            return _Fields(self, name)
+        key = f"{name} "  # a data without fields has its freshness by its name
+        if key not in self._known:
+            self._known[key] = self._made(name)
+        return self._known[key]
+
+    def _made(self, name: str) -> object:
+        match self._conditions.kinds[name]:
+            case Kind.TEXT:
+                return MeasuredText(self._oracle, name)
+            case Kind.FLAG:
+                return MeasuredNumber(self._oracle, name, 0.0, 1.0)
+        data = data_in(name)
+        of_data = [one for one in self._conditions.kinds if data_in(one) == data]
+        apart = data in self._conditions.fresh or len(of_data) > 1  # from a stale value
+        if apart and not self._oracle.choose((DATA, name, NUMBER, "")):
+            return math.nan
+        return MeasuredNumber(self._oracle, name)
+
+
+class _Fields:
+    """A value with fields."""
+
+    def __init__(self, measurements: Measurements, name: str) -> None:
+        self._measurements = measurements
+        self._name = name
+
+    def __getattr__(self, name: str) -> object:
+        return self._measurements.part(f"{self._name}.{name}")
+
+
+class MeasuredNumber(UnknownNumber):
+    """A number that was measured; what a tick has asked of it bounds it for the rest of the tick."""
+
+    __slots__ = ()
+
+    def __new__(cls, oracle: Oracle, what: str, low: float = -math.inf, high: float = math.inf) -> Self:
+        """Make one. As a plain float it is no NaN: that would mean that nothing was measured."""
+        made = float.__new__(cls, math.inf)
+        made.oracle, made.what, made.low, made.high = oracle, what, low, high
+        return made
+
+    def _decided(self, sure: bool, impossible: bool, symbol: str, other: float) -> bool:  # noqa: FBT001
+        if isinstance(other, UnknownNumber):
+            raise UndecidedError(f"the data {self.what} is compared with {other.what}, which is not known either")
+        if sure or impossible:
+            return sure
+        answer = bool(self.oracle.choose((DATA, self.what, symbol, repr(other))))
+        below = {"<": math.nextafter(other, -math.inf), "<=": other}
+        above = {">": math.nextafter(other, math.inf), ">=": other}
+        upwards = {"<": other, "<=": math.nextafter(other, math.inf)}
+        downwards = {">": other, ">=": math.nextafter(other, -math.inf)}
+        if symbol in below:
+            self.high, self.low = (min(self.high, below[symbol]), self.low) if answer else (self.high, max(self.low, upwards[symbol]))
+        else:
+            self.low, self.high = (max(self.low, above[symbol]), self.high) if answer else (self.low, min(self.high, downwards[symbol]))
+        return answer
+
+    def near(self, other: float) -> bool:
+        """Tell whether it is equal to another, as scripts count."""
+        if isinstance(other, UnknownNumber):
+            raise UndecidedError(f"the data {self.what} is compared with {other.what}, which is not known either")
+        low, high = other - EPSILON, other + EPSILON
+        if low <= self.low and self.high <= high:
+            return True
+        if self.high < low or self.low > high:
+            return False
+        if self.oracle.choose((DATA, self.what, "==", repr(float(other)))):
+            self.low, self.high = max(self.low, low), min(self.high, high)
+            return True
+        if self.low >= low or (self.high > high and not self < other):
+            self.low = max(self.low, math.nextafter(high, math.inf))
+        else:
+            self.high = min(self.high, math.nextafter(low, -math.inf))
+        return False
+
+    def __eq__(self, other: object) -> bool:
+        return isinstance(other, int | float) and self.near(other)
+
+    def __ne__(self, other: object) -> bool:
+        return not self == other
+
+    __hash__ = float.__hash__
+
+    def __sub__(self, other: object) -> _Away:  # type: ignore[override]  # scripts compare so; what computes is refused before
+        return _Away(self, other)
+
+    __rsub__ = __sub__  # type: ignore[assignment]
+
+
+@dataclass(frozen=True, eq=False)
+class _Away:
+    """How far a measured number is from another."""
+
+    number: MeasuredNumber
+    other: object
+
+    def __abs__(self) -> _Away:
+        return self
+
+    def __le__(self, _near: float) -> bool:
+        return self.number == self.other
+
+
+class MeasuredText(UnknownText):
+    """A text that was told; what a tick has asked of it holds for the rest of the tick."""
+
+    __slots__ = ("_known", "_others")
+    _known: str | None
+    _others: set[str]
+
+    def __new__(cls, oracle: Oracle, what: str) -> Self:
+        """Make one."""
+        made = super().__new__(cls, oracle, what)
+        made._known, made._others = None, set()
+        return made
+
+    def _decided(self, symbol: str, other: object) -> bool:
+        if symbol != "==" or not isinstance(other, str) or isinstance(other, UnknownText):
+            raise UndecidedError(f"the letters of the data {self.what} are needed")
+        if self._known is not None or other in self._others:
+            return self._known == other
+        if self.oracle.choose((DATA, self.what, "==", f"'{other}'")):
+            self._known = other
+            return True
+        self._others.add(other)
+        return False
+
+    __hash__ = UnknownText.__hash__
+
+
+# --- values that fit ----------------------------------------------------------------------------------------------------
+
+
+Values = Mapping[str, object]
+"""By the names of fields what is told; by those of data whether a value is fresh, where that was asked of them too."""
+
+
+def of_data(choices: Iterable[Asked]) -> list[Asked]:
+    """Return the choices of a tick that are about data."""
+    return [one for one in choices if one.question[0] == DATA]
+
+
+def fits(values: Values, question: Question, answer: Answer) -> bool:
+    """Tell whether values give an answer about data."""
+    _, name, symbol, other = question
+    key = f"{name} {FRESH}" if symbol == FRESH else str(name)
+    if symbol == FRESH or key not in values:
+        return values.get(key, answer) == answer
+    value = values[key]
+    if symbol == NUMBER or value is None:
+        return symbol == NUMBER and (value is not None) == answer
+    known = value == str(other)[1:-1] if isinstance(value, str) else COMPARE[str(symbol)](float(str(value)), float(str(other)))
+    return known == answer
+
+
+def agree(values: Values, choices: Iterable[Asked]) -> bool:
+    """Tell whether values give all answers about data among the choices of a tick."""
+    return all(fits(values, one.question, one.answer) for one in choices if one.question[0] == DATA)
+
+
+def answers(values: Values, questions: Iterable[Question]) -> list[Asked]:
+    """Return what values answer to questions about data; of what is not fresh, or no number, that alone."""
+    fresh = [one for one in questions if one[2] == FRESH or values.get(f"{data_in(str(one[1]))} {FRESH}", True)]
+    known = [one for one in fresh if one[2] in {FRESH, NUMBER} or values.get(str(one[1])) is not None]
+    return [Asked(one, (), fits(values, one, answer=True)) for one in known]
+
+
+def all_values(questions: Iterable[Question]) -> Iterator[Values]:
+    """Yield values that answer questions about data in all the ways that there are."""
+    asked: dict[str, list[Question]] = {}
+    for question in questions:
+        asked.setdefault(f"{question[1]} {FRESH}" if question[2] == FRESH else str(question[1]), []).append(question)
+    ways = [list(_ways(several)) for several in asked.values()]
+    for combined in product(*ways):
+        yield dict(zip(asked, combined, strict=True))
+
+
+def _ways(questions: Sequence[Question]) -> Iterator[object]:
+    """Yield one value for each way to answer questions about one name."""
+    if questions[0][2] == FRESH:
+        yield from (True, False)
+        return
+    name = str(questions[0][1])
+    seen: set[tuple[bool, ...]] = set()
+    for value in _candidates(questions):
+        answers = tuple(fits({name: value}, one, answer=True) for one in questions)
+        if answers not in seen:
+            seen.add(answers)
+            yield value
+
+
+def _candidates(questions: Sequence[Question]) -> Iterator[object]:
+    others = [str(one[3]) for one in questions if one[2] != NUMBER]
+    if others and others[0].startswith("'"):
+        texts = {one[1:-1] for one in others}
+        yield from sorted(texts)
+        yield next(name for name in (ANOTHER, *(f"{ANOTHER} {number}" for number in range(len(texts)))) if name not in texts)
+        return
+    numbers = sorted({float(one) for one in others}) or [0.0]
+    yield from numbers
+    yield from ((low + high) / 2 for low, high in pairwise(numbers))
+    yield numbers[-1] + 1.0  # before what is below: of what is true or false, no value is negative
+    yield numbers[0] - 1.0
+    yield from (one + away for one in numbers for away in (-EPSILON / 2, EPSILON / 2))
+    if len(others) < len(questions):
+        yield None
+
+
+def told(choices: Sequence[Asked]) -> dict[str, object] | None:
+    """Return values of ``skillset.data`` that fit the choices of a tick, None for one that is not fresh; None where no values fit."""
+    found = next(
+        (one for one in all_values(dict.fromkeys(one.question for one in choices)) if agree(one, choices)),
+        None,
+    )
+    if found is None:
+        return None
+    said: dict[str, object] = {}
+    for name, value in found.items():
+        data, fresh, _ = name.partition(f" {FRESH}")
+        if fresh and not value:
+            said[data] = None
+        elif not fresh:
+            path = name.split(".")[2:]
+            value = math.nan if value is None else value  # noqa: PLW2901
+            if not path:
+                said[name] = value
+                continue
+            place = said.setdefault(data_in(name), SimpleNamespace())
+            for part in path[:-1]:
+                place = vars(place).setdefault(part, SimpleNamespace())
+            setattr(place, path[-1], value)
+        else:
+            said.setdefault(data, SimpleNamespace())
+    return said
