@@ -31,7 +31,7 @@ if TYPE_CHECKING:
     from skillset_interfaces.srv import TransitionRequest
 
 STEP_NS = 20_000_000
-STEP_WALL_S = 0.004
+STEP_WALL_S = 0.01
 SENSOR_STEPS = 5
 HEALTH_NS = NS // 10
 LONGEST_WORK_WALL_S = 5.0  # of a node on one measurement, on a machine under load
@@ -134,7 +134,7 @@ class FakeFlight:
     def run(self, seconds: float, *, until: Callable[[], object] = lambda: False) -> bool:
         """Let simulated time pass, at most so much, and return whether the condition came true.
 
-        Time goes at most five times as fast as the wall clock, and waits for the node to be done with each measurement: a slow machine
+        Time goes at most twice as fast as the wall clock, and waits for the node to be done with each measurement: a slow machine
         makes a test longer, not different.
         """
         end_ns = self.now_ns + int(seconds * NS)
