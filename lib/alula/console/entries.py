@@ -54,8 +54,8 @@ PICTURE = "/picture"
 PICTURES_FILE = "pictures.jsonl"
 """Where a run writes them, a line each, with ``stamp_s``."""
 
-RECORDINGS_FILE = "page.jsonl"
-"""Where a report leaves, an entry a line, what it told of the run's other recordings: with these the live page is the report's equal."""
+OF_RECORDINGS = frozenset({PATH, WORLD, FAULT, HEALTH})
+"""Topics of what a report tells of the run's other recordings than the record."""
 
 Wire = tuple[str, float | None, object]
 """An entry as the page gets it."""

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import json
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Iterable, Iterator
 from pathlib import Path
 from typing import Any
 
@@ -13,7 +13,8 @@ from alula.common.robots import page_words
 from alula.console.areas import areas_of
 from alula.console.causes import Causes
 from alula.console.clouds import CloudError, packed, read_points
-from alula.console.entries import AREAS, CAUSES, MAP, PICTURE, PICTURES_FILE, RECORDINGS_FILE, RUN, SUMMARY, Converter, Wire
+from alula.console.embedded import REPORT, read_report
+from alula.console.entries import AREAS, CAUSES, MAP, OF_RECORDINGS, PICTURE, PICTURES_FILE, RUN, SUMMARY, Converter, Wire
 from alula.console.lines import LinesFollower
 
 OF_THE_MACHINE = ("out_dir", "run_id")
@@ -21,10 +22,14 @@ OF_THE_MACHINE = ("out_dir", "run_id")
 
 
 class RunFollower:
-    """Follows one run. ``problems`` names what could not be read."""
+    """Follows one run. ``problems`` names what could not be read.
 
-    def __init__(self, folder: Path) -> None:
+    ``recordings``: what the run's other recordings tell; without it, this is taken from the run's report once there is one.
+    """
+
+    def __init__(self, folder: Path, recordings: Iterable[Wire] | None = None) -> None:
         self.folder = folder
+        self._of_recordings = recordings
         self.problems: list[str] = []
         self.behind = False
         self._converter = Converter()
@@ -66,14 +71,19 @@ class RunFollower:
                 self._note(f"{path.name}: {error}")
 
     def _recordings(self) -> list[Wire]:
-        """Return, once, what the report told of the other recordings."""
-        path = self.folder / RECORDINGS_FILE
-        if self._told or not path.is_file():
+        """Return, once, what the run's other recordings tell."""
+        if self._told:
+            return []
+        if self._of_recordings is not None:
+            self._told = True
+            return list(self._of_recordings)
+        path = self.folder / REPORT
+        if not path.is_file():
             return []
         self._told = True
         try:
-            return [(str(topic), t_s, value) for topic, t_s, value in map(json.loads, path.read_text(encoding="utf-8").splitlines())]
-        except (OSError, ValueError, TypeError) as error:
+            return [entry for entry in read_report(path) if entry[0] in OF_RECORDINGS]
+        except (OSError, ValueError) as error:
             self._note(f"{path.name}: {error}")
             return []
 

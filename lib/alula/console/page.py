@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import base64
-import gzip
 import hashlib
 import html
 from collections import Counter
@@ -11,10 +10,10 @@ from collections.abc import Iterable, Mapping
 from pathlib import Path
 
 from alula.common.files import write_text
-from alula.console.entries import PICTURE, RECORDINGS_FILE, Wire, written
+from alula.console.embedded import REPORT, embedded
+from alula.console.entries import PICTURE, Wire
 from alula.console.following import RunFollower
 
-REPORT = "report.html"
 PARTS = Path(__file__).parent / "page"
 MAX_PICTURES = 400
 """In a report: 3 MB of it at most."""
@@ -22,17 +21,11 @@ PROGRAM = ("dom", "fold", "robot", "account", "state", "tree", "timeline", "map"
 """Files of the program, in the order in which they need each other."""
 
 
-def packed_entries(entries: Iterable[Wire]) -> bytes:
-    """Return entries as a gzipped array of JSON."""
-    text = f"[{','.join(written(entry) for entry in entries)}]"
-    return gzip.compress(text.encode(), compresslevel=6, mtime=0)
-
-
 def make_page(*, title: str, entries: Iterable[Wire] | None = None) -> str:
     """Return the page: a report of ``entries``, or, without any, the live page that gets them over its server's WebSocket."""
     style = (PARTS / "page.css").read_text(encoding="utf-8")
     program = '"use strict";\n(() => {\n' + "\n".join(_part(name) for name in PROGRAM) + "\n})();\n"
-    record = "" if entries is None else base64.b64encode(packed_entries(entries)).decode("ascii")
+    record = "" if entries is None else embedded(entries)
     connect = "'self'" if entries is None else "'none'"
     policy = (
         f"default-src 'none'; script-src {_hash(program)}; style-src {_hash(style)}; img-src data: blob:; connect-src {connect}; "
@@ -46,19 +39,14 @@ def make_page(*, title: str, entries: Iterable[Wire] | None = None) -> str:
 
 
 def write_report(folder: Path, more: Iterable[Wire] = (), *, title: str) -> None:
-    """Write ``report.html`` into a run's folder: what the folder tells, and ``more`` that its other recordings tell.
+    """Write ``report.html`` into a run's folder: what the folder tells, and ``more`` (``OF_RECORDINGS``) that its other recordings tell.
 
-    The latter stays in the folder, so that the live page says of a run that is over what the report says, to the last digit.
+    The live page of a run that is over takes the latter from the report, and so says what it says, to the last digit.
 
     Raises:
         OSError: it can't be written.
     """
-    told = "".join(f"{written(entry)}\n" for entry in more)
-    if told:
-        write_text(folder / RECORDINGS_FILE, told)
-    else:
-        (folder / RECORDINGS_FILE).unlink(missing_ok=True)
-    entries = few_pictures(RunFollower(folder).poll())
+    entries = few_pictures(RunFollower(folder, more).poll())
     write_text(folder / REPORT, make_page(title=title, entries=sorted(entries, key=lambda entry: (entry[1] is not None, entry[1] or 0.0))))
 
 

@@ -31,9 +31,10 @@ from alula.common.runs import runs_folder
 from alula.common.scenarios import scenario_names
 from alula.console import acts, commands
 from alula.console.admission import Admission
+from alula.console.embedded import REPORT
 from alula.console.feed import Feed, place_of
 from alula.console.link import ActError, Link
-from alula.console.page import REPORT, make_page
+from alula.console.page import make_page
 from alula.live.options import RunOption
 from alula.live.spec import RequestError
 

@@ -1,7 +1,6 @@
 from __future__ import annotations
 
 import base64
-import gzip
 import json
 import os
 import re
@@ -34,10 +33,11 @@ from alula.common.robots import RobotError, load_robot_folder
 from alula.common.run_log import note_act
 from alula.console.areas import areas_of
 from alula.console.clouds import MAX_POINTS, CloudError, packed, read_points, thinned
-from alula.console.entries import AREAS, CAUSES, MAP, NODES, PICTURE, PICTURES_FILE, ROUTE, RUN, Converter
+from alula.console.embedded import REPORT, entries_inside, read_report
+from alula.console.entries import AREAS, CAUSES, HEALTH, MAP, NODES, PATH, PICTURE, PICTURES_FILE, ROUTE, RUN, Converter, Wire
 from alula.console.feed import CHUNK_BYTES, Feed, Place, place_of
 from alula.console.following import RunFollower
-from alula.console.page import MAX_PICTURES, PARTS, REPORT, make_page, write_report
+from alula.console.page import MAX_PICTURES, PARTS, make_page, write_report
 
 
 def entry(topic: str, t_s: float, value: dict[str, object]) -> Entry:
@@ -174,7 +174,7 @@ def test_a_live_page_is_told_the_causes_that_the_report_holds(tmp_path: Path, st
     assert steps == sorted(steps), "a failure is told when it happens, with what is known by then"
     assert steps[0] == 0
     write_report(tmp_path, told, title="x")
-    reported = causes_in((topic, t_s, value) for topic, t_s, value in record_inside((tmp_path / REPORT).read_text(encoding="utf-8")))
+    reported = causes_in(read_report(tmp_path / REPORT))
     live = causes_in(seen)
     assert live == reported
     (behind,) = {failure["fault"] for failure in live["failures"]} - {None}
@@ -307,7 +307,7 @@ def test_a_report_holds_some_pictures_of_each_camera_and_stays_small(tmp_path: P
     add_pictures(tmp_path, 1500)
     write_report(tmp_path, title="long")
     page = (tmp_path / REPORT).read_text(encoding="utf-8")
-    shown = [(entry[1], entry[2]["camera"]) for entry in record_inside(page) if entry[0] == PICTURE]  # type: ignore[call-overload, index]
+    shown = [(entry[1], entry[2]["camera"]) for entry in entries_inside(page) if entry[0] == PICTURE]  # type: ignore[index]
     for camera in ("depth", "screen"):
         times = [t_s for t_s, name in shown if name == camera]
         assert 150 < len(times) <= MAX_PICTURES / 2
@@ -318,22 +318,32 @@ def test_a_report_holds_some_pictures_of_each_camera_and_stays_small(tmp_path: P
 # --- the page ------------------------------------------------------------------------------------------------------------
 
 
-def record_inside(page: str) -> list[list[object]]:
-    """Return the entries inside a page."""
-    text = re.search(r'id="record">([^<]*)</script>', page)
-    assert text is not None
-    entries: list[list[object]] = json.loads(gzip.decompress(base64.b64decode(text[1])))
-    return entries
+@pytest.mark.parametrize("damage", ["H4sI", "no base64!", ""])
+def test_what_other_recordings_tell_is_followed_out_of_the_report(tmp_path: Path, damage: str) -> None:
+    path: Wire = (PATH, 3.0, [1.0, 2.0, 3.0])
+    health: Wire = (HEALTH, 2.0, {"sensor": "zed", "ok": False})
+    add_pictures(tmp_path, 2)
+    follower = RunFollower(tmp_path)
+    assert {topic for topic, _, _ in follower.poll()} == {PICTURE}
+    for _ in range(2):  # a report that is made again tells them once
+        write_report(tmp_path, [path, health], title="over")
+    assert sorted(entry for entry in read_report(tmp_path / REPORT) if entry[0] != PICTURE) == [health, path]
+    assert sorted(follower.poll()) == [health, path]
+    assert follower.poll() == []
+    (tmp_path / REPORT).write_text(f'<script id="record">{damage}</script>' if damage else "<p>", encoding="utf-8")
+    damaged = RunFollower(tmp_path)
+    assert {topic for topic, _, _ in damaged.poll()} == {PICTURE}
+    assert [problem.partition(":")[0] for problem in damaged.problems] == [REPORT]
 
 
 def test_a_report_holds_the_run_and_fetches_nothing(tmp_path: Path) -> None:
     write_record(tmp_path, failing_story())
     write_report(tmp_path, [("/fault", 42.0, {"sensor": "zed", "mode": "dead"})], title="mapping, seed 1")
     page = (tmp_path / REPORT).read_text(encoding="utf-8")
-    entries = record_inside(page)
+    entries = entries_inside(page)
     times = [t for _, t, _ in entries if t is not None]
     assert times == sorted(times)  # type: ignore[type-var]
-    assert ["/fault", 42.0, {"sensor": "zed", "mode": "dead"}] in entries
+    assert ("/fault", 42.0, {"sensor": "zed", "mode": "dead"}) in entries
     assert "connect-src &#x27;none&#x27;" in page
     assert not re.search(r"(src|href)=\"(https?:)?//", page)
     assert "http://www.w3.org/2000/svg" in page  # a name, no address: the only one
@@ -344,7 +354,7 @@ def test_markup_of_a_run_is_no_markup_of_the_page() -> None:
     page = make_page(title=HOSTILE, entries=[("/run", None, {"name": HOSTILE, "nan": float("nan")})])
     assert "<img" not in page
     assert page.count("</script>") == 2
-    assert record_inside(page) == [["/run", None, {"name": HOSTILE, "nan": None}]]
+    assert entries_inside(page) == [("/run", None, {"name": HOSTILE, "nan": None})]
 
 
 # --- feeds ---------------------------------------------------------------------------------------------------------------
