@@ -16,11 +16,6 @@ class Range:
     high: Fraction | None
 
     @property
-    def is_point(self) -> bool:
-        """Tell whether it is one number."""
-        return self.low == self.high
-
-    @property
     def corners(self) -> tuple[Fraction, ...]:
         """Return its finite ends."""
         return tuple(dict.fromkeys(end for end in (self.low, self.high) if end is not None))

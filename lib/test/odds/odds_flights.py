@@ -74,7 +74,7 @@ class Flights:
 
 def number(known: Range) -> float:
     """Return a figure that is one number."""
-    assert known.is_point
+    assert known.low == known.high
     return float(known.low)
 
 
