@@ -14,6 +14,7 @@ from ground_station.quality import grey, no_reference, ssim
 from ground_station.rehearsal import Rehearsal
 from ground_station.window import LossMeter, Shown, Window
 from radio_link.conditions import PRESETS, Both, Quality
+from video_stream.rate import RateSettings
 from video_stream.wire import NS, Mark, VideoPacket
 
 GOOD, DEGRADED, CRITICAL, OUT = (PRESETS[quality] for quality in Quality)
@@ -207,6 +208,15 @@ def test_after_a_second_without_radio_the_picture_comes_back():
     stream = run(8.0, [(0.0, GOOD), (3.0, OUT), (4.0, GOOD)])
     assert 0.9 < max(stream.gaps()) < 2.0
     assert at(stream, 7.0).report.fps >= 8
+
+
+def test_a_busy_computer_on_board_is_no_full_radio():
+    chance = random.Random(3)  # noqa: S311 - no secret
+    prompt = run(4.0, [(0.0, GOOD)])
+    late = run(4.0, [(0.0, GOOD)], late_ns=lambda _: int(chance.uniform(0.0, 0.25) * NS))
+    assert at(prompt, 3.9).target_bps == at(late, 3.9).target_bps == RateSettings().max_bps
+    assert max(moment.report.queue_s for moment in late.moments) < RateSettings().queue_limit_s
+    assert at(late, 3.9).report.delay_s > at(prompt, 3.9).report.delay_s + 0.08, "the telepilot sees late pictures all the same"
 
 
 def test_garbage_replays_and_disorder_on_the_way_show_no_wrong_picture():

@@ -31,7 +31,7 @@ def picture(number: int, width: int = 320, height: int = 180) -> np.ndarray:
 
 # --- wire ---------------------------------------------------------------------------------------------------------------
 
-PACKET = VideoPacket(7, Mark(41, 123_456_789_000, 2, 5, key=True), b"\x65payload")
+PACKET = VideoPacket(7, Mark(41, 123_456_789_000, 2, 5, key=True), b"\x65payload", held_ms=260)
 
 
 def test_a_packet_in_bytes():
@@ -198,7 +198,9 @@ def test_frames_are_identified_and_sent_again_once():
     packets = [VideoPacket.parse(data, SEAL) for frame in frames if frame for data in frame.datagrams]
     assert [(p.mark.frame_id, p.mark.index) for p in packets] == [(f.frame_id, i) for f in frames if f for i in range(len(f.datagrams))]
     wanted = VideoReport(1, 3 * STEP_NS, newest_id=2, missing=((0, 0), (99, 0), (0, 9999))).pack(SEAL)
-    assert sender.feedback(wanted, 3 * STEP_NS) == [frames[0].datagrams[0]]
+    (resent,) = (VideoPacket.parse(data, SEAL) for data in sender.feedback(wanted, 3 * STEP_NS))
+    assert (resent.sequence, resent.mark, resent.payload) == (packets[0].sequence, packets[0].mark, packets[0].payload)
+    assert (packets[0].sent_ns, resent.sent_ns) == (0, 3 * STEP_NS), "what it waited for is not the radio's delay"
     assert sender.feedback(wanted, 4 * STEP_NS) == [], "a replayed report"
     again = VideoReport(2, 4 * STEP_NS, newest_id=2, missing=((0, 0),)).pack(SEAL)
     assert sender.feedback(again, 4 * STEP_NS) == [], "it may still be under way"

@@ -70,7 +70,7 @@ class VideoReceiver:
         new = self._assembler.add(packet, now_ns)
         if new:
             self._losses.add(packet.sequence, now_ns)
-            self._window.receive(now_ns, len(data), now_ns - packet.mark.stamp_ns)
+            self._window.receive(now_ns, len(data), now_ns - packet.sent_ns)
         return new
 
     def pictures(self, now_ns: int) -> list[Picture]:

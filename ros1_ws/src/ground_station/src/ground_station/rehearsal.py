@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import time
+from collections import deque
 from collections.abc import Callable, Iterator
 from dataclasses import dataclass, field
 from itertools import pairwise
@@ -37,11 +38,13 @@ class RehearsalMoment:
 class Rehearsal:
     """Runs a stream. ``camera(n)``: the n-th picture, 20 a second; ``radio(t_s)``: how the radio is at a time.
 
+    ``late_ns(n)``: how long after its exposure the n-th picture comes to the encoder; by default at once.
     ``tamper``: what is done to the datagrams on their way to the ground; by default nothing.
     """
 
     camera: Callable[[int], Rgb]
     radio: Callable[[float], Both]
+    late_ns: Callable[[int], int] = lambda _: 0
     seed: int = 0
     settings: RateSettings | None = None
     tamper: Callable[[list[bytes]], list[bytes]] = lambda datagrams: datagrams
@@ -55,6 +58,7 @@ class Rehearsal:
         self.sender = VideoSender(seal, self.settings)
         self.receiver = VideoReceiver(seal)
         self._seal = seal
+        self._filmed: deque[tuple[int, int, Rgb]] = deque()
         both = self.radio(0.0)
         self._down, self._up = Channel(both.down, 2 * self.seed), Channel(both.up, 2 * self.seed + 1)
 
@@ -67,8 +71,11 @@ class Rehearsal:
             self._at_the_ground(now_ns)
             self._at_the_drone(now_ns)
             if now_ns >= frame * FRAME_NS:
-                self._film(self.camera(frame), now_ns)
+                self._filmed.append((now_ns + self.late_ns(frame), now_ns, self.camera(frame)))
                 frame += 1
+            while self._filmed and self._filmed[0][0] <= now_ns:
+                _, stamp_ns, image = self._filmed.popleft()
+                self._film(image, stamp_ns, now_ns)
 
     def gaps(self, start_s: float = 0.0, end_s: float = float("inf")) -> Iterator[float]:
         """Yield the seconds between the pictures that were shown in a time."""
@@ -92,10 +99,10 @@ class Rehearsal:
             for again in self.sender.feedback(data, now_ns):
                 self._down.send(again, now_ns)
 
-    def _film(self, image: Rgb, now_ns: int) -> None:
-        self.receiver.reference(now_ns, image)
+    def _film(self, image: Rgb, stamp_ns: int, now_ns: int) -> None:
+        self.receiver.reference(stamp_ns, image)
         begun = time.perf_counter()
-        frame = self.sender.frame(image, now_ns, now_ns)
+        frame = self.sender.frame(image, stamp_ns, now_ns)
         self.encode_s.append(time.perf_counter() - begun)
         for data in frame.datagrams if frame is not None else ():
             self._down.send(data, now_ns)

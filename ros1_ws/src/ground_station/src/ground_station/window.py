@@ -36,7 +36,7 @@ class Window:
         self._shown.append(shown)
 
     def receive(self, now_ns: int, size_bytes: int, delay_ns: int) -> None:
-        """Note a packet and how long after its frame's exposure it came."""
+        """Note a packet and how long it was under way."""
         self._received.append((now_ns, size_bytes))
         self._delays.append((now_ns, delay_ns))
 

@@ -33,8 +33,8 @@ class SentFrame:
 @dataclass
 class _Kept:
     sent_ns: int
-    stamp_ns: int
-    datagrams: tuple[bytes, ...]
+    packets: tuple[VideoPacket, ...]
+    size_bytes: int
     resent_ns: dict[int, int]
 
 
@@ -104,18 +104,19 @@ class VideoSender:
         waiting = [kept for frame_id, kept in self._kept.items() if frame_id > self.report.newest_id]
         if not waiting:
             return False
-        bits = 8 * sum(len(datagram) for kept in waiting for datagram in kept.datagrams)
+        bits = 8 * sum(kept.size_bytes for kept in waiting)
         carried_bps = max(self.report.received_bps, self._rate.target_bps / 4.0)  # little has come while little was sent
         return now_ns - waiting[0].sent_ns > UNDER_WAY_S * NS or bits > WINDOW_S * carried_bps
 
     def _send(self, payloads: tuple[bytes, ...], stamp_ns: int, now_ns: int, *, key: bool, size_bytes: int) -> SentFrame:
         frame_id = self._next_id
         self._next_id += 1
-        datagrams = tuple(
-            VideoPacket(self._number(), Mark(frame_id, stamp_ns, index, len(payloads), key), payload).serialize(self._seal)
+        packets = tuple(
+            VideoPacket(self._number(), Mark(frame_id, stamp_ns, index, len(payloads), key), payload)
             for index, payload in enumerate(payloads)
         )
-        self._kept[frame_id] = _Kept(now_ns, stamp_ns, datagrams, {})
+        datagrams = tuple(packet.sent(now_ns).serialize(self._seal) for packet in packets)
+        self._kept[frame_id] = _Kept(now_ns, packets, sum(map(len, datagrams)), {})
         self._sent_ns = now_ns
         while len(self._kept) > KEPT_FRAMES:
             self._kept.popitem(last=False)
@@ -123,10 +124,11 @@ class VideoSender:
 
     def _again(self, frame_id: int, index: int, now_ns: int) -> list[bytes]:
         kept = self._kept.get(frame_id)
-        if kept is None or index >= len(kept.datagrams) or now_ns - kept.resent_ns.get(index, 0) < RESEND_AFTER_NS:
+        if kept is None or index >= len(kept.packets) or now_ns - kept.resent_ns.get(index, 0) < RESEND_AFTER_NS:
             return []
         kept.resent_ns[index] = now_ns
-        return [kept.datagrams[index]]  # the same sequence number: to a player it is a packet that came late
+        # The same sequence number: to a player it is a packet that came late.
+        return [kept.packets[index].sent(now_ns).serialize(self._seal)]
 
     def _number(self) -> int:
         self._sequence = (self._sequence + 1) & 0xFFFF

@@ -1,8 +1,8 @@
 """What crosses the radio: RTP packets whose header extension names their frame, and sealed messages. RFC 3550, RFC 8285.
 
-Every packet carries the id and the stamp of its frame, its place among the frame's packets, and a tag that only a holder of the
-key can make. A player that knows nothing of them skips the extension, as RFC 8285 demands. Frames are put together by id and place, not
-by sequence number: what is repeated, late or out of order finds its place or none.
+Every packet carries the id and the stamp of its frame, its place among the frame's packets, how long after the exposure it was sent, and a
+tag that only a holder of the key can make. A player that knows nothing of them skips the extension, as RFC 8285 demands. Frames are put
+together by id and place, not by sequence number: what is repeated, late or out of order finds its place or none.
 """
 
 from __future__ import annotations
@@ -12,7 +12,7 @@ import hmac
 import json
 import struct
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Any
 
 from aiortc.rtp import HeaderExtensionsMap, RtpPacket, pack_header_extensions, unpack_header_extensions
@@ -21,8 +21,10 @@ PAYLOAD_TYPE = 96  # dynamic, RFC 3551; the SDP says H264/90000
 SSRC = 0x616C756C
 CLOCK_HZ = 90_000
 NS = 1_000_000_000
-MARK_ID, TAG_ID = 1, 2  # of the elements of the header extension
+MARK_ID, TAG_ID, HELD_ID = 1, 2, 3  # of the elements of the header extension
 TAG_BYTES = 8
+_HELD = struct.Struct("!H")
+_MOST_HELD_MS = 0xFFFF
 _MARK = struct.Struct("!IQHH")  # 16 bytes, the most that a one-byte header element can hold
 _KEY_FLAG = 0x8000
 
@@ -74,11 +76,25 @@ class Seal:
 
 @dataclass(frozen=True)
 class VideoPacket:
-    """One RTP packet of a frame; ``payload`` as RFC 6184 says."""
+    """One RTP packet of a frame; ``payload`` as RFC 6184 says.
+
+    ``held_ms``: from the exposure to this packet's sending, 65535 at most. What the camera, the encoder and the sender's computer take, or
+    the wait before it is sent again, is nothing that the radio does.
+    """
 
     sequence: int
     mark: Mark
     payload: bytes
+    held_ms: int = 0
+
+    def sent(self, now_ns: int) -> VideoPacket:
+        """Return it as it is sent at a moment of mission clock."""
+        return replace(self, held_ms=min(max(0, (now_ns - self.mark.stamp_ns) // (NS // 1000)), _MOST_HELD_MS))
+
+    @property
+    def sent_ns(self) -> int:
+        """When it was sent, mission clock, to the millisecond."""
+        return self.mark.stamp_ns + self.held_ms * (NS // 1000)
 
     @property
     def rtp_timestamp(self) -> int:
@@ -95,8 +111,8 @@ class VideoPacket:
             ssrc=SSRC,
             payload=self.payload,
         )
-        mark = self.mark.pack()
-        return bytes(packet.serialize(_Elements([(MARK_ID, mark), (TAG_ID, seal.tag(_sealed(packet, mark)))])))
+        mark, held = self.mark.pack(), _HELD.pack(self.held_ms)
+        return bytes(packet.serialize(_Elements([(MARK_ID, mark), (HELD_ID, held), (TAG_ID, seal.tag(_sealed(packet, mark + held)))])))
 
     @classmethod
     def parse(cls, data: bytes, seal: Seal) -> VideoPacket:
@@ -107,11 +123,11 @@ class VideoPacket:
         except (ValueError, struct.error, IndexError) as error:
             raise WireError(f"no RTP packet: {error}") from error
         found = dict(elements.values)
-        if MARK_ID not in found or TAG_ID not in found:
+        if not {MARK_ID, HELD_ID, TAG_ID} <= set(found) or len(found[HELD_ID]) != _HELD.size:
             raise WireError("an RTP packet without a frame mark")
-        if not seal.holds(_sealed(packet, found[MARK_ID]), found[TAG_ID]):
+        if not seal.holds(_sealed(packet, found[MARK_ID] + found[HELD_ID]), found[TAG_ID]):
             raise WireError("the tag of an RTP packet is wrong")
-        return cls(packet.sequence_number, Mark.unpack(found[MARK_ID]), packet.payload)
+        return cls(packet.sequence_number, Mark.unpack(found[MARK_ID]), packet.payload, *_HELD.unpack(found[HELD_ID]))
 
 
 class _Elements(HeaderExtensionsMap):  # type: ignore[misc]  # aiortc is seen untyped
@@ -131,8 +147,8 @@ class _Elements(HeaderExtensionsMap):  # type: ignore[misc]  # aiortc is seen un
         return int(profile), bytes(value)
 
 
-def _sealed(packet: RtpPacket, mark: bytes) -> bytes:
-    return struct.pack("!HIB", packet.sequence_number, packet.timestamp, packet.marker) + mark + bytes(packet.payload)
+def _sealed(packet: RtpPacket, elements: bytes) -> bytes:
+    return struct.pack("!HIB", packet.sequence_number, packet.timestamp, packet.marker) + elements + bytes(packet.payload)
 
 
 def pack_message(kind: str, values: Sequence[object], seal: Seal) -> bytes:
