@@ -12,6 +12,7 @@ ALULA_ROOT = Path(__file__).resolve().parents[1]
 ROS1_PACKAGES = (
     "uav_guidance",
     "resource_reporter",
+    "node_core",
     "skillset_ros1",
     "perception_core",
     "zed_depth",
