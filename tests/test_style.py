@@ -39,6 +39,9 @@ TYPED = [
     "tools/mission_mutations",
     *(f"ros2_ws/src/{name}/{name}" for name in ROS2_PACKAGES),
     *(f"ros1_ws/src/{name}/src/{name}" for name in ROS1_PACKAGES),
+    "examples/rover/ros2_ws/src/rover_robot/rover_robot",
+    "examples/rover/ros1_ws/src/rover_simulator/src/rover_simulator",
+    "examples/rover/ros1_ws/src/rover_navigation/src/rover_navigation",
 ]
 
 
