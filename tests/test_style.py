@@ -12,6 +12,7 @@ ALULA_ROOT = Path(__file__).resolve().parents[1]
 ROS1_PACKAGES = (
     "uav_guidance",
     "resource_reporter",
+    "node_core",
     "skillset_ros1",
     "perception_core",
     "zed_depth",
@@ -38,6 +39,9 @@ TYPED = [
     "tools/mission_mutations",
     *(f"ros2_ws/src/{name}/{name}" for name in ROS2_PACKAGES),
     *(f"ros1_ws/src/{name}/src/{name}" for name in ROS1_PACKAGES),
+    "examples/rover/ros2_ws/src/rover_robot/rover_robot",
+    "examples/rover/ros1_ws/src/rover_simulator/src/rover_simulator",
+    "examples/rover/ros1_ws/src/rover_navigation/src/rover_navigation",
 ]
 
 

@@ -28,7 +28,7 @@ def finish(spec: RunSpec, mission_exit: int | None, monitor: Monitor | None = No
             seed=spec.seed,
             out_dir=out,
             faults=list(spec.faults),
-            died=[{"name": d.name, "when_s": d.when_s, "how": d.how} for d in died],
+            died=[{"name": d.name, "when_s": d.when_s, "how": d.how, "again_s": d.again_s} for d in died],
             mission_exit=mission_exit,
             conformance=None if monitor is None else monitor.verdict.as_dict(),
         )

@@ -9,22 +9,21 @@ from __future__ import annotations
 import contextlib
 import functools
 import logging
-import math
 import os
 import signal
 import sys
 import threading
 import time
-from collections.abc import Mapping
+from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
 from alula.common.processes import end_run
 from alula.common.scenarios import load_scenario
 from alula.common.signals import on_end_signal
-from alula.live.part import Consequence, RunPart, part_of_robot
+from alula.live.part import DEAD_S, Consequence, RunPart, part_of_robot
 from alula.live.spec import RunSpec
-from alula.report.deaths import Death, describe_exit, note_death
+from alula.report.deaths import Death, describe_exit, note_again, note_death
 from alula.report.ends import SIGNAL, SUPERVISOR, ReportedEnd, note_end
 from alula_flight.departure import Departure
 from alula_flight.launch import launch_arguments, launch_file
@@ -40,14 +39,25 @@ ABORT_TIMEOUT_S = 150.0  # wall clock, for the mission to bring the robot to res
 log = logging.getLogger("alula.supervisor")
 
 
+@dataclass(frozen=True)
+class Dead:
+    """A process that died in its ``spawn_count``-th life."""
+
+    death: Death
+    spawn_count: int
+
+
 class Watch:
     """Listens to roslaunch's process monitor: which process died, and with which code."""
 
-    def __init__(self, out: Path, clock: MissionClock, consequences: Mapping[str, Consequence]) -> None:
+    def __init__(self, out: Path, clock: MissionClock, part: RunPart) -> None:
         self._out = out
         self._clock = clock
-        self._consequences = {**OF_EVERY_ROBOT, **consequences}
+        self._consequences = {**OF_EVERY_ROBOT, **part.consequences}
+        self._stays_dead = part.stays_dead
         self._told: set[tuple[str, int]] = set()
+        self._dead: dict[str, Dead] = {}
+        """By the process monitor's name."""
         self._launch: Any = None
         self.mission_exit: int | None = None
         self.worst = Consequence.GO_ON
@@ -72,10 +82,22 @@ class Watch:
         if name == "mission" and exit_code is not None and exit_code >= 0:
             self.mission_exit = exit_code
         else:
-            respawned = bool(getattr(process, "respawn", False)) and math.isfinite(getattr(process, "respawn_delay", 0.0))
-            note_death(self._out, Death(name=name, how=describe_exit(exit_code), when_s=self._clock.now_s, respawned=respawned))
-            self._note_consequence(self._consequences.get(name, Consequence.GO_ON), f"{name} died ({describe_exit(exit_code)})")
+            death = Death(name=name, how=describe_exit(exit_code), when_s=self._clock.now_s)
+            note_death(self._out, death)
+            self._dead[process_name] = Dead(death, key[1])
+            self._note_consequence(self._consequences.get(name, Consequence.GO_ON), f"{name} died ({death.how})")
         self.changed.set()
+
+    def look(self) -> None:
+        """Note which of the dead run again, and what follows where one does not."""
+        now_s = self._clock.now_s
+        for process_name, dead in list(self._dead.items()):
+            name = dead.death.name
+            if getattr(self._launch.pm.get_process(process_name), "spawn_count", 0) > dead.spawn_count:
+                del self._dead[process_name]
+                note_again(self._out, name, now_s)
+            elif now_s is not None and now_s - (dead.death.when_s or 0.0) > DEAD_S:
+                self._note_consequence(self._stays_dead.get(name, Consequence.GO_ON), f"{name} died ({dead.death.how}) and stayed dead")
 
     def _note_consequence(self, consequence: Consequence, death: str) -> None:
         order = list(Consequence)
@@ -91,7 +113,7 @@ class Supervisor:
         self._part = part
         self._out = Path(spec.out_dir)
         self._clock = MissionClock()
-        self._watch = Watch(self._out, self._clock, part.consequences)
+        self._watch = Watch(self._out, self._clock, part)
         self._serves = not load_scenario(spec.scenario).mission
         self._asked_to_end: signal.Signals | None = None
         self._began_s: float | None = None  # mission clock
@@ -182,6 +204,7 @@ class Supervisor:
             self._look_for_the_front()
             self._beginning.look()
             self._apply_faults()
+            self._watch.look()
             if self._watch.mission_exit is not None:
                 if self._watch.mission_exit != 0 or self._serves:
                     self._part.bring_to_rest(self._clock)  # what the mission could not, or there was none
@@ -193,6 +216,8 @@ class Supervisor:
                 self._ends(self._watch.worst_death)
                 return GIVEN_UP
             if self._watch.worst is Consequence.REST:
+                if process_of(launch.pm, "mission") is not None:
+                    self._ends(self._watch.worst_death)
                 self._part.bring_to_rest(self._clock)
                 return GIVEN_UP
             asked = self._asked_to_end is not None or self._front_died or self._watch.worst is Consequence.ABORT or self._over_time

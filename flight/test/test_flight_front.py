@@ -8,7 +8,7 @@ import subprocess
 import sys
 import threading
 import uuid
-from dataclasses import asdict
+from dataclasses import asdict, replace
 
 import psutil
 import pytest
@@ -22,7 +22,7 @@ from alula.live.options import RunOption, words_of
 from alula.live.part import RunPart
 from alula.live.spec import RequestError, RunSpec
 from alula.model.execution_state import ExecutionState
-from alula.report.deaths import Death, describe_exit, note_death, read_deaths
+from alula.report.deaths import Death, describe_exit, note_again, note_death, read_deaths
 from alula.report.live import LiveEvents, event_line
 from alula.report.verdict import conformance_lines
 from alula.runtime.core.events import ExecutionEvent, TransitionEvent
@@ -202,13 +202,17 @@ def test_a_death_that_can_not_be_written_ends_nothing(tmp_path):
 
 
 def test_deaths_are_written_at_once_and_a_cut_line_is_left_out(tmp_path):
-    death = Death("driver", describe_exit(-9), 12.5, respawned=True)
+    death = Death("driver", describe_exit(-9), 12.5)
     note_death(tmp_path, death)
+    note_death(tmp_path, death)
+    note_again(tmp_path, "driver", 14.0)
     with (tmp_path / FILE).open("a") as file:
         file.write('{"kind": "death", "name": "ros_br')
-    assert read_deaths(tmp_path) == [death]
-    assert "SIGKILL" in death.sentence()
-    assert "started again" in death.sentence()
+    assert read_deaths(tmp_path) == [replace(death, again_s=14.0), death]
+    assert [f"{one.sentence()}; {one.fate}" for one in read_deaths(tmp_path)] == [
+        "driver died (signal SIGKILL) at 12.5 s of mission clock; it was started again at 14.0 s of mission clock",
+        "driver died (signal SIGKILL) at 12.5 s of mission clock; it stayed dead",
+    ]
 
 
 def test_live_lines_wait_for_whole_events(tmp_path):

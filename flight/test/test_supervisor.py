@@ -10,7 +10,7 @@ from types import SimpleNamespace
 
 import pytest
 
-from alula.live.part import Clock, Consequence, RunPart
+from alula.live.part import DEAD_S, Clock, Consequence, RunPart
 from alula.live.spec import RunSpec
 from alula.report.deaths import read_deaths
 from alula.report.ends import OPERATOR, SIGNAL, SUPERVISOR, ReportedEnd, note_end, read_end
@@ -32,7 +32,7 @@ class StartingLaunch:
 
 
 def test_a_death_while_roslaunch_still_starts_is_noted(tmp_path: Path) -> None:
-    watch = Watch(tmp_path, MissionClock(), {"simulator": Consequence.END})
+    watch = Watch(tmp_path, MissionClock(), Part())
     launch = StartingLaunch(watch)
     watch.follow(launch)
     launch.start()
@@ -44,6 +44,7 @@ class Part(RunPart):
     """A robot with a simulator."""
 
     consequences: Mapping[str, Consequence] = {"simulator": Consequence.END}
+    stays_dead: Mapping[str, Consequence] = {"ros_bridge": Consequence.REST}
 
     rested = 0
 
@@ -61,8 +62,8 @@ class Flight:
         self.part = Part()
         self.supervisor = Supervisor(RunSpec(scenario, str(out), "id", limit_s=limit_s), self.part)
         self.supervisor._clock.begin(simulated=True)
-        process = SimpleNamespace(spawn_count=1, respawn=False)
-        self.launch = SimpleNamespace(pm=SimpleNamespace(get_process=lambda _: process, get_active_names=list))
+        self.process = SimpleNamespace(spawn_count=1)
+        self.launch = SimpleNamespace(pm=SimpleNamespace(get_process=lambda _: self.process, get_active_names=list))
         self.supervisor._watch.follow(self.launch)
 
     def clock(self, now_s: float) -> None:
@@ -96,6 +97,28 @@ def test_a_death_that_ends_a_run_is_the_reason_that_is_told(name: str, flight: F
     flight.died(name)
     assert flight.ends() == GIVEN_UP
     assert read_end(tmp_path) == ReportedEnd(SUPERVISOR, f"{name} died (exit code 1)")
+
+
+@pytest.mark.parametrize(("again_s", "worst"), [(None, Consequence.REST), (4.0, Consequence.GO_ON), (9.0, Consequence.GO_ON)])
+def test_a_process_that_stays_dead_has_another_consequence_than_one_that_runs_again(
+    again_s: float | None, worst: Consequence, flight: Flight, tmp_path: Path
+) -> None:
+    flight.clock(30.0)
+    flight.died("ros_bridge")
+    watch = flight.supervisor._watch
+    for since_s in range(int(DEAD_S)):
+        flight.clock(30.0 + since_s)
+        if since_s == again_s:
+            flight.process.spawn_count += 1
+        watch.look()
+        assert watch.worst is Consequence.GO_ON
+    flight.clock(30.0 + DEAD_S + 0.1)
+    watch.look()
+    assert watch.worst is worst
+    (death,) = read_deaths(tmp_path)
+    assert death.again_s == (None if again_s is None else 30.0 + again_s)
+    if worst is Consequence.REST:
+        assert (flight.ends(), flight.part.rested) == (GIVEN_UP, 1)
 
 
 def test_a_signal_from_outside_is_named(flight: Flight, tmp_path: Path) -> None:

@@ -123,7 +123,7 @@ class RecordingHost:
     def done(self, stamp_ns: int) -> None:
         """Wait for nobody."""
 
-    def report(self, resource: str, state: str, reason: str, *, insist: bool = True) -> None:
+    def report(self, resource: str, state: str, reason: str = "", *, insist: bool = True) -> None:
         """Take nothing."""
 
     def offer(self, work: Callable[[], None]) -> None:

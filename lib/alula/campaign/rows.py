@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import functools
 import json
+import math
 import subprocess
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
@@ -135,7 +136,8 @@ def _ended(died: Mapping[str, Any], events: Sequence[EngineEvent], effects: Effe
     """Return the end of a process, as the summary tells of it, as a fault; without a time it ended before the mission clock ran."""
     begun_s = min((event.stamp_s for event in events), default=0.0)
     at_s = begun_s if died["when_s"] is None else origin_of(events) + died["when_s"]
-    return Fault(died["name"], at_s, effects=effects.of(died["name"]))
+    until_s = math.inf if died.get("again_s") is None else origin_of(events) + died["again_s"]
+    return Fault(died["name"], at_s, until_s, effects.of(died["name"]))
 
 
 # --- in the simulator ---------------------------------------------------------------------------------------------------

@@ -17,7 +17,7 @@ from alula.common.faults import FaultChange
 from alula.common.record import Entry
 
 FILE = "run_log.jsonl"
-DEATH, FAULT, WAIT, ACT, END, MOCKED, MISSION = "death", "fault", "wait", "act", "end", "mocked", "mission"
+DEATH, AGAIN, FAULT, WAIT, ACT, END, MOCKED, MISSION = "death", "again", "fault", "wait", "act", "end", "mocked", "mission"
 """The kinds of lines: see ``alula.report.deaths``, ``alula.common.faults.FaultChange``, ``read_waits``, ``note_act``,
 ``alula.report.ends``, ``note_mocked`` and ``account``."""
 

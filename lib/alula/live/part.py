@@ -21,6 +21,10 @@ class Consequence(Enum):
     END = "end the run"  # there is nothing left to run
 
 
+DEAD_S = 10.0
+"""Mission clock: a node that was not started again for so long stays dead."""
+
+
 class Clock(Protocol):
     """The mission clock as the supervisor sees it."""
 
@@ -51,6 +55,8 @@ class RunPart:
     """What can fail in every scenario, each with the ways in which it can; scenarios add their own."""
     consequences: Mapping[str, Consequence] = {}
     """Of the death of a node; of one that is not here the run goes on."""
+    stays_dead: Mapping[str, Consequence] = {}
+    """Of the death of a node that does not run again within `DEAD_S`."""
     cameras: Mapping[str, str] = {}
     """Topics of sensor_msgs/Image that the operator's page shows thumbnails of, by the name there."""
 

@@ -4,29 +4,38 @@ from __future__ import annotations
 
 import contextlib
 import signal
-from dataclasses import asdict, dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
 
-from alula.common.run_log import DEATH, note, read
+from alula.common.run_log import AGAIN, DEATH, note, read
+from alula.report.files import finite
 
 
 @dataclass(frozen=True)
 class Death:
     """A process that ended without being told to.
 
-    ``when_s``: absolute mission clock, None before it runs. ``respawned``: the launch file has it started again.
+    ``when_s``: absolute mission clock, None before it runs. ``again_s``: when it ran again, 0 before the mission clock runs; None: it
+    stayed dead.
     """
 
     name: str
     how: str
     when_s: float | None
-    respawned: bool = False
+    again_s: float | None = None
 
     def sentence(self) -> str:
-        """Return what a person wants to read."""
-        when = "" if self.when_s is None else f" at {self.when_s:.1f} s of mission clock"
-        again = "; it was started again" if self.respawned else ""
-        return f"{self.name} died ({self.how}){when}{again}"
+        """Return how it ended, in words."""
+        return f"{self.name} died ({self.how}){_at(self.when_s)}"
+
+    @property
+    def fate(self) -> str:
+        """Say what became of it."""
+        return "it stayed dead" if self.again_s is None else f"it was started again{_at(self.again_s or None)}"
+
+
+def _at(mission_s: float | None) -> str:
+    return "" if mission_s is None else f" at {mission_s:.1f} s of mission clock"
 
 
 def describe_exit(code: int | None) -> str:
@@ -37,14 +46,23 @@ def describe_exit(code: int | None) -> str:
 
 
 def note_death(out: Path, death: Death) -> None:
-    """Write down that a process of a run died."""
-    note(out, DEATH, asdict(death))
+    """Write down that a process of a run died; that it runs again is written by ``note_again``."""
+    note(out, DEATH, {"name": death.name, "how": death.how, "when_s": death.when_s})
+
+
+def note_again(out: Path, name: str, at_s: float | None) -> None:
+    """Write down that a process that died runs again; seconds of mission clock, None before it runs."""
+    note(out, AGAIN, {"name": name, "again_s": at_s or 0.0})
 
 
 def read_deaths(out: Path) -> list[Death]:
-    """Return which processes of a run died."""
+    """Return which processes of a run died, in that order, with what became of each."""
     deaths = []
     for values in read(out, DEATH):
         with contextlib.suppress(TypeError):
             deaths.append(Death(**values))
+    for values in read(out, AGAIN):
+        at = next((at for at, one in enumerate(deaths) if one.name == values.get("name") and one.again_s is None), None)
+        if at is not None:
+            deaths[at] = replace(deaths[at], again_s=finite(values.get("again_s")))
     return deaths

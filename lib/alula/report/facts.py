@@ -9,11 +9,12 @@ from typing import TypedDict
 
 
 class Death(TypedDict):
-    """A process that ended without being told to. ``when_s``: absolute mission clock, None if unknown."""
+    """A process that ended without being told to: when, absolute mission clock, None if unknown; when it ran again, None: never."""
 
     name: str
     when_s: float | None
     how: str
+    again_s: float | None
 
 
 @dataclass(frozen=True)

@@ -99,8 +99,12 @@ def _died(facts: RunFacts, scenario: Scenario, observed: Observed, effects: Effe
         if death["when_s"] is not None and death["name"] not in ended:
             yield (
                 FaultChange(death["name"], DIED, death["when_s"]),
-                Fault(death["name"], death["when_s"], effects=effects.of(death["name"]), injected=False),
+                Fault(death["name"], death["when_s"], _until(death["again_s"]), effects.of(death["name"]), injected=False),
             )
+
+
+def _until(again_s: float | None) -> float:
+    return math.inf if again_s is None else again_s
 
 
 def summarise_response(one: FaultResponse, phases: Phases) -> ResponseSummary:

@@ -146,7 +146,7 @@ def summarise(
         "faults": list(facts.faults),
         "injected": [InjectedFault(sensor=f.sensor, mode=f.mode, t_s=phases.since(f.t_s)) for f in injected(observed)],
         "answers": [summarise_response(one, phases) for one in responses],
-        "died": [Death(name=death["name"], when_s=phases.since(death["when_s"]), how=death["how"]) for death in facts.died],
+        "died": [Death({**one, "when_s": phases.since(one["when_s"]), "again_s": phases.since(one["again_s"])}) for one in facts.died],
         "mission_exit": facts.mission_exit,
         "conformance": None if facts.conformance is None else dict(facts.conformance),
         "mock": mock,

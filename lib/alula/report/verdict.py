@@ -66,17 +66,17 @@ def outcome_words(summary: Mapping[str, Any], died: Sequence[Death], out: Path, 
         return f"mission {reason}"
     if outcome is not None:
         return MEANING.get(str(outcome), f"outcome: {outcome}") + (f": {reason}" if reason else "")
-    if code in BY_EXIT_CODE and all(death.respawned for death in died):  # else it may be the supervisor's
+    if code in BY_EXIT_CODE and all(death.again_s is not None for death in died):  # else it may be the supervisor's
         return f"{MEANING[BY_EXIT_CODE[code]]} (by its exit code; its own account is lost)"
     names = ", ".join(dict.fromkeys(death.name for death in died))
     return f"the mission came to no outcome: {f'{names} died' if names else 'the run ended early'}; {out / 'logs'} tells why"
 
 
 def death_lines(died: Sequence[Death]) -> list[str]:
-    """Return how each process died the last time, and how often it did."""
+    """Return how each process died the last time, what became of it, and how often it did."""
     last = {death.name: death for death in died}
     times = {name: sum(death.name == name for death in died) for name in last}
-    return [f"  {death.sentence()}" + (f" ({times[name]} times in all)" if times[name] > 1 else "") for name, death in last.items()]
+    return [f"  {one.sentence()}; {one.fate}" + (f" ({times[name]} times in all)" if times[name] > 1 else "") for name, one in last.items()]
 
 
 def world_lines(summary: Mapping[str, Any]) -> list[str]:

@@ -30,7 +30,16 @@ def test_a_fallback_that_ended_badly_is_told_with_how_long_it_held(browser: Any,
 
 
 UNASKED = {
-    "ground_station": ("the process ground_station died", "ground_station died", ["The process ground_station died: signal SIGSEGV."]),
+    "ground_station": (
+        "the process ground_station died",
+        "ground_station died",
+        ["The process ground_station died: signal SIGSEGV; it stayed dead."],
+    ),
+    "encoder": (
+        "the process encoder died",
+        "encoder died",
+        ["The process encoder died: signal SIGSEGV; it ran again after 1.5 s."],
+    ),
     "radio": ("radio was lost", "radio lost", ["The radio was lost.", "The radio works again."]),
 }
 """Of what failed without being made to: its name, its mark on the timeline, and what is told of it."""
@@ -41,8 +50,9 @@ def test_what_failed_without_being_made_to_is_the_cause_of_what_followed(browser
     what, mark, sentences = UNASKED[sensor]
     story, summary = overtaken()
     (answer,) = summary["answers"]
-    died = [] if sensor == "radio" else [{"name": sensor, "when_s": 40.0, "how": "signal SIGSEGV"}]
-    mode, until_s = ("died", None) if died else ("", 50.0)
+    again_s = 41.5 if sensor == "encoder" else None
+    died = [] if sensor == "radio" else [{"name": sensor, "when_s": 40.0, "how": "signal SIGSEGV", "again_s": again_s}]
+    mode, until_s = ("died", again_s) if died else ("", 50.0)
     summary |= {"answers": [{**answer, "sensor": sensor, "mode": mode, "injected": False, "until_s": until_s}], "died": died}
     page = Page(browser, make_story_report(tmp_path, [entry for entry in story if entry[1] != "/fault"], summary))
     page.wait(DRAWN)

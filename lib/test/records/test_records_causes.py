@@ -231,6 +231,23 @@ def test_what_a_fault_of_the_robot_shows_is_an_alarm_and_where_a_resource_begins
     assert [alarms.of(*one.split()) for one in told] == [A.ALWAYS, A.AWAY, A.NONE, A.ALWAYS, A.AWAY, A.NONE, A.ALWAYS]
 
 
+@pytest.mark.parametrize(
+    ("shown", "blind"), [("states: {rover.scanner_status: BLIND}", Alarm.AWAY), ("ends: {rover.drive: sees}", Alarm.NONE)]
+)
+def test_where_a_file_tells_what_faults_show_the_state_in_which_a_resource_begins_is_bad_only_by_a_fault(
+    shown, blind, monkeypatch, tmp_path
+):
+    """As a charger that is OFF: it breaks an invariant of whoever charges, and a robot on its way has no need of it."""
+    (tmp_path / "robot.yaml").write_text("name: rover\n")
+    (tmp_path / "skillsets").mkdir()
+    (tmp_path / "skillsets/rover.skill").write_text(ROVER)
+    (tmp_path / "skillsets/faults.yaml").write_text(f"faults: {{scanner: {{{shown}}}}}")
+    monkeypatch.setenv("ALULA_ROBOT", str(tmp_path))
+    alarms = effects_of_robot().alarms
+    assert alarms.of("rover.scanner_status", "BLIND") is blind
+    assert alarms.of("rover.scanner_status", "DEAD") is Alarm.ALWAYS, "what breaks an invariant and is not how it begins"
+
+
 FLOWN = {
     ("mapping", "zed@20-30", "zed@50"): [("zed, ends again", "LiDAR navigation", 0.35), ("zed", "nothing failed", None)],
     ("mapping", "lidar@10", "zed@20"): [("lidar", "given up", 0.01), ("zed", "given up", 0.36)],

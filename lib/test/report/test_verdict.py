@@ -37,20 +37,24 @@ OUT = Path("/runs/one")
 
 def test_a_flight_whose_nodes_all_died_names_them_and_their_logs() -> None:
     died = [Death("uav_simulator", "exit code 1", None)]
-    died += [Death("zed_depth", "exit code 1", None, respawned=True) for _ in range(3)]
+    died += [Death("zed_depth", "exit code 1", 4.0, again_s=5.5) for _ in range(3)]
     lines = verdict_lines({"outcome": None, "mission_exit": 1, "landed": None, "collisions": None}, died, OUT)
     assert lines == [
         "",
         "the mission came to no outcome: uav_simulator, zed_depth died; /runs/one/logs tells why",
-        "  uav_simulator died (exit code 1)",
-        "  zed_depth died (exit code 1); it was started again (3 times in all)",
+        "  uav_simulator died (exit code 1); it stayed dead",
+        "  zed_depth died (exit code 1) at 4.0 s of mission clock; it was started again at 5.5 s of mission clock (3 times in all)",
     ]
 
 
 def test_a_mission_that_could_not_start_tells_no_figures() -> None:
     summary = {"outcome": "not_started", "reason": "the mission clock stands still", "landed": None, "collisions": None}
     lines = verdict_lines(summary, [Death("uav_simulator", "exit code 1", None)], OUT)
-    assert lines == ["", "the mission could not start: the mission clock stands still", "  uav_simulator died (exit code 1)"]
+    assert lines == [
+        "",
+        "the mission could not start: the mission clock stands still",
+        "  uav_simulator died (exit code 1); it stayed dead",
+    ]
 
 
 def test_what_is_not_known_of_a_flight_is_said_so() -> None:

@@ -82,6 +82,10 @@ function pauses(run) {
 }
 
 /** When the mission was aborted at or after a moment; Infinity: it was not. */
+const fateOf = (when, again) => { // undefined: an older record does not tell
+  if (again === undefined) return "";
+  return again === null ? "; it stayed dead" : `; it ran again${when === null ? "" : ` after ${seconds(again - when)}`}`;
+};
 const abortAfter = (run, t) => run.operator.find(({ by, command, t: at }) => by === "mission" && command === "abort" && at >= t)?.t ?? Infinity;
 
 const OPERATOR_ACTS = { start: "started the mission", take: "took command", off: "switched everything off" };
@@ -106,7 +110,7 @@ function account(run) {
   }
   if (recovery?.fallback_running_s != null) say(zero + recovery.fallback_running_s, fallbackTold(run, zero + recovery.fallback_running_s), "reaction");
   if (recovery?.moving_again_s != null) say(zero + recovery.moving_again_s, "The robot moves on.", "reaction");
-  for (const { name, when_s: when, how } of run.facts["/summary"]?.died ?? []) say(when === null ? run.begin : zero + when, `The process ${name} died: ${how}.`, "bad");
+  for (const { name, when_s: when, how, again_s: again } of run.facts["/summary"]?.died ?? []) say(when === null ? run.begin : zero + when, `The process ${name} died: ${how}${fateOf(when, again)}.`, "bad");
   const back = comingBack(run);
   const where = restWhere(run);
   const crash = run.facts["/summary"]?.crash;
@@ -168,9 +172,9 @@ function answers(run) {
   faultsOf(run).forEach(({ text, t, until, detected }, index) => {
     if (!groups.has(index)) rows.push({ what: text, t, until, done: running ? "nothing so far" : detected === null ? "nothing: it was not detected" : "nothing: no skill failed of it", cost: "" });
   });
-  for (const { name, when_s: when, how } of run.facts["/summary"]?.died ?? []) {
+  for (const { name, when_s: when, how, again_s: again } of run.facts["/summary"]?.died ?? []) {
     const t = when === null ? run.begin : origin(run) + when;
-    if (!rows.some((row) => Math.abs(row.t - t) < REACTION_S)) rows.push({ what: `the process ${name} died: ${how}`, t, done: "nothing that the record tells of", cost: "" });
+    if (!rows.some((row) => Math.abs(row.t - t) < REACTION_S)) rows.push({ what: `the process ${name} died: ${how}${fateOf(when, again)}`, t, done: "nothing that the record tells of", cost: "" });
   }
   rows.sort(byTime);
   const whole = costs(run);

@@ -1,8 +1,9 @@
 """Which states of resources are bad news, by the robot's models and its file of faults; no name of a state says it.
 
 A state is an alarm that the functional layer reports, and that a fault of the robot shows (``faults.yaml``) or that breaks an invariant
-of a skill, whatever the other resources are. In the state in which a resource begins, nothing has gone wrong yet: it is an alarm only
-while the robot is away.
+of a skill, whatever the other resources are. In the state in which a resource begins, nothing has gone wrong yet, and a skill whose
+invariant it breaks may be one that nobody needs, as charging away from the dock: it is an alarm only while the robot is away, and only
+where a fault shows it. Where no file tells what faults show, the invariants alone decide.
 """
 
 from __future__ import annotations
@@ -43,17 +44,20 @@ class Alarms:
         return Alarm.ALWAYS if said in self.always else Alarm.AWAY if said in self.away else Alarm.NONE
 
 
-def alarms_of(skillsets: Iterable[Skillset], shown: Iterable[str] = ()) -> Alarms:
-    """Return the alarms of models; ``shown`` are patterns of what faults show, ``skillset.resource STATE``."""
-    patterns = [pattern for pattern in shown if not pattern.endswith(f" {ANY}")]
+def alarms_of(skillsets: Iterable[Skillset], shown: Iterable[str] | None = None) -> Alarms:
+    """Return the alarms of models; ``shown`` are patterns of what faults show, ``skillset.resource STATE``; None: nothing tells them."""
+    patterns = [pattern for pattern in shown or () if not pattern.endswith(f" {ANY}")]
     always: set[str] = set()
     away: set[str] = set()
     for skillset in skillsets:
         breaking = set(breaking_states(skillset))
         for resource, state in _reported(skillset):
             said = f"{skillset.name}.{resource.name} {state}"
-            if said in breaking or any(fnmatchcase(said, pattern) for pattern in patterns):
-                (away if state == resource.initial else always).add(said)
+            by_fault = any(fnmatchcase(said, pattern) for pattern in patterns)
+            if state != resource.initial and (by_fault or said in breaking):
+                always.add(said)
+            elif by_fault or (shown is None and said in breaking):
+                away.add(said)
     return Alarms(frozenset(always), frozenset(away))
 
 

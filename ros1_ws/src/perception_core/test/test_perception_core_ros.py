@@ -10,10 +10,10 @@ import pytest
 from geometry_msgs.msg import Quaternion, Transform, Vector3
 from std_msgs.msg import Header
 
+from node_core.ros import NewestWorker
 from perception_core import Nearest, SettingsError, tunable
 from perception_core.clouds import sweep_of_cloud
 from perception_core.conversions import cloud_message, depth_message, matrix_of_transform, obstacle_message
-from perception_core.ros import NewestWorker
 from perception_core.ros.settings import override
 
 

@@ -53,16 +53,25 @@ def run(log: Log, id_: str, name: str, at_s: float, *end: Any) -> None:
 
 
 def report(
-    folder: Path, log: Log, *faults: Fault, scenario: str = "mapping", asked: tuple[str, ...] = (), died: dict[str, float] | None = None
+    folder: Path,
+    log: Log,
+    *faults: Fault,
+    scenario: str = "mapping",
+    asked: tuple[str, ...] = (),
+    died: dict[str, float] | None = None,
+    again_s: float | None = None,
 ) -> dict[str, Any]:
-    """Return the summary; a fault: sensor, from, until, seconds after lift-off; ``died``: processes, and when."""
+    """Return the summary; a fault: sensor, from, until, seconds after lift-off; ``died``: processes, and when; ``again_s``: they ran."""
     log.write(folder / RECORD)
     told = [{"sensor": name, "mode": "dead", "t_s": LIFT_OFF_S + at_s} for name, at_s, *_ in faults]
     told += [{"sensor": name, "mode": "ok", "t_s": LIFT_OFF_S + until[0]} for name, _, *until in faults if until]
     state = {"lift_off_s": LIFT_OFF_S, "collisions": 0, "min_clearance_m": 1.0, "distance_m": 1.0, "faults": told}
     t_s = np.arange(0.0, 80.0, 0.5)
     write_bag(folder / "functional.bag", poses=(t_s + LIFT_OFF_S, np.outer(t_s, [1.0, 0.0, 0.0])), states=[state])
-    deaths = [{"name": name, "when_s": LIFT_OFF_S + at_s, "how": "signal SIGKILL"} for name, at_s in (died or {}).items()]
+    deaths = [
+        {"name": name, "when_s": LIFT_OFF_S + at_s, "how": "signal SIGKILL", "again_s": again_s and LIFT_OFF_S + again_s}
+        for name, at_s in (died or {}).items()
+    ]
     facts = RunFacts(scenario=scenario, seed=0, out_dir=folder, faults=asked, died=deaths, mission_exit=0)
     return dict(make_report(facts))
 
@@ -158,6 +167,16 @@ def test_managers_that_die_are_told_as_detected_by_what_the_mission_was_told(tmp
     assert recovery(summary)[:3] == [30.0, 31.2, 33.02]
     (zed,) = [one for one in summary["skills"] if one["skill"] == "zed_depthmap"]
     assert (zed["outcome"], zed["end_s"], zed["message"]) == ("FAILED", 31.2, GONE)
+
+
+def test_what_fails_long_after_a_process_ran_again_is_not_credited_to_its_death(tmp_path):
+    log = flight()
+    log.told(31.2, "perception.zed_depthmap", "1", "FAILED", GONE)
+    for again_s, failed in ((None, ["1"]), (29.0, ["1"]), (25.0, [])):
+        folder = tmp_path / str(again_s)
+        folder.mkdir()
+        (found,) = report(folder, log, died={"perception": 20.0}, again_s=again_s)["answers"]
+        assert (found["failed"], found["until_s"]) == (failed, again_s)
 
 
 def test_a_process_that_nothing_hung_on_dies_without_a_recovery(tmp_path):

@@ -108,8 +108,8 @@ def folder(left_behind: Path, tmp_path: Path) -> Path:
 def whole(left_behind: Path, tmp_path_factory: pytest.TempPathFactory) -> tuple[Path, dict[str, Any]]:
     folder = Path(shutil.copytree(left_behind, tmp_path_factory.mktemp("runs") / "run"))
     died = [
-        {"name": "zed_depth", "when_s": LIFT_OFF_S + 12.0, "how": "signal SIGKILL"},
-        {"name": "record", "when_s": None, "how": "exit code 1"},
+        {"name": "zed_depth", "when_s": LIFT_OFF_S + 12.0, "how": "signal SIGKILL", "again_s": LIFT_OFF_S + 13.5},
+        {"name": "record", "when_s": None, "how": "exit code 1", "again_s": None},
     ]
     return folder, dict(make_report(facts(folder, died=died)))
 
@@ -133,8 +133,8 @@ def test_the_flight_in_numbers(whole):
     assert summary["lift_off"] == {"stamp_s": LIFT_OFF_S, "source": "simulator"}
     assert summary["bridge"] == {"/clock": {"count": 5000, "p50_ms": 0.4, "p95_ms": 1.5, "dropped": 0}}
     assert summary["died"] == [
-        {"name": "zed_depth", "when_s": 12.0, "how": "signal SIGKILL"},
-        {"name": "record", "when_s": None, "how": "exit code 1"},
+        {"name": "zed_depth", "when_s": 12.0, "how": "signal SIGKILL", "again_s": 13.5},
+        {"name": "record", "when_s": None, "how": "exit code 1", "again_s": None},
     ]
 
 

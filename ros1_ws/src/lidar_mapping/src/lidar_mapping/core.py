@@ -21,10 +21,10 @@ from lidar_mapping.ply import read_ply, write_ply
 from lidar_mapping.readings import ReadingQueue
 from lidar_mapping.slam import Slam
 from lidar_mapping.standing import StandingGyro
+from node_core.core import Input, Output
 from perception_core import NS, Sweep, SweepStamps
 from perception_core.clouds import sweep_of_cloud
 from perception_core.conversions import cloud_message
-from perception_core.host import Input, Output
 from perception_core.vehicle import KnownVehicle
 
 if TYPE_CHECKING:
@@ -34,7 +34,7 @@ if TYPE_CHECKING:
 
     from lidar_mapping.registration import Registration
     from lidar_mapping.settings import MappingSettings
-    from perception_core.host import Host
+    from node_core.core import Host
 
     Floats = NDArray[np.float64]
 
@@ -45,7 +45,7 @@ READING_WAIT_S = 0.3  # wall clock; the readings of a sweep may arrive after it,
 MAP_WAIT_S = 1.0  # wall clock; a guidance that runs tells of its map at 20 Hz
 TF_PERIOD_S = 0.1
 STATE, MAP = Output("~state", MappingState, queue_size=5, latch=True), Output("~map", PointCloud2, latch=True)
-POSE, TF = Output("~pose", PoseWithCovarianceStamped, queue_size=5), Output("/tf", TFMessage, queue_size=5)
+POSE, TF = Output("~pose", PoseWithCovarianceStamped, queue_size=5), Output("/tf", TFMessage, queue_size=5, shared=True)
 OUTPUTS = (STATE, MAP, POSE, TF)
 
 
@@ -94,7 +94,7 @@ class LidarMapping:
             self._slam.stop()
             self._readings.clear()
             self._publish_state(self._host.now_ns(), None)
-        self._host.report("slam_status", "UNKNOWN", "the mapping does not run")
+        self._host.report("mapping.slam_status", "UNKNOWN", "the mapping does not run")
 
     def save(self) -> str:
         """Write the map; return what was written where, raise OSError."""
@@ -197,7 +197,7 @@ class LidarMapping:
         problem = self._slam.problem
         if problem:
             self._host.warn("lost", f"the map is lost: {problem}")
-        self._host.report("slam_status", "LOST" if problem else "OK", problem)
+        self._host.report("mapping.slam_status", "LOST" if problem else "OK", problem)
 
     def _publish_state(self, stamp_ns: int, registration: Registration | None) -> None:
         count = self._slam.count

@@ -9,7 +9,8 @@ from std_srvs.srv import Trigger, TriggerResponse
 
 from lidar_mapping.core import OUTPUTS, LidarMapping
 from lidar_mapping.settings import MappingSettings
-from perception_core.ros import RosHost, read_settings
+from node_core.ros import RosHost
+from perception_core.ros import read_settings
 from resource_reporter import ToldService
 
 if TYPE_CHECKING:
@@ -31,7 +32,7 @@ def serve_save(core: LidarMapping) -> ToldService:
 def main() -> None:
     """Run the node until ROS shuts down."""
     rospy.init_node("lidar_mapping")
-    host = RosHost("mapping", OUTPUTS)
+    host = RosHost(OUTPUTS, "mapping")
     core = LidarMapping(read_settings(MappingSettings()), host)
     _saving = serve_save(core)
     host.run(core)

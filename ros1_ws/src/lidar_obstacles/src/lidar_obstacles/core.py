@@ -15,10 +15,10 @@ from uav_msgs.msg import Obstacle
 from lidar_obstacles.ahead import LidarAhead
 from lidar_obstacles.cloud_health import CloudJudge
 from lidar_obstacles.mounting import MountCheck
+from node_core.core import Input, Output
 from perception_core import FINE, Ahead, Finding, Sweep, SweepStamps, TurnJoiner, first_trouble
 from perception_core.clouds import sweep_of_cloud, time_fields
 from perception_core.conversions import obstacle_message
-from perception_core.host import Input, Output
 from perception_core.sensor_watch import HEALTH, TICK_S, SensorWatch
 from perception_core.vehicle import KnownVehicle
 
@@ -26,7 +26,7 @@ if TYPE_CHECKING:
     from collections.abc import Callable
 
     from lidar_obstacles.settings import LidarSettings
-    from perception_core.host import Host
+    from node_core.core import Host
 
 CLOUD = "/lidar/points"
 CLOUD_BYTES = 1 << 23
@@ -56,7 +56,7 @@ class LidarObstacles:
         self._ahead = LidarAhead(settings.ahead)
         self._stamps, self._turns = SweepStamps(), TurnJoiner()
         self._mounting = MountCheck()
-        self._health = SensorWatch(host, "lidar", resource="lidar_status", limits=settings.health, stamps=settings.stamps)
+        self._health = SensorWatch(host, "lidar", resource="perception.lidar_status", limits=settings.health, stamps=settings.stamps)
 
     @property
     def inputs(self) -> list[Input]:

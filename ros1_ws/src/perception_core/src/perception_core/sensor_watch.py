@@ -8,13 +8,13 @@ from typing import TYPE_CHECKING
 from genpy import Time
 from uav_msgs.msg import SensorHealth
 
+from node_core.core import Output
 from perception_core.health import FaultKind, Finding, HealthLimits, HealthWatch, Verdict, broken
-from perception_core.host import Output
 from perception_core.poses import NS
 from perception_core.stamps import StampJudge, StampLimits
 
 if TYPE_CHECKING:
-    from perception_core.host import Host
+    from node_core.core import Host
 
 TICK_S = 0.02
 PUBLISH_S = 0.1

@@ -10,9 +10,9 @@ from geometry_msgs.msg import PoseStamped
 from tf2_msgs.msg import TFMessage
 from uav_msgs.msg import GuidanceState
 
+from node_core.core import Input
 from perception_core.conversions import GUIDANCE_MAP, is_rigid, matrix_of_transform
 from perception_core.corridor import VehicleMotion
-from perception_core.host import Input
 from perception_core.poses import PoseBuffer
 
 if TYPE_CHECKING:

@@ -31,8 +31,9 @@ from uav_msgs.srv import (
 )
 from uav_msgs.srv import TakeoffRequest as TakeoffCall
 
-from perception_core.host import Input
-from perception_core.ros import RawSubscriber, TunableSettings, read_settings, warn_of_garbage
+from node_core.core import Input
+from node_core.ros import RawSubscriber, warn_of_garbage
+from perception_core.ros import TunableSettings, read_settings
 from resource_reporter import DoneReporter, ResourceReporter, ToldService
 from uav_guidance import requests
 from uav_guidance.encoding import command_message, heartbeat_message, interval_message, setpoint_message

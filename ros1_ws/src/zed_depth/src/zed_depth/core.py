@@ -13,9 +13,9 @@ from sensor_msgs.msg import CameraInfo, Image, PointCloud2
 from std_msgs.msg import Header
 from uav_msgs.msg import Obstacle
 
+from node_core.core import Input, Output
 from perception_core import NS, Ahead, FaultKind, Finding, broken, first_trouble
 from perception_core.conversions import cloud_message, depth_message, obstacle_message
-from perception_core.host import Input, Output
 from perception_core.images import GrayConverter
 from perception_core.sensor_watch import HEALTH, TICK_S, SensorWatch
 from perception_core.vehicle import KnownVehicle
@@ -29,7 +29,7 @@ if TYPE_CHECKING:
 
     from numpy.typing import NDArray
 
-    from perception_core.host import Host
+    from node_core.core import Host
     from zed_depth.settings import ZedSettings
 
 IMAGE_BYTES = 1 << 22
@@ -54,7 +54,7 @@ class ZedDepth:
         self._pairing = Pairing(tolerance_s=settings.sync_tolerance_s)
         self._rig = StereoRig(settings, self._camera_pose)
         self._lock = Lock()
-        self._health = SensorWatch(host, "zed", resource="zed_status", limits=settings.health, stamps=settings.stamps)
+        self._health = SensorWatch(host, "zed", resource="perception.zed_status", limits=settings.health, stamps=settings.stamps)
         self._images = [each for side in SIDES for each in self._inputs_of(side)]
 
     @property

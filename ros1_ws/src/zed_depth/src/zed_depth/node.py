@@ -5,7 +5,8 @@ from __future__ import annotations
 import cv2
 import rospy
 
-from perception_core.ros import RosHost, TunableSettings, read_settings
+from node_core.ros import RosHost
+from perception_core.ros import TunableSettings, read_settings
 from zed_depth.core import OUTPUTS, ZedDepth
 from zed_depth.settings import ZedSettings
 
@@ -15,7 +16,7 @@ def main() -> None:
     rospy.init_node("zed_depth")
     settings = read_settings(ZedSettings())
     cv2.setNumThreads(settings.threads)
-    host = RosHost("perception", OUTPUTS)
+    host = RosHost(OUTPUTS, "perception")
     core = ZedDepth(settings, host)
     _tuning = TunableSettings(settings, core.tune)
     host.run(core)

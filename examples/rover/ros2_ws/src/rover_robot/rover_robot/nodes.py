@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from typing import Any
+from typing import Any, ClassVar
 
 from alula.missions.filed.part import MissionPart
 from alula.trees.errors import TickError
@@ -47,7 +47,7 @@ class Next(SyncAction):
 class NextParcel(Next):
     """The parcel that is next, and the rooms at its two ends."""
 
-    ports: tuple[Port, ...] = (
+    ports: ClassVar[tuple[Port, ...]] = (
         input_port("parcels", ANY),
         COUNT,
         MANY,
@@ -75,7 +75,12 @@ class NextParcel(Next):
 class NextWay(Next):
     """A way into a room that was not tried yet: its doors; and the place in the room."""
 
-    ports: tuple[Port, ...] = (input_port("room", ANY), COUNT, output_port("way", ANY, doc="doors"), output_port("inside", ANY, unit="m"))
+    ports: ClassVar[tuple[Port, ...]] = (
+        input_port("room", ANY),
+        COUNT,
+        output_port("way", ANY, doc="doors"),
+        output_port("inside", ANY, unit="m"),
+    )
 
     def listed(self) -> list[Any]:
         """Return the ways."""
@@ -94,7 +99,7 @@ class NextWay(Next):
 class NextDoor(Next):
     """The next door on a way: where the rover stands before it, and the safe place near it."""
 
-    ports: tuple[Port, ...] = (
+    ports: ClassVar[tuple[Port, ...]] = (
         input_port("way", ANY),
         COUNT,
         MANY,
@@ -118,7 +123,7 @@ class NextDoor(Next):
 class NextPlace(Next):
     """The next place of a round."""
 
-    ports: tuple[Port, ...] = (input_port("places", ANY), COUNT, MANY, output_port("place", ANY, unit="m"))
+    ports: ClassVar[tuple[Port, ...]] = (input_port("places", ANY), COUNT, MANY, output_port("place", ANY, unit="m"))
 
     def listed(self) -> list[Any]:
         """Return the places."""

@@ -8,14 +8,15 @@ from typing import TYPE_CHECKING, Any
 
 from alula.common.record import BLACKBOARD, MISSION, read_record
 from alula.common.record import Entry as RecordEntry
+from alula.model.execution_state import ExecutionState
 from alula.report.part import Findings, NoPart, Task
 
 if TYPE_CHECKING:
     from collections.abc import Iterator, Sequence
 
-    from alula.report.history import RecordedExecution
     from alula.report.part import Entry, ReportedRun
     from alula.report.phases import Phases
+    from alula.runtime.core.records import ExecutionRecord
 
 BAG, TRUTH, STATE = "functional.bag", "/truth/odom", "/truth/state"
 PERIOD_S = 0.2
@@ -61,7 +62,7 @@ class RoverReport(NoPart):
                 yield "/path", round(t_s, 3), [round(x, 3), round(y, 3), 0.0]
 
 
-def parcels(entries: Sequence[RecordEntry], executions: Sequence[RecordedExecution]) -> Iterator[Task]:
+def parcels(entries: Sequence[RecordEntry], executions: Sequence[ExecutionRecord]) -> Iterator[Task]:
     """Return what became of each parcel that the mission was given, by what it counted; none for a mission that was given none."""
     given = [entry.value.get("inputs") for entry in entries if entry.topic == MISSION]
     names = [parcel["name"] for parcel in given[0].get("parcels", ())] if given and isinstance(given[0], dict) else []
@@ -77,14 +78,18 @@ def parcels(entries: Sequence[RecordEntry], executions: Sequence[RecordedExecuti
         yield Task(name, done, "" if done else _why(executions, since_s, until_s))
         since_s = until_s
     for name in names[len(dealt) :]:
-        moved = [one.result for one in executions if one.inputs.get("parcel") == name and one.result in {"LOADED", "UNLOADED"}]
+        moved = [one.result for one in executions if _parcel_of(one) == name and one.result in {"LOADED", "UNLOADED"}]
         yield Task(name, done=False, why="the mission ended with it in the box" if moved[-1:] == ["LOADED"] else "the mission ended before")
 
 
-def _why(executions: Sequence[RecordedExecution], since_s: float, until_s: float) -> str:
+def _parcel_of(execution: ExecutionRecord) -> object:
+    return execution.inputs.get("parcel") if isinstance(execution.inputs, dict) else None
+
+
+def _why(executions: Sequence[ExecutionRecord], since_s: float, until_s: float) -> str:
     """Return what ended otherwise than it should, the last of these, while a parcel was dealt with."""
-    ended = [one for one in executions if one.end_s is not None and since_s < one.end_s <= until_s and one.skill in DONE]
-    failed = [one for one in ended if one.outcome == "TERMINATED" and one.result != DONE[one.skill]]
+    ended = [one for one in executions if one.ended_s is not None and since_s < one.ended_s <= until_s and one.skill in DONE]
+    failed = [one for one in ended if one.state is ExecutionState.TERMINATED and one.result != DONE[one.skill]]
     return f"{failed[-1].skill} {failed[-1].result}: {failed[-1].message}".removesuffix(": ") if failed else ""
 
 

@@ -12,6 +12,7 @@ if TYPE_CHECKING:
     from argparse import ArgumentParser, Namespace
 
     from alula.common.scenarios import Scenario
+    from alula.live.part import Clock
     from alula.live.spec import RunSpec
 
 MAX_RATE = 1000.0
@@ -20,8 +21,10 @@ MAX_RATE = 1000.0
 class RoverRun(RunPart):
     """Adds ``--rate``, which the launch file takes by that name."""
 
-    # Time ends with the simulator. All else is started again; what stays dead the hooks and the mission notice: README, Drives.
+    # Time ends with the simulator. All else is started again. Without a bridge no mission decides; of a navigation that stays dead the
+    # mission hears by its hooks: README, Drives.
     consequences: Mapping[str, Consequence] = {"simulator": Consequence.END}
+    stays_dead: Mapping[str, Consequence] = {"ros_bridge": Consequence.REST}
 
     def add_options(self, parser: ArgumentParser) -> None:
         """Add it."""
@@ -36,3 +39,9 @@ class RoverRun(RunPart):
     def clock_source(self, spec: RunSpec) -> str:
         """Say where ``/clock`` comes from."""
         return "the simulator"
+
+    def bring_to_rest(self, clock: Clock) -> None:
+        """Have it stand where it is."""
+        from rover_robot.resting import stand  # late: it needs ROS 1
+
+        stand(clock)

@@ -1,16 +1,6 @@
-"""The ROS 1 side of the nodes: the host of a core, settings, subscriptions to bytes, the worker."""
+"""The ROS 1 side of settings: parameters of a node, and changes of them in flight."""
 
-from perception_core.ros.host import RosHost
 from perception_core.ros.settings import read_settings
-from perception_core.ros.subscription import RawSubscriber, warn_of_garbage
 from perception_core.ros.tuning import TunableSettings
-from perception_core.ros.worker import NewestWorker
 
-__all__ = [
-    "NewestWorker",
-    "RawSubscriber",
-    "RosHost",
-    "TunableSettings",
-    "read_settings",
-    "warn_of_garbage",
-]
+__all__ = ["TunableSettings", "read_settings"]

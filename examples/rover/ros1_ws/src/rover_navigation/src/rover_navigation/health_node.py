@@ -1,100 +1,16 @@
-"""Health's node: watches what is measured, and reports the resources of the skillsets that only the functional layer knows.
-
-Tells all verdicts on /health (std_msgs/String of JSON), so that a record says why a resource changed.
-"""
+"""Health's node: its core on ROS."""
 
 from __future__ import annotations
 
-import json
-
-import numpy as np
 import rospy
-from geometry_msgs.msg import PoseWithCovarianceStamped, Twist
-from nav_msgs.msg import Odometry
-from resource_reporter import DoneReporter, ResourceReporter
-from sensor_msgs.msg import BatteryState, LaserScan
-from std_msgs.msg import Bool, Float32, String
+from node_core.ros import RosHost
 
-from rover_navigation.health import OK, BumperMonitor, LaserMonitor, PoseMonitor, WheelMonitor, WheelReading
-from rover_navigation.ros import pose_of
-
-COMMAND_TIMEOUT_S = 0.5  # the base stops by itself when no command comes any more
-
-
-class HealthNode:
-    """Reports base_status, pose_status and authority of `base`, laser and bumper_status of `perception`, charger of `power`."""
-
-    def __init__(self) -> None:
-        self._laser, self._pose, self._wheels, self._bumper = LaserMonitor(), PoseMonitor(), WheelMonitor(), BumperMonitor()
-        self._pressed = self._operator = False
-        self._charging: bool | None = None
-        self._matched: tuple[float, float] | None = None
-        self._told = (0.0, -np.inf)  # rad/s, when
-        self._verdicts: dict[str, str] = {}
-        self._reporters = {skillset: ResourceReporter(skillset) for skillset in ("base", "perception", "power")}
-        self._health = rospy.Publisher("/health", String, queue_size=5, latch=True)
-        self._done = DoneReporter(*self._reporters.values())
-        for topic, kind, handler in (
-            ("/scan", LaserScan, self._on_scan),
-            ("/bumper", Bool, self._on_bumper),
-            ("/battery_state", BatteryState, self._on_battery),
-            ("/localization/quality", Float32, lambda message: self._pose.quality(message.data)),
-            ("/localization/pose", PoseWithCovarianceStamped, self._on_pose),
-            ("/cmd_vel", Twist, self._on_command),
-            ("/operator/drives", Bool, self._on_operator),
-            ("/odom", Odometry, self._on_odometry),
-        ):
-            rospy.Subscriber(topic, kind, handler, queue_size=20, tcp_nodelay=True)
-
-    def _on_scan(self, scan: LaserScan) -> None:
-        self._laser.scan(np.asarray(scan.ranges, dtype=np.float64), scan.header.stamp.to_sec())
-
-    def _on_bumper(self, message: Bool) -> None:
-        self._pressed = message.data
-
-    def _on_battery(self, message: BatteryState) -> None:
-        self._charging = message.power_supply_status == BatteryState.POWER_SUPPLY_STATUS_CHARGING
-
-    def _on_pose(self, message: PoseWithCovarianceStamped) -> None:
-        self._matched = pose_of(message.pose.pose)[:2]
-
-    def _on_command(self, twist: Twist) -> None:
-        self._told = (twist.angular.z, rospy.get_time())
-
-    def _on_operator(self, message: Bool) -> None:
-        """Somebody drives by hand: a stick's dead-man switch says so."""
-        self._operator = message.data
-
-    def _on_odometry(self, message: Odometry) -> None:
-        """Judge, and report."""
-        now_s, pose = message.header.stamp.to_sec(), pose_of(message.pose.pose)
-        told_rad_s = self._told[0] if now_s - self._told[1] < COMMAND_TIMEOUT_S else 0.0
-        if self._matched is not None and self._laser.verdict(now_s) == OK:  # old scans say that it stands
-            self._wheels.step(WheelReading(now_s, pose[:2], self._matched, told_rad_s, message.twist.twist.angular.z))
-        self._bumper.step(pose[:2], pressed=self._pressed)
-        self._report(now_s)
-        self._done.done(message.header.stamp.to_nsec())
-
-    def _report(self, now_s: float) -> None:
-        laser = self._laser.verdict(now_s)
-        base, perception, power = self._reporters.values()
-        base.report("authority", "OPERATOR" if self._operator else "MISSION")
-        perception.report("bumper_status", self._bumper.verdict)
-        if laser:
-            perception.report("laser", OK if laser == OK else "BROKEN")
-        if self._pose.verdict:
-            base.report("pose_status", self._pose.verdict)
-        if self._charging is not None:
-            base.report("base_status", "DOCKED" if self._charging else "AWAY")
-            power.report("charger", "ON" if self._charging else "OFF")
-        verdicts = {"laser": laser, "pose": self._pose.verdict, "wheels": self._wheels.verdict, "bumper": self._bumper.verdict}
-        if verdicts != self._verdicts:
-            self._verdicts = verdicts
-            self._health.publish(String(json.dumps({"t_s": round(now_s, 3), **verdicts})))
+from rover_navigation.health_core import NAME, OUTPUTS, SKILLSETS, Health
 
 
 def main() -> None:
     """Run the node until ROS shuts down."""
-    rospy.init_node("health")
-    _node = HealthNode()
+    rospy.init_node(NAME)
+    host = RosHost(OUTPUTS, *SKILLSETS)
+    host.run(Health(host))
     rospy.spin()

@@ -75,16 +75,16 @@ class NavigationNode:
             server.set_aborted(text=f"the goal's frame is '{frame}'; give it in map")
             return
         job = make(pose_of(goal.target_pose.pose))
-        with self._lock:
-            self._job, self._ended = job, None
+        self._begin(job)
         while not rospy.is_shutdown():
             with self._lock:
                 if self._job is not job:
                     server.set_preempted(text="another goal has come")
                     return
-                if self._ended is not None:
+                ended = self._ended
+                if ended is not None:
                     self._job = None
-                    (server.set_succeeded if self._ended.arrived else server.set_aborted)(text=self._ended.text)
+                    (server.set_succeeded if ended.arrived else server.set_aborted)(text=ended.text)
                     return
                 if server.is_preempt_requested():
                     self._job = None
@@ -92,6 +92,10 @@ class NavigationNode:
                     server.set_preempted(text="preempted")
                     return
             threading.Event().wait(LOOK_S)
+
+    def _begin(self, job: Job) -> None:
+        with self._lock:
+            self._job, self._ended = job, None
 
     # --- measurements -------------------------------------------------------------------------------------------------
 

@@ -37,7 +37,7 @@ class Surroundings:
     @property
     def seen(self) -> NDArray[np.bool_]:
         """Return the cells in which something was seen."""
-        return np.isfinite(self.seen_s)
+        return np.asarray(np.isfinite(self.seen_s))
 
     def look(self, pose: Pose, points: Points, free: Points, now_s: float) -> None:
         """Take in what the laser hit, and how far the beams came that hit nothing; both in base_link, from a pose in map."""

@@ -105,7 +105,8 @@ class Charge(AbstractChargeSkill):
 
     def progress(self, execution: Execution) -> float:
         """Return the part of the wanted level that is there."""
-        return min((self._battery.level or 0.0) / execution.inputs.level, 1.0)  # type: ignore[attr-defined]
+        wanted: float = execution.inputs.level  # type: ignore[attr-defined]
+        return min((self._battery.level or 0.0) / wanted, 1.0)
 
     def _look(self) -> None:
         execution, level, now_s = self._execution, self._battery.level or 0.0, self._battery.watch.now_s

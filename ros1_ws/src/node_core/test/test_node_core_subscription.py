@@ -10,8 +10,8 @@ from geometry_msgs.msg import Point
 from std_msgs.msg import String
 
 from alula_testing.waits import until
-from perception_core.host import Input
-from perception_core.ros import RawSubscriber, subscription, warn_of_garbage
+from node_core.core import Input
+from node_core.ros import RawSubscriber, subscription, warn_of_garbage
 from perception_core.testing import framed, send_raw
 
 BUFFER_BYTES = 1 << 16

@@ -7,8 +7,8 @@ import rospy
 from std_msgs.msg import Header
 
 from alula_testing.waits import until
-from perception_core.host import Input
-from perception_core.ros import RosHost
+from node_core.core import Input
+from node_core.ros import RosHost
 
 BUFFER_BYTES = 1 << 16
 
@@ -37,7 +37,7 @@ class Core:
 
 def test_a_node_is_ready_for_lockstep_when_it_listens_to_all_its_inputs(ros_master: str) -> None:
     core, heard = Core(), []
-    host = RosHost("perception", [])
+    host = RosHost([], "perception")
     host.done(1)  # nobody may take the node for ready because of it
     host.run(core)
     assert core.ready == [False]

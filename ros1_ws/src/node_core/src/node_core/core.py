@@ -4,20 +4,24 @@ from __future__ import annotations
 
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
-from typing import Any, Protocol
+from typing import Any, Protocol, runtime_checkable
 
 import genpy
 
 
 @dataclass(frozen=True)
 class Output:
-    """A topic that a core publishes; ``~`` begins the names of its own."""
+    """A topic that a core publishes; ``~`` begins the names of its own.
+
+    ``shared``: other nodes publish it, too. What a record has there stands in a replay.
+    """
 
     topic: str
     kind: type[Any]
     queue_size: int = 1
     latch: bool = False
     tcp_nodelay: bool = False
+    shared: bool = False
 
 
 @dataclass(frozen=True)
@@ -27,8 +31,8 @@ class Input:
     topic: str
     kind: type[Any]
     take: Callable[[Any], None]
-    garbage: Callable[[str], None]
-    buffer_bytes: int
+    garbage: Callable[[str], None] = lambda _reason: None
+    buffer_bytes: int = 1 << 16
     queue_size: int = 1
 
     def take_bytes(self, sent: str, data: bytes) -> None:
@@ -64,8 +68,8 @@ class Host(Protocol):
     def done(self, stamp_ns: int) -> None:
         """Note that nothing is left to do for the measurement made at ``stamp_ns``."""
 
-    def report(self, resource: str, state: str, reason: str, *, insist: bool = True) -> None:
-        """Report a resource's state to the skillset; see ``resource_reporter.ResourceReporter``."""
+    def report(self, resource: str, state: str, reason: str = "", *, insist: bool = True) -> None:
+        """Report the state of ``skillset.resource``; see ``resource_reporter.ResourceReporter``."""
 
     def offer(self, work: Callable[[], None]) -> None:
         """Have this done beside the inputs, one at a time; of what waits only the newest is."""
@@ -80,8 +84,6 @@ class Host(Protocol):
 class Core(Protocol):
     """What a node does, without rospy. Periodic work comes in seconds of mission clock."""
 
-    enabled: bool
-
     @property
     def inputs(self) -> Sequence[Input]:
         """The topics that it takes."""
@@ -90,5 +92,12 @@ class Core(Protocol):
     def timers(self) -> Sequence[tuple[float, Callable[[], None]]]:
         """What it does again and again, with the period."""
 
+
+@runtime_checkable
+class Switched(Protocol):
+    """A core with work that runs on demand has this, too."""
+
+    enabled: bool
+
     def switch(self, enabled: bool) -> None:  # noqa: FBT001 -- a callback's signature
-        """Begin or end what runs on demand."""
+        """Begin or end it."""

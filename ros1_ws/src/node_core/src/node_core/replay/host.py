@@ -1,4 +1,4 @@
-"""What runs the perception's cores over a bag: virtual time, no graph and no threads. The same messages make the same messages."""
+"""What runs cores over a bag: virtual time, no graph and no threads. The same messages make the same messages."""
 
 from __future__ import annotations
 
@@ -6,10 +6,13 @@ import heapq
 import itertools
 import json
 import logging
-from collections.abc import Callable
-from typing import Any
+from collections.abc import Callable, Mapping, Sequence
+from typing import TYPE_CHECKING, Any
 
 from std_msgs.msg import String
+
+if TYPE_CHECKING:
+    from node_core.core import Output
 
 log = logging.getLogger(__name__)
 Publish = Callable[[str, Any], None]
@@ -52,12 +55,15 @@ class BagHost:
 
     Args:
         name: the node's.
-        skillset: has the resources that the core reports.
-        publish: gets what is published, ``publish(topic, message)``.
+        outputs: what the core publishes.
+        initial: the states in which resources begin, by ``skillset.resource``; UNKNOWN where none is named.
+        publish: gets what is published, ``publish(topic, message)``; not what other nodes publish, too.
     """
 
-    def __init__(self, name: str, skillset: str, timeline: Timeline, publish: Publish) -> None:
-        self._name, self._skillset, self._timeline, self._publish = name, skillset, timeline, publish
+    def __init__(self, name: str, outputs: Sequence[Output], initial: Mapping[str, str], timeline: Timeline, publish: Publish) -> None:
+        self._name, self._initial, self._timeline, self._publish = name, initial, timeline, publish
+        self.topics = {self._resolved(output.topic) for output in outputs if not output.shared}
+        """Topics on which the core alone says something."""
         self._shown: dict[str, tuple[str, str]] = {}
         self._waiting: list[Callable[[], None]] = []
         self._busy = False
@@ -67,8 +73,13 @@ class BagHost:
         return self._timeline.now_ns
 
     def publish(self, topic: str, message: Any) -> None:
-        """Pass it on with the node's name."""
-        self._publish(f"/{self._name}/{topic[1:]}" if topic.startswith("~") else topic, message)
+        """Pass it on with the node's name; what others publish, too, is told by the record."""
+        resolved = self._resolved(topic)
+        if resolved in self.topics:
+            self._publish(resolved, message)
+
+    def _resolved(self, topic: str) -> str:
+        return f"/{self._name}/{topic[1:]}" if topic.startswith("~") else topic
 
     def wanted(self, _topic: str) -> bool:
         """Return that nobody takes it."""
@@ -81,18 +92,19 @@ class BagHost:
     def done(self, _stamp_ns: int) -> None:
         """Wait for nobody: time goes on when all of a moment is done."""
 
-    def report(self, resource: str, state: str, reason: str, *, insist: bool = True) -> None:
+    def report(self, resource: str, state: str, reason: str = "", *, insist: bool = True) -> None:
         """Tell a new state or reason as a call that was accepted.
 
-        What the skillset shows before the first call is not known here: a reason alone is told only of what was said here.
+        Which reason the skillset shows before the first call is not known here: a reason alone is told only of what was said here.
         """
-        before, known = self._shown.get(resource, ("UNKNOWN", reason))
+        before, known = self._shown.get(resource, (self._initial.get(resource, "UNKNOWN"), reason))
         if insist if before != state else reason not in {"", known}:
             self._shown[resource] = state, reason
             now_s = self.now_ns() / 1e9
             response = {"accepted": True, "reason": "", "state": state}
-            request = {"resource": resource, "to": state, "reason": reason}
-            call = {"service": f"/{self._skillset}/transition", "request": request, "response": response, "error": ""}
+            skillset, _, name = resource.partition(".")
+            request = {"resource": name, "to": state, "reason": reason}
+            call = {"service": f"/{skillset}/transition", "request": request, "response": response, "error": ""}
             self._publish(CALLS, String(data=json.dumps({**call, "begin_s": now_s, "end_s": now_s})))
 
     def offer(self, work: Callable[[], None]) -> None:

@@ -7,7 +7,7 @@ from threading import Lock, Thread
 
 import rospy
 
-from perception_core.host import Input
+from node_core.core import Input
 
 SILENCE_S = 2.0  # that the rest of a message may take; mission clock: while it is held, or the machine is slow, none is due
 LONGEST_SILENCE_S = 30.0

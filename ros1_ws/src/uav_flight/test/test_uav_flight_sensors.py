@@ -68,7 +68,7 @@ def measured(tmp_path_factory) -> Path:
 
 
 def perceive(source: Path, target: Path, *words: str) -> subprocess.CompletedProcess[str]:
-    command = [sys.executable, "-m", "uav_flight.sensor_replay", str(source), str(target), *words]
+    command = [sys.executable, "-m", "node_core.replay", str(source), str(target), "--zero", str(LIFT_OFF_S), *words]
     return subprocess.run(command, capture_output=True, text=True, check=False, timeout=200)
 
 

@@ -9,42 +9,43 @@ from typing import TYPE_CHECKING, Any
 
 import rospy
 
-from perception_core.ros.subscription import RawSubscriber
-from perception_core.ros.switch import EnableSwitch
-from perception_core.ros.worker import NewestWorker
+from node_core.core import Switched
+from node_core.ros.subscription import RawSubscriber
+from node_core.ros.switch import EnableSwitch
+from node_core.ros.worker import NewestWorker
 from resource_reporter import DoneReporter, ResourceReporter
 
 if TYPE_CHECKING:
     from collections.abc import Sequence
 
-    from perception_core.host import Core, Output
+    from node_core.core import Core, Output
 
 
 class RosHost:
-    """The host of a core in flight; to be made after ``rospy.init_node``. ``run`` begins, once the core is made.
+    """The host of a core in a node; to be made after ``rospy.init_node``. ``run`` begins, once the core is made.
 
     Args:
-        skillset: has the resources that the core reports.
         outputs: what the core publishes.
+        skillsets: have the resources that the core reports.
     """
 
-    def __init__(self, skillset: str, outputs: Sequence[Output]) -> None:
+    def __init__(self, outputs: Sequence[Output], *skillsets: str) -> None:
         self._publishers = {each.topic: _publisher(each) for each in outputs}
         self._subscribers: dict[str, RawSubscriber] = {}
-        self._reporter = ResourceReporter(skillset)
+        self._reporters = {skillset: ResourceReporter(skillset) for skillset in skillsets}
         self._done: DoneReporter | None = None
         self._worker = NewestWorker[Callable[[], None]](lambda work: work())
         self._lock = Lock()
         self._warned_s: dict[str, float] = {}
 
     def run(self, core: Core) -> None:
-        """Subscribe to the core's inputs, serve its switch and run its timers."""
-        self._switch = EnableSwitch(core.switch)
+        """Subscribe to the core's inputs, serve its switch where it has one, and run its timers."""
+        self._switch = EnableSwitch(core.switch) if isinstance(core, Switched) else None
         for each in core.inputs:
             self._subscribers[each.topic] = RawSubscriber(each)
         # reset: a clock that jumps back (a bag played again) must not end the timer's thread.
         self._timers = [rospy.Timer(rospy.Duration.from_sec(period_s), _job(work), reset=True) for period_s, work in core.timers]
-        self._done = DoneReporter(self._reporter)
+        self._done = DoneReporter(*self._reporters.values())
 
     def now_ns(self) -> int:
         """Return the ROS clock."""
@@ -67,9 +68,10 @@ class RosHost:
         if self._done is not None:  # nobody has heard of this node yet
             self._done.done(stamp_ns)
 
-    def report(self, resource: str, state: str, reason: str, *, insist: bool = True) -> None:
+    def report(self, resource: str, state: str, reason: str = "", *, insist: bool = True) -> None:
         """Report to the skillset."""
-        self._reporter.report(resource, state, reason, insist=insist)
+        skillset, _, name = resource.partition(".")
+        self._reporters[skillset].report(name, state, reason, insist=insist)
 
     def offer(self, work: Callable[[], None]) -> None:
         """Have the node's worker do this next."""

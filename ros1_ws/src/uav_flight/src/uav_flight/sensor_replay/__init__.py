@@ -1,1 +1,0 @@
-"""Recorded measurements through the perception's cores, in the order of their stamps and in virtual time."""
