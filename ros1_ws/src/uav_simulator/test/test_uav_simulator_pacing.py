@@ -91,6 +91,16 @@ def test_a_topic_that_repeats_an_old_stamp_does_not_come_back():
     assert p.may_advance(20.0, 3.1)
 
 
+def test_who_says_again_how_far_it_has_come_is_waited_for_as_a_mission_that_waits_for_another_robot():
+    p = pacer()
+    p.heard("/a", 10.0)
+    for wall_s in range(10):
+        assert not p.may_advance(11.0, float(wall_s))
+        p.heard("/a", 10.0)
+    assert not p.may_advance(11.0, 9.0)
+    assert p.may_advance(11.0, 9.0 + TIMEOUT_S)
+
+
 def test_a_node_that_works_on_measurements_is_waited_for_while_there_are_some():
     p = Pacer(["/depth/done=zed", "/state"], limit_s=LIMIT_S, timeout_s=TIMEOUT_S)
     p.measured("zed", 10.0, 10.0)

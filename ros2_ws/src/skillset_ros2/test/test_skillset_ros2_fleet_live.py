@@ -22,7 +22,7 @@ from std_msgs.msg import Header
 
 from alula.common.record import DECISIONS, EVENTS, read_record
 from alula.common.run_log import account
-from skillset_ros2.fleet_clock import FleetClock
+from skillset_ros2.fleet_clock import STALLED_S, FleetClock
 from skillset_ros2.names import LATCHED
 from skillset_ros2.session import Session
 
@@ -160,7 +160,8 @@ class Clocks:
         self.session = Session("fleet", domain=domain)
         self.node = self.session.node
         self.said: list[int] = []
-        self.fleet = FleetClock(self.node, ["/one", "/two"])
+        self.wall_s = 0.0
+        self.fleet = FleetClock(self.node, ["/one", "/two"], lambda: self.wall_s)
         self.node.create_subscription(Tick, "clock", lambda tick: self.said.append(tick.clock.sec), 10)
         self.robots = {name: self.node.create_publisher(Tick, f"/{name}/clock", 10) for name in ("one", "two")}
 
@@ -182,4 +183,26 @@ def test_the_clock_of_a_fleet_is_that_of_the_robot_furthest_behind(ros2_domain: 
     # One that has ended holds nobody up.
     clocks.node.destroy_publisher(clocks.robots.pop("one"))
     clocks.tell(11, two=11)
+    clocks.session.close()
+
+
+def test_a_robot_whose_clock_stands_still_holds_the_clock_of_the_fleet_for_a_while(ros2_domain: int) -> None:
+    clocks = Clocks(ros2_domain)
+    clocks.tell(3, one=4, two=3)
+    clocks.wall_s = STALLED_S - 1.0
+    clocks.fleet.look()  # the second stalls, the first waits for the mission
+    clocks.tell(4, one=5, two=4)
+    clocks.wall_s += STALLED_S + 1.0
+    assert clocks.said[-1] == 4
+    clocks.tell(5, one=5)
+    assert 4 in clocks.said
+    clocks.tell(7, one=7)
+    # Once it goes on it is waited for until it has caught up.
+    clocks.tell(8, one=8, two=8)
+    clocks.tell(9, one=12, two=9)
+    # When all stand still none is left out.
+    clocks.wall_s += STALLED_S + 1.0
+    clocks.fleet.look()
+    clocks.tell(13, one=13, two=13)
+    assert clocks.said == sorted(clocks.said)
     clocks.session.close()

@@ -52,13 +52,18 @@ class Pacer:
             self._measured.setdefault(sensor, deque(maxlen=MEASUREMENTS)).append((stamp_s, now_s))
 
     def heard(self, topic: str, stamp_s: float) -> None:
-        """Note a message; one that has been left out is back when it speaks with a newer stamp."""
+        """Note a message; one that has been left out is back when it speaks with a newer stamp.
+
+        One that says again how far it has come does not hang: it waits for something itself, as a mission for another robot.
+        """
         if stamp_s <= 0.0:
             return
         with self._lock:
             listener = self._listeners.setdefault(topic, _Listener(stamp_s))
             if stamp_s > listener.stamp_s:
                 self._listeners[topic] = _Listener(stamp_s, lagging_since_s=listener.lagging_since_s if listener.live else None)
+            elif stamp_s == listener.stamp_s:
+                listener.lagging_since_s = None
 
     def may_advance(self, now_s: float, wall_s: float) -> bool:
         """Return whether simulated time may go on at ``now_s``; ``wall_s`` is a monotonic clock for the timeout."""

@@ -11,7 +11,7 @@ from alula.common.faults import FaultError, parse_faults
 from rover_simulator.drawing import draw
 from rover_simulator.errors import WorldError
 from rover_simulator.faults import FAULTS
-from rover_simulator.lockstep import Lockstep
+from rover_simulator.lockstep import LEAST_SHARE, Lockstep, ProcessorShare
 from rover_simulator.person import Person
 from rover_simulator.simulation import Simulation
 from rover_simulator.world import load_world
@@ -128,3 +128,18 @@ def test_time_waits_for_those_that_lag_and_not_for_the_dead():
     lockstep.heard("/a", 5.3)
     assert lockstep.left_out == ["/b"]
     assert lockstep.lagging(5.45, 11.0) == ["/a"]
+
+
+def test_the_share_of_a_processor_is_what_steps_get_of_it_lately():
+    processor = ProcessorShare()
+    processor.worked(0.0, 0.0)
+    assert processor.share == 1.0
+    for _ in range(200):
+        processor.worked(0.02, 0.002)
+    assert processor.share == pytest.approx(0.1, abs=0.01)
+    for _ in range(200):
+        processor.worked(0.002, 0.0025)  # clocks are coarse
+    assert processor.share == pytest.approx(1.0, abs=0.01)
+    for _ in range(500):
+        processor.worked(1.0, 0.0)
+    assert processor.share == pytest.approx(LEAST_SHARE, abs=0.001)

@@ -9,13 +9,14 @@ from dataclasses import dataclass
 
 ROUNDING_S = 1e-6
 LIMIT_S = 0.1  # a node may be behind the clock by two steps
+LEAST_SHARE, SHARE_STEPS = 0.02, 20.0  # steps over which a share is averaged
 
 
 @dataclass
 class _Follower:
     limit_s: float
     stamp_s: float | None = None  # of the last message; None: time does not wait for it
-    lagging_since_s: float | None = None  # wall clock
+    lagging_since_s: float | None = None  # of what is waited by
 
 
 class Lockstep:
@@ -50,19 +51,36 @@ class Lockstep:
         with self._lock:
             self._followers[topic].stamp_s = None
 
-    def lagging(self, now_s: float, wall_s: float) -> list[str]:
-        """Return the topics that are behind ``now_s``; after the timeout (``wall_s``: monotonic) one is not waited for any more."""
+    def lagging(self, now_s: float, waited_s: float) -> list[str]:
+        """Return the topics that are behind ``now_s``; one is not waited for any more after the timeout, by ``waited_s``, which only grows."""
         with self._lock:
-            return [topic for topic, follower in self._followers.items() if self._lags(follower, now_s, wall_s)]
+            return [topic for topic, follower in self._followers.items() if self._lags(follower, now_s, waited_s)]
 
-    def _lags(self, follower: _Follower, now_s: float, wall_s: float) -> bool:
+    def _lags(self, follower: _Follower, now_s: float, waited_s: float) -> bool:
         if follower.stamp_s is None or now_s - follower.stamp_s <= follower.limit_s + ROUNDING_S:
             return False
-        follower.lagging_since_s = wall_s if follower.lagging_since_s is None else follower.lagging_since_s
-        if wall_s - follower.lagging_since_s >= self._timeout_s:
+        follower.lagging_since_s = waited_s if follower.lagging_since_s is None else follower.lagging_since_s
+        if waited_s - follower.lagging_since_s >= self._timeout_s:
             follower.stamp_s = None
             return False
         return True
+
+
+class ProcessorShare:
+    """Which part of a processor this process gets while it works: 1 on a machine that does nothing else, less on a busy one.
+
+    A process that is started again gets about the same part. So time that goes on meanwhile, that much slower, gives it as long as it
+    takes on a machine of its own.
+    """
+
+    def __init__(self) -> None:
+        self.share = 1.0
+
+    def worked(self, wall_s: float, processor_s: float) -> None:
+        """Note how long a step took, and how much of that it was computed."""
+        if wall_s > 0.0:
+            measured = min(max(processor_s / wall_s, LEAST_SHARE), 1.0)
+            self.share += (measured - self.share) / SHARE_STEPS
 
 
 def stamp_s(header: bytes) -> float:

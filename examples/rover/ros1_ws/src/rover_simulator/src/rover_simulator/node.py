@@ -26,14 +26,14 @@ from tf2_msgs.msg import TFMessage
 from rover_simulator import messages
 from rover_simulator.errors import WorldError
 from rover_simulator.faults import FAULTS
-from rover_simulator.lockstep import Lockstep, stamp_s
+from rover_simulator.lockstep import Lockstep, ProcessorShare, stamp_s
 from rover_simulator.simulation import Simulation
 from rover_simulator.world import load_world
 
 SCAN_STEPS, BATTERY_STEPS, STATE_STEPS = 2, 20, 20  # of 50 ms
 WAIT_S = 0.001  # wall clock, while time stands still
 START_CLOCK_S = 0.05
-HANGS_S = 15.0  # wall clock: a node that hangs is waited for so long, one that has died is not
+HANGS_S = 15.0  # wall clock, times the processor's share: a node that hangs is waited for so long, one that has died is not
 
 
 def unconnected() -> list[str]:
@@ -54,6 +54,8 @@ class SimulatorNode:
         self._rate = float(param("~rate", 1.0))  # simulated seconds a second at most; 0: as fast as it can
         self._start_timeout_s = float(param("~start_timeout_s", 45.0))
         self._lockstep = Lockstep(str(param("~lockstep", "")).replace(",", " ").split(), HANGS_S)
+        self._processor = ProcessorShare()
+        self._waited_s = 0.0  # in all: by it a node hangs
         self._steps = 0
         self._told = ""
         self._left_out: list[str] = []
@@ -93,22 +95,31 @@ class SimulatorNode:
         while not self._ended:
             while not self._inbox.empty():
                 self._inbox.get()()
-            self._simulation.step()
             if self._steps == 0:
+                self._simulation.step()
                 self._begin()
-            self._publish()
+                self._publish()
+            else:
+                self._step()
             rate = self._rate
             if left_out := self._lockstep.left_out:  # a node that is started again takes as long as it does on a robot
-                rate = min(rate or 1.0, 1.0)
+                rate = min(rate or 1.0, 1.0) * self._processor.share
             self._tell(left_out)
             if rate > 0.0:
                 due_s = max(due_s + self._simulation.floor.period_s / rate, time.monotonic() - 0.25)
             self._wait(due_s)
 
+    def _step(self) -> None:
+        wall_s, processor_s = time.monotonic(), time.thread_time()
+        self._simulation.step()
+        self._publish()
+        self._processor.worked(time.monotonic() - wall_s, time.thread_time() - processor_s)
+
     def _tell(self, left_out: list[str]) -> None:
         if left_out != self._left_out:
             self._left_out = left_out
-            rospy.logwarn(f"simulated time does not wait for {', '.join(left_out)}" if left_out else "simulated time waits for all again")
+            told = f"simulated time does not wait for {', '.join(left_out)}" if left_out else "simulated time waits for all again"
+            rospy.logwarn(f"{self._simulation.now_s:.2f} s: {told}")
 
     def _begin(self) -> None:
         """Hold time at its first step until all that work for it are there: how long nodes take to start changes no drive.
@@ -129,10 +140,13 @@ class SimulatorNode:
 
     def _wait(self, due_s: float) -> None:
         """Wait until wall clock and followers have come far enough."""
-        again_s = time.monotonic() + START_CLOCK_S
+        last_s = time.monotonic()
+        again_s = last_s + START_CLOCK_S
         while not self._ended:
-            now_s = time.monotonic()
-            lagging = self._lockstep.lagging(self._simulation.now_s, now_s)
+            last_s, before_s = time.monotonic(), last_s
+            self._waited_s += (last_s - before_s) * self._processor.share
+            now_s = last_s
+            lagging = self._lockstep.lagging(self._simulation.now_s, self._waited_s)
             if not lagging and now_s >= due_s:
                 return
             for topic in set(lagging) & set(self._absent()):
