@@ -33,7 +33,7 @@ from uav_msgs.srv import TakeoffRequest as TakeoffCall
 
 from perception_core.host import Input
 from perception_core.ros import RawSubscriber, TunableSettings, read_settings, warn_of_garbage
-from resource_reporter import DoneReporter, ResourceReporter, ToldService
+from resource_reporter import DoneReporter, ResourceReporter, ToldService, send_directly
 from uav_guidance import requests
 from uav_guidance.encoding import command_message, heartbeat_message, interval_message, setpoint_message
 from uav_guidance.follower import Setpoint
@@ -269,5 +269,6 @@ def _next_due(due_s: float, now_s: float) -> float:
 
 def main() -> None:
     """Run the guidance node, with its private parameters, until ROS shuts down."""
+    send_directly()
     rospy.init_node("uav_guidance")
     GuidanceNode(read_settings(GuidanceSettings())).run()

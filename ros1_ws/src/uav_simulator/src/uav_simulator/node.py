@@ -19,6 +19,7 @@ from uav_msgs.srv import SetSensor, SetSensorRequest, SetSensorResponse
 
 from alula.common.faults import FaultError, parse_faults
 from alula.common.signals import StopEvent
+from resource_reporter import send_directly
 from uav_simulator import ros_messages
 from uav_simulator.drivers import Drivers
 from uav_simulator.errors import ConfigError, SimulatorError
@@ -218,6 +219,7 @@ class SimulatorNode:
 
 def main() -> None:
     """Run the node until ROS ends it; a wrong parameter ends it with one line."""
+    send_directly()
     # Not rospy's own handlers: they close connections inside the signal's handler, and wait for ever when the signal
     # interrupts the main thread in the middle of a publish, which here is where it nearly always is.
     rospy.init_node("uav_simulator", disable_signals=True)

@@ -12,7 +12,7 @@ import rospy
 from perception_core.ros.subscription import RawSubscriber
 from perception_core.ros.switch import EnableSwitch
 from perception_core.ros.worker import NewestWorker
-from resource_reporter import DoneReporter, ResourceReporter
+from resource_reporter import DoneReporter, ResourceReporter, send_directly
 
 if TYPE_CHECKING:
     from collections.abc import Sequence
@@ -29,6 +29,7 @@ class RosHost:
     """
 
     def __init__(self, skillset: str, outputs: Sequence[Output]) -> None:
+        send_directly()
         self._publishers = {each.topic: _publisher(each) for each in outputs}
         self._subscribers: dict[str, RawSubscriber] = {}
         self._reporter = ResourceReporter(skillset)
