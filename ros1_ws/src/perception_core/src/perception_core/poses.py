@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections import deque
 from dataclasses import dataclass
 from threading import Condition
@@ -51,7 +52,7 @@ class PoseBuffer:
 
     def add(self, stamp_ns: int, position_m: Sequence[float], quat_xyzw: Sequence[float]) -> None:
         """Remember a pose; time that jumps backwards (a restarted clock) clears the memory. One with numbers that are none is left out."""
-        if not np.isfinite([*position_m, *quat_xyzw]).all() or not any(quat_xyzw):
+        if not all(map(math.isfinite, (*position_m, *quat_xyzw))) or not any(quat_xyzw):
             return
         with self._lock:
             if self._rows and stamp_ns <= self._rows[-1][0]:

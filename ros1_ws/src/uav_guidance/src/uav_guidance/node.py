@@ -31,6 +31,7 @@ from uav_msgs.srv import (
 )
 from uav_msgs.srv import TakeoffRequest as TakeoffCall
 
+from perception_core.conversions import MAP
 from perception_core.host import Input
 from perception_core.ros import RawSubscriber, TunableSettings, read_settings, warn_of_garbage
 from resource_reporter import DoneReporter, ResourceReporter, ToldService, send_directly
@@ -93,7 +94,8 @@ class GuidanceNode:
         for topic in ("/zed_depth/obstacle", "/lidar_obstacles/obstacle"):
             RawSubscriber(Input(topic, Obstacle, self._on_obstacle, _on_garbage, BUFFER_BYTES, queue_size=5))
         RawSubscriber(Input("/lidar_mapping/state", MappingState, self._on_mapping, warn_of_garbage, BUFFER_BYTES))
-        RawSubscriber(Input("/tf", TFMessage, self._on_transforms, warn_of_garbage, BUFFER_BYTES, queue_size=TRANSFORMS_WAITING))
+        transforms = Input("/tf", TFMessage, self._on_transforms, warn_of_garbage, BUFFER_BYTES, TRANSFORMS_WAITING, about=MAP.encode())
+        RawSubscriber(transforms)
         self._offer_services()
         self._tuning = TunableSettings(settings, self._tune)
         self._done = DoneReporter(self._reporter)
