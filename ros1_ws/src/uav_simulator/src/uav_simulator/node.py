@@ -34,7 +34,6 @@ from uav_simulator.world.ply import write_mesh
 
 POSE_PERIOD_NS = 50_000_000
 STATE_PERIOD_NS = 1_000_000_000
-WAIT_S = 0.002  # longest nap while time stands still; MAVLink wakes it
 START_CLOCK_S = 0.05  # how often the first tick is told while time has not begun, for nodes that come late
 CATCH_UP_S = 0.25  # a delay of more is not made up for
 # Behind an autopilot that does not wait: then pictures and sweeps are left out, and nodes are not waited for. Poses and measurements are
@@ -78,6 +77,7 @@ class SimulatorNode:
         self._pose_due_ns = self._state_due_ns = 0
         self._last_state = self._simulation.state
         self._left_out: list[str] = []
+        self._held = False
         self._late_told_s = -LATE_TOLD_S
         self._stopping = StopEvent()
         for name, port in self._pilot.ports.items():
@@ -130,7 +130,7 @@ class SimulatorNode:
             self._publish_clock()
             again = time.monotonic() + START_CLOCK_S
             while (rest := again - time.monotonic()) > 0.0:
-                self._pilot.serve(min(rest, WAIT_S))
+                self._pilot.serve(min(rest, self._pilot.nap_s))
         if missing and not self._ended:
             rospy.logwarn(f"simulated time begins without {', '.join(missing)}: not connected for {self._settings.start_timeout_s:g} s")
         self._pacer.begin(self._simulation.now_s)
@@ -145,10 +145,11 @@ class SimulatorNode:
         """Serve the link until wall time and the paced topics have come far enough."""
         while not self._ended:
             now = time.monotonic()
-            held = not self._late and not self._pacer.may_advance(self._simulation.now_s, now)
+            self._held = True  # before it is asked: what is heard from here on ends the nap
+            self._held = held = not self._late and not self._pacer.may_advance(self._simulation.now_s, now)
             if held:
                 self._leave_out_the_dead()
-            rest = max(due - now, WAIT_S if held else 0.0)
+            rest = max(due - now, self._pilot.nap_s if held else 0.0)
             self._pilot.serve(rest)
             if not held and rest <= 0.0:
                 break
@@ -204,6 +205,8 @@ class SimulatorNode:
             self._heard_at_start.add(topic)  # it may be of a type without a header
             return
         self._pacer.heard(topic, header_stamp_s(message._buff))  # noqa: SLF001 - AnyMsg has no other access to its bytes
+        if self._held:
+            self._pilot.wake()
 
     def _leave_out_the_dead(self) -> None:
         for topic in self._absent():
