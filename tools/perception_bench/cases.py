@@ -28,7 +28,6 @@ Work = Callable[[], object]
 DATA = Path(os.environ.get("ALULA_DATA", Path(__file__).resolve().parents[3] / "shared" / "data"))
 FORWARD = VehicleMotion(velocity_enu_m_s=(1.0, 0.0, 0.0))
 OPTICAL = np.array([[0.0, 0, 1, 0.3], [-1, 0, 0, 0], [0, -1, 0, 0], [0, 0, 0, 1]])
-NEAR_M = 0.45
 BASELINE_M = 0.12
 
 
@@ -82,7 +81,7 @@ def stereo(width: int, height: int, fx: float) -> dict[str, Work]:
 
     divisor = max(1, round(width / settings.max_width_px))
     small = [cv2.resize(image, (width // divisor, height // divisor), interpolation=cv2.INTER_AREA) for image in (left, right)]
-    count = 16 * int(np.ceil((fx / divisor * BASELINE_M / NEAR_M + 1) / 16))
+    count = 16 * int(np.ceil((fx / divisor * BASELINE_M / ZedSettings().near_depth_m + 1) / 16))
     ours, bare = StereoMatcher(MatcherSettings(), DisparityRange(0, count)), bare_matcher(count)
     wide = [cv2.copyMakeBorder(image, 0, 0, count, 0, cv2.BORDER_REPLICATE) for image in small]
     return {

@@ -1,6 +1,7 @@
 """The autopilot's sockets: a companion over TCP and a ground station over UDP, on one vehicle."""
 
 import socket
+import threading
 
 import pytest
 from pymavlink.dialects.v20 import ardupilotmega as mavlink
@@ -10,6 +11,7 @@ from uav_simulator.autopilot.endpoint import Endpoint
 from uav_simulator.autopilot.link_server import LinkServer
 
 WAIT_S = 2.0
+LONG_S = 1e5  # longer than any test may take
 
 
 @pytest.fixture
@@ -72,3 +74,12 @@ def test_garbage_and_a_station_that_has_gone_do_no_harm(links):
     station.close()
     advance(link, ground, server, 2.0)
     assert mavlink.MAVLink(None).parse_buffer(companion.recv(65536))
+
+
+def test_a_wait_is_ended_by_another_thread(links):
+    _, _, server, _, _ = links
+    for _ in range(3):
+        waker = threading.Thread(target=server.wake)
+        waker.start()
+        server.serve(LONG_S)
+        waker.join()

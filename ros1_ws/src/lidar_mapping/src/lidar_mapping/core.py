@@ -10,13 +10,12 @@ from typing import TYPE_CHECKING
 import numpy as np
 from genpy import Time
 from geometry_msgs.msg import Point, PoseWithCovarianceStamped, Quaternion, TransformStamped, Vector3
-from scipy.spatial.transform import Rotation
 from sensor_msgs.msg import Imu, PointCloud2
 from std_msgs.msg import Header
 from tf2_msgs.msg import TFMessage
 from uav_msgs.msg import MappingState
 
-from lidar_mapping.inertial import ImuReading
+from lidar_mapping.inertial import ImuReading, quaternion_xyzw
 from lidar_mapping.ply import read_ply, write_ply
 from lidar_mapping.readings import ReadingQueue
 from lidar_mapping.slam import Slam
@@ -215,7 +214,7 @@ class LidarMapping:
             return
         message = PoseWithCovarianceStamped(header=Header(stamp=_time(stamp_ns), frame_id="map"))
         message.pose.pose.position = Point(*known[0][:3, 3])
-        message.pose.pose.orientation = Quaternion(*Rotation.from_matrix(known[0][:3, :3]).as_quat())
+        message.pose.pose.orientation = Quaternion(*quaternion_xyzw(known[0][:3, :3]))
         message.pose.covariance = known[1].ravel().tolist()
         self._host.publish(POSE.topic, message)
 
@@ -228,7 +227,7 @@ class LidarMapping:
             return  # the identity would be a jump of the pose in flight
         transform = TransformStamped(header=Header(stamp=_time(self._host.now_ns()), frame_id="map"), child_frame_id="odom")
         transform.transform.translation = Vector3(*place[:3, 3])
-        transform.transform.rotation = Quaternion(*Rotation.from_matrix(place[:3, :3]).as_quat())
+        transform.transform.rotation = Quaternion(*quaternion_xyzw(place[:3, :3]))
         self._host.publish(TF.topic, TFMessage(transforms=[transform]))
 
     def _publish_map(self) -> None:

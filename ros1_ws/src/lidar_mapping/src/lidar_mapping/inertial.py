@@ -8,6 +8,7 @@ attitudes or velocities within a few seconds know no more than one.
 
 from __future__ import annotations
 
+import math
 from collections import deque
 from dataclasses import dataclass, field
 from typing import TYPE_CHECKING
@@ -32,6 +33,7 @@ TERMS = 21
 HISTORY = 2000
 """States kept since the last sweep: of a few seconds, for the autopilot may have been silent."""
 SHAKING_S = 0.3
+UNIT = np.eye(3)
 
 
 @dataclass(frozen=True)
@@ -134,7 +136,7 @@ class Shaking:
 
     def __init__(self) -> None:
         self._newest: deque[ImuReading] = deque(maxlen=3)
-        self._variances: Floats = np.zeros(2)
+        self._variances: tuple[float, ...] = (0.0, 0.0)
 
     def densities(self, reading: ImuReading) -> tuple[float, float]:
         """Take the next reading; return the densities per root hertz of rates and specific force over the last `SHAKING_S`."""
@@ -149,11 +151,11 @@ class Shaking:
             (1.0 - share) * first.rates + share * last.rates - middle.rates,
             (1.0 - share) * first.specific_force + share * last.specific_force - middle.specific_force,
         ]
-        fading = np.exp(-(long_s - short_s) / SHAKING_S)
-        seen = np.array([float(each @ each) for each in off]) * 0.5 * long_s / spread
-        self._variances = fading * self._variances + (1.0 - fading) * seen
-        gyro, accel = np.sqrt(self._variances)
-        return float(gyro), float(accel)
+        fading = math.exp(-(long_s - short_s) / SHAKING_S)
+        seen = (float(each @ each) * 0.5 * long_s / spread for each in off)
+        self._variances = tuple(fading * before + (1.0 - fading) * now for before, now in zip(self._variances, seen, strict=True))
+        gyro, accel = map(math.sqrt, self._variances)
+        return gyro, accel
 
 
 class InertialFilter:
@@ -183,7 +185,7 @@ class InertialFilter:
             rates = 0.5 * (before.rates + reading.rates) - self.state.gyro_bias
             force = 0.5 * (before.specific_force + reading.specific_force) - self.state.accel_bias
             noise = self._noise
-            densities = np.square([max(noise.gyro, gyro), max(noise.accel, accel), 0.0, noise.gyro_walk, noise.accel_walk])
+            densities = (max(noise.gyro, gyro), max(noise.accel, accel), 0.0, noise.gyro_walk, noise.accel_walk)
             self._move(reading.stamp_ns, rates, self.state.rotation @ force + GRAVITY, force, densities)
 
     def coast(self, stamp_ns: int) -> None:
@@ -191,7 +193,7 @@ class InertialFilter:
         duration_s = (stamp_ns - self.stamp_ns) / NS
         if duration_s > 0.0:
             noise = self._noise
-            densities = np.square([noise.free_rad_s, noise.free_m_s2, 0.0, noise.gyro_walk, noise.accel_walk])
+            densities = (noise.free_rad_s, noise.free_m_s2, 0.0, noise.gyro_walk, noise.accel_walk)
             self._move(stamp_ns, np.zeros(3), np.zeros(3), np.zeros(3), densities)
 
     def correct(self, linearise: Linearise, *, least: int = 1, most: int = 1) -> None:
@@ -222,22 +224,26 @@ class InertialFilter:
 
         return take_back
 
-    def _move(self, stamp_ns: int, rates: Floats, acceleration: Floats, force: Floats, densities: Floats) -> None:
+    def _move(self, stamp_ns: int, rates: Floats, acceleration: Floats, force: Floats, densities: tuple[float, ...]) -> None:
         duration_s = (stamp_ns - self.stamp_ns) / NS
         before, noise = self.state, self._noise
-        fading, drift_fading = np.exp(-duration_s / np.array([noise.autopilot_s, noise.autopilot_drift_s]))
+        fading, drift_fading = math.exp(-duration_s / noise.autopilot_s), math.exp(-duration_s / noise.autopilot_drift_s)
         turn = rotation_matrix(rates * duration_s)
-        transition = np.eye(TERMS)
+        transition, step = np.eye(TERMS), UNIT * duration_s
+        moved = before.rotation * -duration_s
         transition[ATTITUDE, ATTITUDE] = turn.T
-        transition[ATTITUDE, GYRO_BIAS] = -np.eye(3) * duration_s
-        transition[VELOCITY, ATTITUDE] = -before.rotation @ cross_matrix(force) * duration_s
-        transition[VELOCITY, ACCEL_BIAS] = -before.rotation * duration_s
-        transition[POSITION, VELOCITY] = np.eye(3) * duration_s
-        transition[AUTOPILOT, AUTOPILOT] = np.eye(3) * fading
-        transition[DRIFT, DRIFT] = np.eye(3) * drift_fading
-        slow = [*(1.0 - fading**2) * noise.autopilot_rad**2, *np.full(3, (1.0 - drift_fading**2) * noise.autopilot_drift**2)]
-        growth = [*np.repeat(densities * duration_s, 3), *slow]
-        self.covariance = transition @ self.covariance @ transition.T + np.diag(growth)
+        transition[ATTITUDE, GYRO_BIAS] = -step
+        transition[VELOCITY, ATTITUDE] = moved @ cross_matrix(force)
+        transition[VELOCITY, ACCEL_BIAS] = moved
+        transition[POSITION, VELOCITY] = step
+        transition[AUTOPILOT, AUTOPILOT] = UNIT * fading
+        transition[DRIFT, DRIFT] = UNIT * drift_fading
+        tilt, heading = noise.autopilot_tilt_rad**2 * (1.0 - fading**2), noise.autopilot_heading_rad**2 * (1.0 - fading**2)
+        drift = noise.autopilot_drift**2 * (1.0 - drift_fading**2)
+        growth = [density * density * duration_s for density in densities for _ in range(3)] + [tilt, tilt, heading, drift, drift, drift]
+        covariance = transition @ self.covariance @ transition.T
+        covariance.flat[:: TERMS + 1] += growth
+        self.covariance = covariance
         self.state = InertialState(
             before.rotation @ turn,
             before.velocity + acceleration * duration_s,
@@ -259,6 +265,12 @@ def rotation_matrix(vector: Floats) -> Floats:
 def rotation_vector(matrix: Floats) -> Floats:
     """Return the rotation vector (3,), radians, of a matrix (3, 3)."""
     return np.asarray(gtsam.Rot3.Logmap(gtsam.Rot3(matrix)), dtype=np.float64)
+
+
+def quaternion_xyzw(matrix: Floats) -> tuple[float, float, float, float]:
+    """Return the unit quaternion of a matrix (3, 3)."""
+    q = gtsam.Rot3(matrix).toQuaternion()
+    return float(q.x()), float(q.y()), float(q.z()), float(q.w())
 
 
 def cross_matrix(v: Floats) -> Floats:

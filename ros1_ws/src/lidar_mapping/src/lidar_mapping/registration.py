@@ -23,8 +23,6 @@ if TYPE_CHECKING:
 
     Floats = NDArray[np.float64]
 
-POSE = np.array([0, 1, 2, 6, 7, 8])
-"""The places of attitude and position in the filter's error."""
 SEARCHED_M = 0.03  # patches are searched again where a point has moved by more: within that a neighbouring patch tells of the same plane
 FITNESS_GATES = 3.0
 
@@ -107,7 +105,8 @@ class _Measurement:
         off_m, inside = self._off(state, gate_m)
         kernel_m = max(0.2 * gate_m, settings.kernel_m)
         weight = inside * (settings.independent / settings.point_sigma_m**2 / (1.0 + (off_m / kernel_m) ** 2))
-        rows = np.vstack([cross(self._paired, state.rotation.T @ self._normals), self._normals])
+        rows = self._rows
+        cross(self._paired, state.rotation.T @ rows[3:], out=rows[:3])
         return self._spread((rows * weight) @ rows.T, rows @ (weight * off_m), float(weight.sum()))
 
     def judge(self, state: InertialState) -> None:
@@ -122,23 +121,26 @@ class _Measurement:
         if self._searched is None or np.abs(placed - self._searched).max() > SEARCHED_M:
             self._searched = placed
             self._chosen, patch = self._surface.nearest(placed.T, within_m=self._reach_m)
-            self._paired = self._points[:, self._chosen]
-            self._patches, self._normals = (np.ascontiguousarray(each[patch].T) for each in (self._surface.points, self._surface.normals))
-        apart = placed[:, self._chosen] - self._patches
-        off_m: Floats = np.einsum("ij,ij->j", self._normals, apart)
+            self._paired = self._points.take(self._chosen, axis=1)
+            self._patches = np.ascontiguousarray(self._surface.points.take(patch, axis=0).T)
+            self._rows = np.empty((6, len(patch)))  # by how much a turn and a shift move each point along its patch's normal
+            self._rows[3:] = self._surface.normals.take(patch, axis=0).T
+        apart = placed.take(self._chosen, axis=1) - self._patches
+        off_m: Floats = np.einsum("ij,ij->j", self._rows[3:], apart)
         return off_m, np.einsum("ij,ij->j", apart, apart) < gate_m**2
 
     def _spread(self, information: Floats, gradient: Floats, total: float) -> tuple[Floats, Floats]:
         """Take the information of noise off, and put the rest in the filter's places."""
         values, axes = np.linalg.eigh(information[3:, 3:])
         noise = 3.0 * self._settings.tilt_rad**2 * total
-        share = np.clip((values - noise) / np.maximum(values, 1e-9), 0.0, 1.0)
-        scale = np.eye(6)
-        scale[3:, 3:] = axes @ np.diag(np.sqrt(share)) @ axes.T
-        information, gradient = scale @ information @ scale, scale @ gradient
-        self.held = information[3:, 3:]
+        share = np.minimum(np.maximum(values - noise, 0.0) / np.maximum(values, 1e-9), 1.0)
+        scale = (axes * np.sqrt(share)) @ axes.T
+        self.held = scale @ information[3:, 3:] @ scale
+        mixed = information[:3, 3:] @ scale
         whole, whole_gradient = np.zeros((TERMS, TERMS)), np.zeros(TERMS)
-        whole[np.ix_(POSE, POSE)], whole_gradient[POSE] = information, gradient
+        whole[ATTITUDE, ATTITUDE], whole[ATTITUDE, POSITION] = information[:3, :3], mixed
+        whole[POSITION, ATTITUDE], whole[POSITION, POSITION] = mixed.T, self.held
+        whole_gradient[ATTITUDE], whole_gradient[POSITION] = gradient[:3], scale @ gradient[3:]
         return whole, whole_gradient
 
 

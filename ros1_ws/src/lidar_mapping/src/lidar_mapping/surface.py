@@ -118,9 +118,13 @@ def smallest_axis(symmetric: Floats) -> tuple[Floats, Floats]:
     return np.stack([least, middle], axis=1), normals[best, :, chosen] / length[:, None]
 
 
-def cross(a: Floats, b: Floats) -> Floats:
-    """Return the cross products of columns (3, N); several times as fast as `numpy.cross` of rows."""
-    return np.stack([a[1] * b[2] - a[2] * b[1], a[2] * b[0] - a[0] * b[2], a[0] * b[1] - a[1] * b[0]])
+def cross(a: Floats, b: Floats, out: Floats | None = None) -> Floats:
+    """Return the cross products of columns (3, N), in ``out`` if it is given; several times as fast as `numpy.cross` of rows."""
+    product = np.empty_like(a) if out is None else out
+    for i, j, k in ((0, 1, 2), (1, 2, 0), (2, 0, 1)):
+        np.multiply(a[j], b[k], out=product[i])
+        product[i] -= a[k] * b[j]
+    return product
 
 
 class Surface:

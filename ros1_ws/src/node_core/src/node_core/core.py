@@ -26,7 +26,10 @@ class Output:
 
 @dataclass(frozen=True)
 class Input:
-    """A topic that a core takes: messages go to ``take``, what is none to ``garbage``, with a sentence."""
+    """A topic that a core takes: messages go to ``take``, what is none to ``garbage``, with a sentence.
+
+    Of a topic that carries much for others, those messages alone are decoded whose bytes hold the word ``about``.
+    """
 
     topic: str
     kind: type[Any]
@@ -34,12 +37,15 @@ class Input:
     garbage: Callable[[str], None] = lambda _reason: None
     buffer_bytes: int = 1 << 16
     queue_size: int = 1
+    about: bytes = b""
 
     def take_bytes(self, sent: str, data: bytes) -> None:
         """Decode a message of the type that its publisher has told (``*``: any), and take it."""
         wanted = self.kind._type  # noqa: SLF001 -- generated messages have it
         if sent not in {"*", wanted}:
             self.garbage(f"{self.topic} carries {sent}, expected {wanted}")
+            return
+        if self.about not in data:
             return
         message = self.kind()
         try:

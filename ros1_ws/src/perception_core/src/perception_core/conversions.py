@@ -8,12 +8,11 @@ from typing import TYPE_CHECKING
 import numpy as np
 from genpy import Time
 from geometry_msgs.msg import Point, Vector3
-from scipy.spatial.transform import Rotation
 from sensor_msgs.msg import Image, PointCloud2, PointField
 from std_msgs.msg import Header
 from uav_msgs.msg import Obstacle
 
-from perception_core.poses import NS
+from perception_core.poses import NS, rotation_of
 
 if TYPE_CHECKING:
     from geometry_msgs.msg import Transform
@@ -50,7 +49,8 @@ def matrix_of_transform(transform: Transform) -> NDArray[np.float64]:
     """Return a (4, 4) matrix."""
     q, t = transform.rotation, transform.translation
     matrix = np.eye(4)
-    matrix[:3, :3] = Rotation.from_quat([q.x, q.y, q.z, q.w]).as_matrix()
+    length = math.hypot(q.x, q.y, q.z, q.w)
+    matrix[:3, :3] = rotation_of(q.x / length, q.y / length, q.z / length, q.w / length)
     matrix[:3, 3] = [t.x, t.y, t.z]
     return matrix
 

@@ -2,6 +2,9 @@
 
 from __future__ import annotations
 
+import math
+import operator
+from bisect import bisect_right
 from collections import deque
 from dataclasses import dataclass
 from threading import Condition
@@ -15,6 +18,10 @@ if TYPE_CHECKING:
     from numpy.typing import NDArray
 
 NS = 1_000_000_000
+LEAST_ANGLE = 1e-6  # between two unit quaternions; nearer ones are interpolated linearly
+
+_Row = tuple[float, float, float, float, float, float, float]
+"""A position, and a unit quaternion x, y, z, w."""
 
 
 class PoseUnavailableError(LookupError):
@@ -46,17 +53,19 @@ class PoseBuffer:
     def __init__(self, *, keep_s: float = 3.0, tolerance_s: float = 0.15) -> None:
         self._keep_ns = int(keep_s * NS)
         self._tolerance_ns = int(tolerance_s * NS)
-        self._rows: deque[tuple[int, tuple[float, ...]]] = deque()
+        self._rows: deque[tuple[int, _Row]] = deque()
         self._lock = Condition()
 
     def add(self, stamp_ns: int, position_m: Sequence[float], quat_xyzw: Sequence[float]) -> None:
         """Remember a pose; time that jumps backwards (a restarted clock) clears the memory. One with numbers that are none is left out."""
-        if not np.isfinite([*position_m, *quat_xyzw]).all() or not any(quat_xyzw):
+        if not all(map(math.isfinite, (*position_m, *quat_xyzw))) or not any(quat_xyzw):
             return
+        (x, y, z), (qx, qy, qz, qw), length = position_m, quat_xyzw, math.hypot(*quat_xyzw)
+        row = (x, y, z, qx / length, qy / length, qz / length, qw / length)
         with self._lock:
             if self._rows and stamp_ns <= self._rows[-1][0]:
                 self._rows.clear()
-            self._rows.append((stamp_ns, (*position_m, *quat_xyzw)))
+            self._rows.append((stamp_ns, row))
             while self._rows[0][0] < stamp_ns - self._keep_ns:
                 self._rows.popleft()
             self._lock.notify_all()
@@ -78,14 +87,12 @@ class PoseBuffer:
             rows = list(self._rows)
         if not rows:
             raise PoseUnavailableError("no pose was received yet: is the guidance running?")
-        wanted = np.asarray(stamps_ns, dtype=np.int64)
         tolerance_ns = self._tolerance_ns if tolerance_s is None else int(tolerance_s * NS)
-        _check_reach(int(wanted.min()), int(wanted.max()), rows[0][0], rows[-1][0], tolerance_ns)
-        known = np.array([stamp for stamp, _ in rows], dtype=np.int64)
-        first = max(0, int(np.searchsorted(known, wanted.min(), side="right")) - 1)
-        last = min(len(rows), int(np.searchsorted(known, wanted.max(), side="left")) + 1)
-        values = np.array([row for _, row in rows[first:last]])
-        return _interpolate(known[first:last], values, wanted)
+        known_ns, values = zip(*rows, strict=True)
+        _check_reach(min(stamps_ns), max(stamps_ns), known_ns[0], known_ns[-1], tolerance_ns)
+        # By plain numbers: for the dozen moments of a sweep numpy takes several times as long.
+        found = [values[0] if len(rows) == 1 else _interpolated(known_ns, values, int(stamp_ns)) for stamp_ns in stamps_ns]
+        return Poses(rotation=np.array([rotation_of(*row[3:]) for row in found]), position=np.array([row[:3] for row in found]))
 
 
 def _check_reach(first_ns: int, last_ns: int, oldest_ns: int, newest_ns: int, tolerance_ns: int) -> None:
@@ -94,34 +101,26 @@ def _check_reach(first_ns: int, last_ns: int, oldest_ns: int, newest_ns: int, to
         raise PoseUnavailableError(f"the nearest known pose is {gap_ns / NS:.2f} s away, more than {tolerance_ns / NS:.2f} s")
 
 
-def _interpolate(known_ns: NDArray[np.int64], values: NDArray[np.float64], wanted_ns: NDArray[np.int64]) -> Poses:
-    known_s = (known_ns - known_ns[0]) / NS
-    wanted_s = np.clip((wanted_ns - known_ns[0]) / NS, 0.0, known_s[-1])
-    before = np.clip(np.searchsorted(known_s, wanted_s, side="right") - 1, 0, max(0, len(known_s) - 2))
-    after = np.minimum(before + 1, len(known_s) - 1)
-    share = ((wanted_s - known_s[before]) / np.maximum(known_s[after] - known_s[before], 1e-9))[:, None]
-    position = values[before, :3] + share * (values[after, :3] - values[before, :3])
-    quats = values[:, 3:] / np.linalg.norm(values[:, 3:], axis=1, keepdims=True)
-    return Poses(rotation=_matrices(_slerp(quats[before], quats[after], share)), position=position)
+def _interpolated(stamps_ns: Sequence[int], rows: Sequence[_Row], wanted_ns: int) -> _Row:
+    """Return the position and the unit quaternion of a moment; beyond what is known those of the nearest end."""
+    later = min(max(bisect_right(stamps_ns, wanted_ns), 1), len(rows) - 1)
+    before_ns, after_ns = stamps_ns[later - 1], stamps_ns[later]
+    share = min(max((wanted_ns - before_ns) / max(after_ns - before_ns, 1), 0.0), 1.0)
+    (x, y, z, *first), (next_x, next_y, next_z, *second) = rows[later - 1], rows[later]
+    cosine = sum(map(operator.mul, first, second))
+    angle = math.acos(min(abs(cosine), 1.0))
+    of_first, of_second = 1.0 - share, share
+    if angle >= LEAST_ANGLE:
+        of_first, of_second = (math.sin(part * angle) / math.sin(angle) for part in (of_first, of_second))
+    of_second = math.copysign(of_second, cosine)
+    qx, qy, qz, qw = (of_first * a + of_second * b for a, b in zip(first, second, strict=True))
+    return (x + share * (next_x - x), y + share * (next_y - y), z + share * (next_z - z), qx, qy, qz, qw)
 
 
-def _slerp(first: NDArray[np.float64], second: NDArray[np.float64], share: NDArray[np.float64]) -> NDArray[np.float64]:
-    """Interpolate unit quaternions (N, 4) on the great arc; ``share`` (N, 1) is of the second."""
-    cosine = np.sum(first * second, axis=1, keepdims=True)
-    second = np.where(cosine < 0.0, -second, second)
-    angle = np.arccos(np.minimum(np.abs(cosine), 1.0))
-    near = angle < 1e-6
-    sine = np.where(near, 1.0, np.sin(angle))
-    weights = np.where(near, (1.0 - share, share), (np.sin((1.0 - share) * angle) / sine, np.sin(share * angle) / sine))
-    mixed: NDArray[np.float64] = weights[0] * first + weights[1] * second
-    return mixed
-
-
-def _matrices(quats_xyzw: NDArray[np.float64]) -> NDArray[np.float64]:
-    x, y, z, w = quats_xyzw.T
-    rows = [
-        [1 - 2 * (y * y + z * z), 2 * (x * y - w * z), 2 * (x * z + w * y)],
-        [2 * (x * y + w * z), 1 - 2 * (x * x + z * z), 2 * (y * z - w * x)],
-        [2 * (x * z - w * y), 2 * (y * z + w * x), 1 - 2 * (x * x + y * y)],
+def rotation_of(x: float, y: float, z: float, w: float) -> list[list[float]]:
+    """Return the rows of the rotation matrix of a unit quaternion."""
+    return [
+        [1.0 - 2.0 * (y * y + z * z), 2.0 * (x * y - w * z), 2.0 * (x * z + w * y)],
+        [2.0 * (x * y + w * z), 1.0 - 2.0 * (x * x + z * z), 2.0 * (y * z - w * x)],
+        [2.0 * (x * z - w * y), 2.0 * (y * z + w * x), 1.0 - 2.0 * (x * x + y * y)],
     ]
-    return np.moveaxis(np.array(rows), 2, 0)

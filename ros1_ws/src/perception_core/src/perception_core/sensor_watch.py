@@ -73,28 +73,29 @@ class SensorWatch:
         """Judge at this moment; ``missing`` says which inputs have no driver."""
         now_ns = self._host.now_ns()
         with self._lock:
-            verdict = self._watch.tick(now_ns, missing=missing)
-            message = self._message(now_ns)
-        changed = verdict is not self._told
+            verdict, fault, reason = self._watch.tick(now_ns, missing=missing), self._watch.fault, self._watch.reason
+            changed = verdict is not self._told
+            # Half a tick of tolerance, or the clock's grain would turn 10 Hz into 8.
+            due = changed or not 0 <= now_ns - self._published_ns < (PUBLISH_S - TICK_S / 2) * NS
+            message = self._message(now_ns) if due else None
         self._told = verdict
         if changed:
-            self._host.info(f"{self._sensor} is {verdict.value} {message.reason}")
+            self._host.info(f"{self._sensor} is {verdict.value} {reason}")
         self._judged |= changed
-        self._report(verdict, message)
-        # Half a tick of tolerance, or the clock's grain would turn 10 Hz into 8.
-        if changed or not 0 <= now_ns - self._published_ns < (PUBLISH_S - TICK_S / 2) * NS:
+        self._report(verdict, fault, reason)
+        if message is not None:
             self._published_ns = now_ns
             self._host.publish(HEALTH.topic, message)
 
-    def _report(self, verdict: Verdict, message: SensorHealth) -> None:
+    def _report(self, verdict: Verdict, fault: FaultKind, reason: str) -> None:
         """Tell the skillset a new verdict or a new kind of fault, with its reason; the figures in a reason change all the time.
 
         Before its first verdict a node that was started again knows nothing against what the one before it has said.
         """
-        news = (verdict, message.fault if self._judged else message.reason)
+        news = (verdict, fault.value if self._judged else reason)
         if news != self._reported:
             self._reported = news
-            self._host.report(self._resource, verdict.value, message.reason, insist=self._judged)
+            self._host.report(self._resource, verdict.value, reason, insist=self._judged)
 
     def _message(self, now_ns: int) -> SensorHealth:
         watch = self._watch

@@ -21,7 +21,7 @@ if TYPE_CHECKING:
     from numpy.typing import NDArray
 
 BUFFER_BYTES = 1 << 16
-TRANSFORMS_WAITING = 50  # the vehicle's pose comes on the same topic, at 50 Hz
+TRANSFORMS_WAITING = 50  # the vehicle's pose comes on the same topic, at 50 Hz, which is of no interest here
 POSES_KEPT_S = 3.0
 BASE = "base_link"
 LONGEST_CHAIN = 16  # of frames between a sensor and base_link; longer is a loop
@@ -46,7 +46,7 @@ class KnownVehicle:
         return [
             Input("/uav_guidance/pose", PoseStamped, self._on_pose, garbage, BUFFER_BYTES, queue_size=50),
             Input("/uav_guidance/state", GuidanceState, self._on_state, garbage, BUFFER_BYTES),
-            Input("/tf", TFMessage, self._on_transforms, garbage, BUFFER_BYTES, queue_size=TRANSFORMS_WAITING),
+            Input("/tf", TFMessage, self._on_transforms, garbage, BUFFER_BYTES, TRANSFORMS_WAITING, about=GUIDANCE_MAP.encode()),
             Input("/tf_static", TFMessage, self._on_static, garbage, BUFFER_BYTES, queue_size=10),
         ]
 

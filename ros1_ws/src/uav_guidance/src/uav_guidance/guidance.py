@@ -64,8 +64,7 @@ class Guidance:
     def __init__(self, settings: GuidanceSettings) -> None:
         self.odometry = VehicleSnapshot()
         """As the autopilot says, in `odom`."""
-        self.vehicle = VehicleSnapshot()
-        """The same in `map`."""
+        self._in_map: VehicleSnapshot | None = None
         self._settings = settings
         self._localization = Localization(settings)
         self._home_map_m: Vec3 | None = None
@@ -96,6 +95,13 @@ class Guidance:
         self._follower.tune(settings)
 
     @property
+    def vehicle(self) -> VehicleSnapshot:
+        """What is known of the vehicle, in `map`; it is made when it is asked for, which is less often than something is heard of it."""
+        if self._in_map is None:
+            self._in_map = in_map(self.odometry, self.correction, self._home_map_m)
+        return self._in_map
+
+    @property
     def correction(self) -> Correction:
         """The transform T_map_odom in use."""
         return self._localization.correction
@@ -113,8 +119,8 @@ class Guidance:
         before, self.odometry = self.odometry, updated(self.odometry, message, now_s)
         self._leapt |= leapt(before, self.odometry, self._settings.map_jump_m)
         self._keep_home(before)
-        self.vehicle = in_map(self.odometry, self.correction, self._home_map_m)
-        if self.vehicle.boots > before.boots:
+        self._in_map = None
+        if self.odometry.boots > before.boots:
             self._start_over(now_s)
         if kind == "HEARTBEAT":
             self._authority.hear_heartbeat(self.vehicle)
@@ -174,7 +180,7 @@ class Guidance:
 
     def link(self, now_s: float) -> bool:
         """Return whether anything arrives from the autopilot; heartbeats alone may be seconds apart on a busy machine."""
-        known = self._heard_s is not None and self.vehicle.heartbeat_s is not None
+        known = self._heard_s is not None and self.odometry.heartbeat_s is not None
         return known and abs(now_s - (self._heard_s or 0.0)) <= self._settings.link_lost_s
 
     def resources(self) -> dict[str, str]:
@@ -310,7 +316,7 @@ class Guidance:
         place = self.odometry.position_enu_m
         if place is None:
             return
-        flying = self.vehicle.armed or not self.vehicle.on_ground
+        flying = self.odometry.armed or not self.odometry.on_ground
         jumped = self._localization.step(place, now_s, flying=flying)
         if self._leapt and flying:
             log.warning("the autopilot's estimate of its place has jumped")
@@ -318,7 +324,7 @@ class Guidance:
         self._leapt = False
         if jumped and self._readiness.restarted:  # home, too, counts from the other origin
             self._set_home()
-        self.vehicle = in_map(self.odometry, self.correction, self._home_map_m)
+        self._in_map = None
         if jumped:
             self._follower.begin_again(self.vehicle, now_s)
 

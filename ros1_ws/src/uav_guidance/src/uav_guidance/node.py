@@ -33,8 +33,9 @@ from uav_msgs.srv import TakeoffRequest as TakeoffCall
 
 from node_core.core import Input
 from node_core.ros import RawSubscriber, warn_of_garbage
+from perception_core.conversions import MAP
 from perception_core.ros import TunableSettings, read_settings
-from resource_reporter import DoneReporter, ResourceReporter, ToldService
+from resource_reporter import DoneReporter, ResourceReporter, ToldService, send_directly
 from uav_guidance import requests
 from uav_guidance.encoding import command_message, heartbeat_message, interval_message, setpoint_message
 from uav_guidance.follower import Setpoint
@@ -94,7 +95,8 @@ class GuidanceNode:
         for topic in ("/zed_depth/obstacle", "/lidar_obstacles/obstacle"):
             RawSubscriber(Input(topic, Obstacle, self._on_obstacle, _on_garbage, BUFFER_BYTES, queue_size=5))
         RawSubscriber(Input("/lidar_mapping/state", MappingState, self._on_mapping, warn_of_garbage, BUFFER_BYTES))
-        RawSubscriber(Input("/tf", TFMessage, self._on_transforms, warn_of_garbage, BUFFER_BYTES, queue_size=TRANSFORMS_WAITING))
+        transforms = Input("/tf", TFMessage, self._on_transforms, warn_of_garbage, BUFFER_BYTES, TRANSFORMS_WAITING, about=MAP.encode())
+        RawSubscriber(transforms)
         self._offer_services()
         self._tuning = TunableSettings(settings, self._tune)
         self._done = DoneReporter(self._reporter)
@@ -270,5 +272,6 @@ def _next_due(due_s: float, now_s: float) -> float:
 
 def main() -> None:
     """Run the guidance node, with its private parameters, until ROS shuts down."""
+    send_directly()
     rospy.init_node("uav_guidance")
     GuidanceNode(read_settings(GuidanceSettings())).run()

@@ -50,17 +50,19 @@ class StampClock:
 
     def __init__(self) -> None:
         self._offsets_ns: deque[int] = deque(maxlen=WINDOW)
+        self._median_ns = 0
         self._last_ns = 0
 
     def stamp_ns(self, boot_ms: int, arrival_ns: int) -> int | None:
         """Return the time of measurement in ns of the mission clock; None if it is not later than the one before."""
         offset_ns = arrival_ns - boot_ms * 1_000_000
-        if self._offsets_ns and abs(offset_ns - median_low(self._offsets_ns)) > JUMP_NS:
+        if self._offsets_ns and abs(offset_ns - self._median_ns) > JUMP_NS:
             # One of the two clocks was set or restarted.
             self._offsets_ns.clear()
             self._last_ns = 0
         self._offsets_ns.append(offset_ns)
-        stamp_ns = boot_ms * 1_000_000 + median_low(self._offsets_ns)
+        self._median_ns = median_low(self._offsets_ns)
+        stamp_ns = boot_ms * 1_000_000 + self._median_ns
         if stamp_ns <= self._last_ns:
             return None
         self._last_ns = stamp_ns

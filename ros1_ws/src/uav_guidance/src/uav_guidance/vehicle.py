@@ -164,10 +164,13 @@ def _of_this_boot(vehicle: VehicleSnapshot, message: Any) -> VehicleSnapshot:
 
 
 def _local_position(vehicle: VehicleSnapshot, message: Any, now_s: float) -> VehicleSnapshot:
-    vehicle = replace(_of_this_boot(vehicle, message), place_s=now_s)
-    position = enu_from_ned(Vec3(message.x, message.y, message.z))
-    velocity = enu_from_ned(Vec3(message.vx, message.vy, message.vz))
-    return replace(vehicle, boot_ms=int(message.time_boot_ms), position_enu_m=position, velocity_enu_m_s=velocity)
+    return replace(
+        _of_this_boot(vehicle, message),
+        place_s=now_s,
+        boot_ms=int(message.time_boot_ms),
+        position_enu_m=enu_from_ned(Vec3(message.x, message.y, message.z)),
+        velocity_enu_m_s=enu_from_ned(Vec3(message.vx, message.vy, message.vz)),
+    )
 
 
 def _attitude(vehicle: VehicleSnapshot, message: Any, now_s: float) -> VehicleSnapshot:

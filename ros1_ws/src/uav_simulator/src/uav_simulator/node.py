@@ -19,6 +19,7 @@ from uav_msgs.srv import SetSensor, SetSensorRequest, SetSensorResponse
 
 from alula.common.faults import FaultError, parse_faults
 from alula.common.signals import StopEvent
+from resource_reporter import send_directly
 from uav_simulator import ros_messages
 from uav_simulator.drivers import Drivers
 from uav_simulator.errors import ConfigError, SimulatorError
@@ -33,7 +34,6 @@ from uav_simulator.world.ply import write_mesh
 
 POSE_PERIOD_NS = 50_000_000
 STATE_PERIOD_NS = 1_000_000_000
-WAIT_S = 0.002  # longest nap while time stands still; MAVLink wakes it
 START_CLOCK_S = 0.05  # how often the first tick is told while time has not begun, for nodes that come late
 CATCH_UP_S = 0.25  # a delay of more is not made up for
 # Behind an autopilot that does not wait: then pictures and sweeps are left out, and nodes are not waited for. Poses and measurements are
@@ -77,6 +77,7 @@ class SimulatorNode:
         self._pose_due_ns = self._state_due_ns = 0
         self._last_state = self._simulation.state
         self._left_out: list[str] = []
+        self._held = False
         self._late_told_s = -LATE_TOLD_S
         self._stopping = StopEvent()
         for name, port in self._pilot.ports.items():
@@ -129,7 +130,7 @@ class SimulatorNode:
             self._publish_clock()
             again = time.monotonic() + START_CLOCK_S
             while (rest := again - time.monotonic()) > 0.0:
-                self._pilot.serve(min(rest, WAIT_S))
+                self._pilot.serve(min(rest, self._pilot.nap_s))
         if missing and not self._ended:
             rospy.logwarn(f"simulated time begins without {', '.join(missing)}: not connected for {self._settings.start_timeout_s:g} s")
         self._pacer.begin(self._simulation.now_s)
@@ -144,10 +145,11 @@ class SimulatorNode:
         """Serve the link until wall time and the paced topics have come far enough."""
         while not self._ended:
             now = time.monotonic()
-            held = not self._late and not self._pacer.may_advance(self._simulation.now_s, now)
+            self._held = True  # before it is asked: what is heard from here on ends the nap
+            self._held = held = not self._late and not self._pacer.may_advance(self._simulation.now_s, now)
             if held:
                 self._leave_out_the_dead()
-            rest = max(due - now, WAIT_S if held else 0.0)
+            rest = max(due - now, self._pilot.nap_s if held else 0.0)
             self._pilot.serve(rest)
             if not held and rest <= 0.0:
                 break
@@ -203,6 +205,8 @@ class SimulatorNode:
             self._heard_at_start.add(topic)  # it may be of a type without a header
             return
         self._pacer.heard(topic, header_stamp_s(message._buff))  # noqa: SLF001 - AnyMsg has no other access to its bytes
+        if self._held:
+            self._pilot.wake()
 
     def _leave_out_the_dead(self) -> None:
         for topic in self._absent():
@@ -218,6 +222,7 @@ class SimulatorNode:
 
 def main() -> None:
     """Run the node until ROS ends it; a wrong parameter ends it with one line."""
+    send_directly()
     # Not rospy's own handlers: they close connections inside the signal's handler, and wait for ever when the signal
     # interrupts the main thread in the middle of a publish, which here is where it nearly always is.
     rospy.init_node("uav_simulator", disable_signals=True)

@@ -21,8 +21,15 @@ from uav_simulator.settings import SimulatorSettings
 log = logging.getLogger(__name__)
 
 
+NAP_S = 0.002  # of what can't be woken
+WOKEN_NAP_S = 0.05
+
+
 class Pilot(Protocol):
     """Flies the body: the simulated autopilot, ArduPilot, or one elsewhere that is followed."""
+
+    nap_s: float
+    """The longest wait (wall clock) that lets time go on soon enough after it may: longer where ``wake`` ends it."""
 
     @property
     def flown(self) -> Flown:
@@ -35,6 +42,9 @@ class Pilot(Protocol):
     def serve(self, wait_s: float = 0.0) -> None:
         """Handle what has come over its links, or comes within ``wait_s``."""
 
+    def wake(self) -> None:
+        """End a wait of ``serve`` where that can be done; called from other threads."""
+
     def obey(self, word: str) -> None:
         """Do what a word of ``/sim/pilot`` says; raises ConfigError for one that can't be done."""
 
@@ -44,6 +54,8 @@ class Pilot(Protocol):
 
 class SimulatedPilot:
     """The simulator's own autopilot, behind MAVLink."""
+
+    nap_s = WOKEN_NAP_S
 
     def __init__(self, settings: SimulatorSettings, home: Vec3) -> None:
         self.flown = SimulatedAutopilotVehicle(
@@ -64,6 +76,10 @@ class SimulatedPilot:
         """Read and write MAVLink on all links; wait for at most ``wait_s`` (wall clock)."""
         self._links.serve(wait_s)
 
+    def wake(self) -> None:
+        """End a wait for MAVLink."""
+        self._links.wake()
+
     def obey(self, word: str) -> None:
         """Flip the pilot's switch, move the stick, lose a link."""
         apply_pilot_word(word, self.flown.autopilot, self.flown.endpoint)
@@ -76,6 +92,8 @@ class SimulatedPilot:
 class ArduPilotPilot:
     """ArduPilot's own program, which the guidance speaks to directly."""
 
+    nap_s = NAP_S
+
     def __init__(self, settings: SimulatorSettings, home: Vec3) -> None:
         self.flown = ArduPilotVehicle(seed=settings.seed, home=home, port=settings.ardupilot_port)
         self.ports = {"ardupilot_port": self.flown.port}
@@ -84,6 +102,9 @@ class ArduPilotPilot:
     def serve(self, wait_s: float = 0.0) -> None:
         """Wait: packets are taken by the vehicle's tick alone, for each of them moves the body."""
         time.sleep(wait_s)
+
+    def wake(self) -> None:
+        """Do nothing: naps are short."""
 
     def obey(self, word: str) -> None:
         """Refuse: the pilot of a real autopilot has a remote control, or a ground station."""
@@ -97,6 +118,8 @@ class ArduPilotPilot:
 class FollowedPilot:
     """An autopilot that flies elsewhere, with or without a simulator of its own; the guidance has another connection to it."""
 
+    nap_s = NAP_S
+
     def __init__(self, settings: SimulatorSettings, home: Vec3) -> None:
         self.flown = FollowedVehicle(settings.followed_url, home)
         self.ports: dict[str, int] = {}
@@ -106,6 +129,9 @@ class FollowedPilot:
         until_s = time.monotonic() + wait_s
         while (rest_s := until_s - time.monotonic()) > 0.0:
             self.flown.listen(rest_s)
+
+    def wake(self) -> None:
+        """Do nothing: naps are short."""
 
     def obey(self, word: str) -> None:
         """Refuse: the pilot of a real autopilot has a remote control, or a ground station."""

@@ -40,7 +40,7 @@ class ZedSettings:
     min_valid: float = tunable(0.02, 0.0, 1.0, "of the image that has a depth, or nothing is known")
     # matching
     max_width_px: int = tunable(640, 64, 4096, "of the images that are matched; larger ones are scaled down")
-    near_depth_m: float = tunable(0.45, 0.1, 10.0, "that can be measured; what is nearer is told at this depth")
+    near_depth_m: float = tunable(0.5, 0.1, 10.0, "that can be measured; what is nearer is told at this depth")
     block_px: int = tunable(5, 3, 21, "edge of the matched blocks, odd")
     uniqueness_percent: int = tunable(10, 0, 50, "by which the best match must be better than the second")
     speckle_px: int = tunable(120, 0, 2000, "of a patch of one depth that is believed")

@@ -13,7 +13,7 @@ from node_core.core import Switched
 from node_core.ros.subscription import RawSubscriber
 from node_core.ros.switch import EnableSwitch
 from node_core.ros.worker import NewestWorker
-from resource_reporter import DoneReporter, ResourceReporter
+from resource_reporter import DoneReporter, ResourceReporter, send_directly
 
 if TYPE_CHECKING:
     from collections.abc import Sequence
@@ -30,6 +30,7 @@ class RosHost:
     """
 
     def __init__(self, outputs: Sequence[Output], *skillsets: str) -> None:
+        send_directly()
         self._publishers = {each.topic: _publisher(each) for each in outputs}
         self._subscribers: dict[str, RawSubscriber] = {}
         self._reporters = {skillset: ResourceReporter(skillset) for skillset in skillsets}

@@ -2,7 +2,9 @@
 
 from __future__ import annotations
 
+import contextlib
 import select
+import socket
 
 from uav_simulator.autopilot.endpoint import Endpoint
 from uav_simulator.autopilot.tcp_link import TcpLink
@@ -14,6 +16,9 @@ class LinkServer:
 
     def __init__(self, companion: Endpoint, ground: Endpoint | None, *, port: int, gcs_port: int) -> None:
         """``port`` (TCP) and ``gcs_port`` (UDP) on loopback; 0: any free one."""
+        self._woken, self._waker = socket.socketpair()
+        self._woken.setblocking(False)
+        self._waker.setblocking(False)
         tcp = TcpLink(companion, port)
         self.port, self.gcs_port = tcp.port, 0
         self._links: list[TcpLink | UdpLink] = [tcp]
@@ -26,13 +31,22 @@ class LinkServer:
         """Handle what has come, or comes within ``wait_s``, and send what is ready."""
         for link in self._links:
             link.send()
-        readable, _, _ = select.select([link.socket for link in self._links], [], [], max(0.0, wait_s))
+        readable, _, _ = select.select([self._woken, *(link.socket for link in self._links)], [], [], max(0.0, wait_s))
+        if self._woken in readable:
+            self._woken.recv(4096)
         for link in self._links:
             if link.socket in readable:
                 link.receive()
             link.send()
 
+    def wake(self) -> None:
+        """End the wait of ``serve``, or of its next call; may be called from any thread."""
+        with contextlib.suppress(OSError):  # full of such words already, or closed
+            self._waker.send(b"\0")
+
     def close(self) -> None:
         """Let the clients go and free the ports."""
+        self._woken.close()
+        self._waker.close()
         for link in self._links:
             link.close()

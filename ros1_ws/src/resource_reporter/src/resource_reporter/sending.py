@@ -1,0 +1,73 @@
+"""Messages go out in the thread that publishes them, as long as their subscriber takes them: no other thread is woken for each."""
+
+from __future__ import annotations
+
+import socket
+
+import rospy
+from rospy.impl.tcpros_pubsub import QueuedConnection
+
+
+class DirectConnection(QueuedConnection):  # type: ignore[misc]  # rospy has no types
+    """A connection to a subscriber that hands its thread only what the socket does not take at once.
+
+    rospy's own wakes a thread for each message and subscriber, and gives the processor up after each. The order of the messages, and
+    that of those that wait the newest ``queue_size`` are sent, are the same; of a message that was begun the rest always is.
+    """
+
+    _queue: list[bytes]
+    _error: Exception | None
+
+    def __init__(self, connection: rospy.impl.transport.Transport, queue_size: int) -> None:
+        self._rest = b""  # of a message of which the socket took a part
+        self._relaying = False
+        super().__init__(connection, queue_size)
+
+    def write_data(self, data: bytes) -> bool:
+        """Send a message, or let it wait for those before it; what went wrong in the thread is raised here."""
+        with self._lock:
+            if self._error:
+                error, self._error = self._error, None
+                raise error
+            if not (self._relaying or self._rest or self._queue):
+                self._rest = data[self._sent(data) :]
+            else:
+                if 0 < self._queue_size <= len(self._queue):
+                    del self._queue[0]
+                self._queue.append(data)
+            if self._rest or self._queue:
+                self._cond_data_available.notify()
+        return True
+
+    def _sent(self, data: bytes) -> int:
+        """Return how many bytes the socket takes at once; what is wrong with it, the thread finds out."""
+        to = self._connection
+        if to.socket is None or to.done:
+            return 0
+        try:
+            sent: int = to.socket.send(data, socket.MSG_DONTWAIT)
+        except OSError:
+            return 0
+        to.stat_bytes += sent
+        to.stat_num_msg += sent == len(data)  # of others the thread sends the end
+        return sent
+
+    def _run(self) -> None:
+        while not self._connection.done:
+            with self._lock:
+                self._relaying = False
+                while not (self._rest or self._queue or self._connection.done):
+                    self._cond_data_available.wait()
+                waiting = [self._rest, *self._queue] if self._rest else self._queue
+                self._rest, self._queue, self._relaying = b"", [], True
+            for data in waiting:
+                try:
+                    self._connection.write_data(data)
+                except Exception as error:  # noqa: BLE001 -- of whatever kind, for the one who publishes next
+                    with self._lock:
+                        self._error = error
+
+
+def send_directly() -> None:
+    """Have all publishers of this process send so, to all who subscribe from now on."""
+    rospy.topics.QueuedConnection = DirectConnection
