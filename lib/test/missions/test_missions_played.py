@@ -172,3 +172,13 @@ def test_what_models_say_nothing_of_is_looked_at_and_plays(text: str, node: str,
     assert play(path, finding.run, NO_PART).left == ""
     known = prove_within(Deadline.after(60.0), path, robot.skillsets, NO_PART, given="this test").findings
     assert "ALU704" not in {one.code for one in known}
+
+
+LEFT = '<ForceSuccess><Timeout msec="100"><drone.hover/></Timeout></ForceSuccess><WaitFor if="!running(drone.hover)"/><drone.lift/>'
+
+
+def test_a_script_may_ask_for_what_was_left_wherever_the_mission_may_be_paused(tmp_path: Path) -> None:
+    (robot,) = check_texts([ModelFile("robot.rl", ROBOT)])
+    path = tmp_path / "mission.xml"
+    path.write_text(whole(f"<Fallback><Sequence>{LEFT}</Sequence><drone.land/></Fallback>"))
+    assert prove_mission(path, robot.skillsets, NO_PART).complete

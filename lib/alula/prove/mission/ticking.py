@@ -110,7 +110,7 @@ class Ticker:
             self._oracle.begin(lambda _: None)
             self._keeper.put(self.memories[memory])
             self._pausing[memory] = not self._body.director.refusal(paused=True)
-            self._keeper.take()
+            self._keeper.leave()
         return self._pausing[memory]
 
     def known(self, memory: int, act: str, view: View, answers: Sequence[Answer]) -> Decision | Outcome:
