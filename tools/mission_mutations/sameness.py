@@ -277,8 +277,7 @@ class _Both:
         """Return all that can come of the managers before the next tick; None where both can't do the same until then."""
         found = []
         for seen, memory, roots in zip(self._both, pair.memories, pair.sets, strict=True):
-            over = seen.regions.system.ticker.memories[memory].end is not None
-            closures = tuple(seen.regions.closure(place, numbers, over=over) for place, numbers in enumerate(roots))
+            closures = tuple(seen.regions.closure(place, numbers, memory) for place, numbers in enumerate(roots))
             found.append((tuple(seen.closure(*known) for known in enumerate(closures)), tuple(known.all for known in closures)))
         return _Pair(pair.memories, (found[0][1], found[1][1])) if found[0][0] == found[1][0] else None
 

@@ -129,6 +129,11 @@ class Director:
         return self._mission.root
 
     @property
+    def stop_root(self) -> Behaviour | None:
+        """The tree that brings the robot to rest, None before an abort."""
+        return self._stop
+
+    @property
     def memory(self) -> DirectorMemory:
         """What the next step hangs on, besides the trees."""
         return DirectorMemory(self._phase.__name__, self.end, self.start_s, self._wait_until_s, self._stop is not None)

@@ -146,3 +146,39 @@ def test_the_axes_that_listing_3_keeps_are_kept_in_a_flight(tmp_path: Path) -> N
     played = play(path, finding.run, part, tmp_path)
     assert (played.left, played.end.outcome) == ("", Outcome.GIVEN_UP)
     assert (tmp_path / "skills.mcap").is_file()
+
+
+EITHER = '<WaitFor name="told" if="drone.control == OURS || drone.control == THEIRS"/>'
+TOLD = f"<Fallback><Sequence><drone.lift/>{EITHER}</Sequence><drone.land/></Fallback>"
+STOP = '<BehaviorTree ID="stop_here"><WaitFor name="theirs" if="drone.control == THEIRS"/></BehaviorTree></root>'
+ABORTED = (
+    whole("<Fallback><drone.lift/><drone.land/></Fallback>")
+    .replace("</root>", STOP)
+    .replace("<root", '<root main_tree_to_execute="mission"')
+)
+
+
+@pytest.mark.parametrize(("text", "node", "kind"), [(whole(TOLD), "told", Kind.DIE), (ABORTED, "theirs", Kind.ABORT)])
+def test_what_models_say_nothing_of_is_looked_at_and_plays(text: str, node: str, kind: Kind, tmp_path: Path) -> None:
+    """Managers that stay dead, and an abort after which nothing ends."""
+    (robot,) = check_texts([ModelFile("robot.rl", ROBOT)])
+    path = tmp_path / "mission.xml"
+    path.write_text(text)
+    (finding,) = (one for one in prove_mission(path, robot.skillsets, NO_PART).findings if one.code == "ALU704")
+    assert f"waits in '{node}' for ever" in finding.message
+    assert isinstance(finding, MissionFinding)
+    assert finding.run is not None
+    assert kind in {event.kind for event in finding.run.events}
+    assert play(path, finding.run, NO_PART).left == ""
+    known = prove_within(Deadline.after(60.0), path, robot.skillsets, NO_PART, given="this test").findings
+    assert "ALU704" not in {one.code for one in known}
+
+
+LEFT = '<ForceSuccess><Timeout msec="100"><drone.hover/></Timeout></ForceSuccess><WaitFor if="!running(drone.hover)"/><drone.lift/>'
+
+
+def test_a_script_may_ask_for_what_was_left_wherever_the_mission_may_be_paused(tmp_path: Path) -> None:
+    (robot,) = check_texts([ModelFile("robot.rl", ROBOT)])
+    path = tmp_path / "mission.xml"
+    path.write_text(whole(f"<Fallback><Sequence>{LEFT}</Sequence><drone.land/></Fallback>"))
+    assert prove_mission(path, robot.skillsets, NO_PART).complete

@@ -18,6 +18,7 @@ from alula.prove.mission.play import LeftError, _Player
 from alula.prove.mission.run import run_of
 from alula.prove.mission.state import Event, State
 from alula.prove.mission.system import System
+from alula.trees.node import Node
 from alula.trees.status import RUNNING
 
 STEPS = 10
@@ -30,6 +31,13 @@ EXACT = 100
 COMPUTED = "`tries`"
 NEVER = '<ForceSuccess _skipIf="true"><drone.hover/></ForceSuccess>'
 """So that each mission has the leaf that scripts ask for."""
+
+
+STOP = """
+  <BehaviorTree ID="stop_here">
+    <Fallback><drone.land name="land at once"/><drone.hover name="stay"/></Fallback>
+  </BehaviorTree>
+"""
 
 
 def mission(chance: random.Random, folder: Path) -> Path:
@@ -77,6 +85,11 @@ def possible(run: list[tuple[Event, State]]) -> bool:
     return len(times) <= 1 and max(numbers.values(), default=0) <= 1 and COMPUTED not in numbers
 
 
+def trees(player: _Player) -> list[Node]:
+    director = player._driver.director
+    return [director.root, *([director.stop_root] if isinstance(director.stop_root, Node) else [])]
+
+
 def difference(player: _Player, system: System, state: State) -> str:
     """Return in what the real mission is not in a situation, empty where it is."""
     ended = system.outcome(state)
@@ -84,13 +97,16 @@ def difference(player: _Player, system: System, state: State) -> str:
     if (ended, None) != (end.outcome if end else None, None):
         return f"the mission is {end}, not {ended}"
     for skillset in system.skillsets:
-        for resource in skillset.resources:
+        alive = player.world.managers[skillset.name].alive
+        for resource in skillset.resources if alive else ():
             name = f"{skillset.name}.{resource.name}"
             if player._state(skillset.name, resource.name) != system.resource(state, name):
                 return f"{name} is not {system.resource(state, name)}"
+        if not alive and system.managers(state, skillset.name).states is not None:
+            return f"the managers of {skillset.name} are not there"
     if ended:
         return ""
-    active = {node.uid for node in player._driver.director.root.iterate() if node.status is RUNNING}
+    active = {node.uid for root in trees(player) for node in root.iterate() if node.status is RUNNING}
     if active != {node.uid for node in system.active(state)}:
         return f"the nodes {sorted(active)} are active"
     open_ = {(leaf, one.phase) for leaf, one in system.open(state)}
@@ -108,11 +124,18 @@ def taken(player: _Player, event: Event, system: System, state: State) -> str:
     return difference(player, system, state)
 
 
-@pytest.mark.parametrize("seed", range(24))
-def test_what_is_reached_in_a_few_steps_is_reached_by_the_engine(seed: int, tmp_path: Path) -> None:
+HOOKS = Failures(refusals=False, aborts=False)
+OUTSIDE = Failures(refusals=False, hooks=False, deaths=True, pauses=True)
+"""Managers that die, an abort and a pause; the mission has a tree that brings the robot to rest, or has none."""
+
+
+@pytest.mark.parametrize(("seed", "failures"), [*((seed, HOOKS) for seed in range(24)), *((seed, OUTSIDE) for seed in range(24, 36))])
+def test_what_is_reached_in_a_few_steps_is_reached_by_the_engine(seed: int, failures: Failures, tmp_path: Path) -> None:
     chance = random.Random(3000 + seed)  # noqa: S311 - for tests
     path = mission(chance, tmp_path)
-    system = System.read(path, robots(), PART, Failures(refusals=False, aborts=False), few=EXACT)
+    if failures.aborts and seed % 2:
+        path.write_text(path.read_text().replace("</root>", f"{STOP}</root>"))
+    system = System.read(path, robots(), PART, failures, few=EXACT)
     several = [run for run in ways(system, STEPS) if possible(run)]
     compared: set[State] = set()
     for run in chance.sample(several, min(MOST, len(several))):

@@ -149,7 +149,7 @@ class RetryAfter(Decorator):
             return answer
         self.reset_children()
         self._left -= 1
-        if not self._left or not self._script.holds():
+        if not self._script.holds() or not self._left:  # a search of all runs need not count where there is none
             return FAILURE
         wait_ns = seconds_ns(self, "wait")
         self._again_ns = self.now_ns + wait_ns

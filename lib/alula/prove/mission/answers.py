@@ -1,16 +1,16 @@
 """What a mission does about each failure: the coverage of its failures, from all its runs.
 
 A row is a skill that fails in some way, at a moment: the other leaves that run then, their skills asked for. Its answer is what the tree
-asks for next; its outcomes are all ways in which the mission can end from there, whatever else happens.
+asks for next; its outcomes are all ways in which the mission can end from there, whatever else happens, unless somebody aborts it.
 """
 
 from __future__ import annotations
 
 from dataclasses import dataclass, field
 
-from alula.prove.mission.regions import Regions, Sets, Ticked
+from alula.prove.mission.regions import Region, Regions, Sets, Ticked
 from alula.prove.mission.state import State
-from alula.prove.mission.ticking import Outcome
+from alula.prove.mission.ticking import ABORT, Outcome
 
 GOOD = frozenset({"accomplished", "degraded"})
 GIVES_UP = "AlwaysFailure"
@@ -76,7 +76,7 @@ class Answers:
         self._giving_up = {number for number, node in enumerate(self._system.nodes) if node.wiring.type.name == GIVES_UP}
         rows: dict[tuple[str, str, int, tuple[str, ...]], Row] = {}
         for number, region in enumerate(regions.regions):
-            for target, ticked in region.next:
+            for target, ticked in _ticks(region):
                 for (leaf, end), way in self._failures(ticked).items():
                     self._add(rows, number, target, ticked, leaf, end, way)
         self.rows = sorted(rows.values(), key=lambda one: (one.skill, one.leaf, one.end, one.moment))
@@ -137,7 +137,7 @@ class Answers:
                 at = self._regions.regions[todo.pop()]
                 if self._system.ticker.memories[at.memory].end is not None:
                     found.add(frozenset())
-                for target, ticked in at.next:
+                for target, ticked in _ticks(at):
                     if ticked.outcome.started:
                         found.add(frozenset(ticked.outcome.started))
                     elif target not in seen:
@@ -155,7 +155,7 @@ class Answers:
             if any(number in self._giving_up for way, _ in ticked.ways for number, _ in way.touched):
                 return True
             if not ticked.outcome.started:
-                more = [one for one in self._regions.regions[at].next if one[0] not in seen]
+                more = [one for one in _ticks(self._regions.regions[at]) if one[0] not in seen]
                 seen |= {one for one, _ in more}
                 todo += more
         return False
@@ -166,7 +166,7 @@ class Answers:
         found: list[set[str]] = [set() for _ in regions]
         before: list[list[int]] = [[] for _ in regions]
         for number, region in enumerate(regions):
-            for target, _ in region.next:
+            for target, _ in _ticks(region):
                 before[target].append(number)
         for number, region in enumerate(regions):
             end = self._system.ticker.memories[region.memory].end
@@ -179,3 +179,8 @@ class Answers:
                     found[one].add(end.value)
                     todo += before[one]
         return [frozenset(one) for one in found]
+
+
+def _ticks(region: Region) -> list[tuple[int, Ticked]]:
+    """Return what leads on from a region, without aborts: they answer nothing."""
+    return [one for one in region.next if one[1].act != ABORT]

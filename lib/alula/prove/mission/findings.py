@@ -19,6 +19,7 @@ from alula.prove.mission.waits import Waits
 from alula.prove.mission.words import situation, told
 from alula.trees.node import Node
 
+WAITS = "ALU704"
 ANSWER = "put a Fallback around it with what is to be done then, or `<AlwaysFailure/>` where giving up is meant"
 
 
@@ -115,7 +116,7 @@ def waits(looked: Waits, system: System, deadline: Deadline) -> Iterator[Diagnos
         how = f"waits in '{node.name}' for ever" if stays else f"goes round '{node.name}' without end"
         message = f"the mission {how}, though nothing fails any more: {situation(system, state)}{f', {data}' if data else ''}"
         cure = "wait with Timeout, Awaits or `within`, try again a number of times, or leave the loop"
-        yield _finding("ALU704", message, node, cure, told(system, events), run_of(system, events, state))
+        yield _finding(WAITS, message, node, cure, told(system, events), run_of(system, events, state))
 
 
 def _finding(code: str, message: str, node: Node, cure: str, lines: tuple[str, ...] = (), run: MissionRun | None = None) -> Diagnostic:

@@ -89,11 +89,15 @@ def _startable(regions: Regions, place: int, number: int) -> set[str]:
     system = regions.system
     bare = system.number(Managers(system.managers_of(number).states))
     found: set[str] = set()
-    for one in regions.closure(place, frozenset({bare}), over=False).all:
-        if system.managers_of(one).states is not None:
-            states = _states(system, place, one)
-            skills = system.skillsets[place].skills
-            found |= {skill.name for skill in skills if not any(semantics.unmet_preconditions(skill, states, {}))}
+    seen, todo = {bare}, [bare]
+    while todo:
+        one = todo.pop()
+        states = _states(system, place, one)
+        skills = system.skillsets[place].skills
+        found |= {skill.name for skill in skills if not any(semantics.unmet_preconditions(skill, states, {}))}
+        after = {number for event, number in system.moves_of(place, one) if event.kind is not Kind.DIE} - seen
+        seen |= after
+        todo += after
     return found
 
 
@@ -106,6 +110,9 @@ def _by(system: System, place: int, events: Sequence[Event]) -> str:
     taken: dict[str, int] = {}
     left: dict[str, str] = {}
     for event in (one for one in events if one.skillset == skillset.name):
+        if event.kind is Kind.DIE:  # those that come again have nothing taken
+            taken, left = {}, {}
+            continue
         for name, _, _ in event.changes:
             taken.pop(name, None)
             left.pop(name, None)

@@ -31,6 +31,7 @@ class Failures:
         hooks: hooks may fail (FAILED).
         deaths: managers' processes may end, and come back.
         aborts: someone may abort the mission.
+        pauses: someone may pause the mission; what does not go on afterwards is interrupted, which the tree has not asked for.
         most: how many failures happen in one run, of all kinds; None: any number.
     """
 
@@ -38,6 +39,7 @@ class Failures:
     hooks: bool = True
     deaths: bool = False
     aborts: bool = True
+    pauses: bool = False
     most: int | None = None
 
 
@@ -151,6 +153,9 @@ class ManagersSteps:
         if self._failures.hooks:
             step = semantics.fail(self._skillset, situation, running, "")
             yield self._event(Kind.FAIL, execution, step, failure=True), self._after(managers, step)
+        if self._failures.pauses and not execution.asked:
+            step = semantics.interrupt(self._skillset, situation, running)
+            yield self._event(Kind.PAUSE, execution, step, failure=True), self._after(managers, step)
 
     def _death(self, managers: Managers) -> tuple[Event, Managers]:
         state = ExecutionState.FAILED.value

@@ -115,6 +115,10 @@ class Keeper:
             ahead.ends.intersection(one.result for one in board.failures),
         )
 
+    def leave(self) -> None:
+        """Leave the nodes as a memory has them that was put back, and was not ticked."""
+        self._left = self._values()[0]
+
     def _looked(
         self,
         phase: str,

@@ -12,14 +12,16 @@ from collections.abc import Callable, Collection, Mapping, Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
 
-from alula.missions.director import End, Outcome
+from alula.missions.director import START_TIMEOUT_S, End, Outcome
 from alula.missions.driver import MissionDriver
 from alula.missions.filed.part import MissionPart
 from alula.missions.filed.plan import plan_of_file
 from alula.missions.filed.skills import SkillNode
+from alula.missions.pausing import PauseRefusedError
 from alula.missions.record import MissionRecord
 from alula.missions.skillset import MissionClient
 from alula.model.execution_state import ExecutionState
+from alula.prove.mission.acting import Function, HeldMiddleware
 from alula.prove.mission.measured import COMPARE, of_data
 from alula.prove.mission.measured import told as values_told
 from alula.prove.mission.oracle import Answer, Asked, Oracle, Question
@@ -31,14 +33,13 @@ from alula.prove.mission.unknown import UNKNOWN
 from alula.runtime.client import Client
 from alula.runtime.core.execution import Execution
 from alula.runtime.handle import SkillHandle
-from alula.runtime.hooks import SkillHooks
-from alula.runtime.local import LocalWorld
-from alula.runtime.local.middleware import Bus, VirtualLink, VirtualMiddleware
-from alula.runtime.middleware import GoalListener
+from alula.runtime.local import LocalManagers, LocalWorld
 
 FLIPPED = {"<": ">", "<=": ">=", ">": "<", ">=": "<=", "==": "=="}
 STEP_S = 0.01
 """Between two ticks; times that the run says are over pass before the tick that sees it."""
+MORE_S = 1e-6
+"""A time is over when it has passed; the mission gives up waiting for its begin when more has."""
 
 
 class LeftError(Exception):
@@ -95,47 +96,6 @@ def _alike(chosen: Question, asked: Question) -> bool:
     return False
 
 
-class _Function(SkillHooks):
-    """A function that ends when the run says so, also when it was interrupted; ``validated`` says why inputs are refused."""
-
-    def __init__(self, running: dict[str, Execution], told: dict[str, float], validated: Callable[[], str]) -> None:
-        self._running = running
-        self._told = told
-        self._validated = validated
-
-    def validate(self, _: object) -> str:
-        return self._validated()
-
-    def on_dispatch(self, execution: Execution) -> None:
-        self._running[execution.id] = execution
-
-    def progress(self, execution: Execution) -> float:
-        return self._told.get(execution.id, execution.progress)
-
-    def on_interrupt(self, execution: Execution) -> bool | None:
-        return execution.done
-
-
-class _HeldLink(VirtualLink):
-    """Keeps goals under way until the run has them arrive."""
-
-    held: dict[str, Callable[[], None]]
-
-    def send(self, goal_id: str, goal: object, on_answer: Callable[[bool], None]) -> None:
-        self.held[goal_id] = lambda: super(_HeldLink, self).send(goal_id, goal, on_answer)
-
-
-class _HeldMiddleware(VirtualMiddleware):
-    def __init__(self, bus: Bus, skillset: str, held: dict[str, Callable[[], None]]) -> None:
-        super().__init__(bus, skillset)
-        self._held = held
-
-    def action(self, skill: str, listener: GoalListener) -> VirtualLink:
-        link = _HeldLink(self, skill, listener)
-        link.held = self._held
-        return link
-
-
 class _Told(MissionClient):
     """A client to whose mission the run says what is measured."""
 
@@ -157,12 +117,14 @@ class _Player:
         """The progress that functions tell."""
         self._arriving: Event | None = None
         """The step by which a request arrives now."""
+        self._stays: set[str] = set()
+        """The execution that holds in a pause, and does not go on."""
         self._handles: dict[int, SkillHandle] = {}
         self._oracle = _Answers()
         playables = [playable(one) for one in run.skillsets]
         self._data = {one.skillset.name: one.data for one in playables}
-        make = lambda managers: {one.name: self._function() for one in managers.skillset.skills}  # noqa: E731
-        self.world = LocalWorld([one.skillset for one in playables], make)
+        self._served = {one.skillset.name: one.skillset for one in playables}
+        self.world = LocalWorld(self._served.values(), self._functions)
         nodes = MissionPart(opaque(Robot(self._oracle), part).nodes, memory=part.memory)
         plan = plan_of_file(path, path.stem, run.skillsets, _Unknown(), nodes)
         plan = replace(plan, inputs={})
@@ -175,20 +137,21 @@ class _Player:
         """The data that are told, None for one that is not fresh."""
 
         def client(name: str, wake: Callable[[], None]) -> _Told:
-            made = _Told(Client(_HeldMiddleware(bus, name, self._held), name), wake, record)
+            made = _Told(Client(HeldMiddleware(bus, name, self._held), name), wake, record)
             made.said = self._said
             return made
 
         self._driver = MissionDriver(plan, client, clock_ns, plan.parameters, record=record)
         self._driver.woken_by_events = False
+        self._stops = False
         self._leaves = [node for node in self._driver.director.root.iterate() if isinstance(node, SkillNode)]
         for node in self._leaves:
             node.leaf.with_inputs({})
         self.world.on_event(lambda _, event: self._driver.event(event))
         self.world.run_for(0.0)
 
-    def _function(self) -> _Function:
-        return _Function(self._running, self._told, self._validated)
+    def _functions(self, managers: LocalManagers) -> dict[str, Function]:
+        return {one.name: Function(self._running, self._told, self._validated, self._stays) for one in managers.skillset.skills}
 
     def _validated(self) -> str:
         """Refuse the inputs of the request that arrives, or interrupt it while they are looked at: then it never runs."""
@@ -201,7 +164,9 @@ class _Player:
         """Have it happen; raise LeftError where it does not."""
         match event.kind:
             case Kind.TICK:
-                self._tick(event)
+                self._tick(event, self._driver.tick)
+            case Kind.ABORT:
+                self._tick(event, lambda: self._driver.abort("aborted, as in the counterexample"))
             case Kind.START | Kind.REFUSE:
                 self._arrive(event)
             case Kind.RESULT:
@@ -218,10 +183,8 @@ class _Player:
                 self._execution(event)
                 self._say_data(event.skillset, breaks(event.name, event.result))
                 self._say_data(event.skillset, AS_WANTED)
-            case Kind.FAIL:
-                self._execution(event).fail("as in the counterexample")
             case _:
-                raise LeftError(f"no way is known to have this happen: {event.kind.value} of {event.skill}")
+                self._fail(event)
         self.world.run_for(0.0)
         for name, target in {name: target for name, _, target in event.changes}.items():
             found = self._state(event.skillset, name)
@@ -242,24 +205,69 @@ class _Player:
     def _say_data(self, skillset: str, state: str) -> None:
         self._take_to(skillset, self._data[skillset], state)
 
-    def _tick(self, event: Event) -> None:
-        over_ns = [float(str(one.question[1])) for one in event.choices if one.question[0] == "time" and one.answer]
-        self.world.run_for(max([STEP_S, *(one / 1e9 for one in over_ns)]))
+    def _fail(self, event: Event) -> None:
+        """Have fail what models say nothing of."""
+        match event.kind:
+            case Kind.FAIL:
+                self._execution(event).fail("as in the counterexample")
+            case Kind.PAUSE:
+                self._pause(event)
+            case Kind.DIE:
+                self._die(event.skillset)
+            case Kind.RESTART:
+                self.world.serve(self._served[event.skillset], self._functions)
+
+    def _die(self, skillset: str) -> None:
+        """End managers without a word: what is under way to them is lost."""
+        self.world.kill(skillset)
+        for leaf, handle in self._handles.items():
+            if self._leaves[leaf].skillset == skillset:
+                self._held.pop(handle.id, None)
+
+    def _pause(self, event: Event) -> None:
+        """Pause the mission and have it go on, which an execution does not: it is interrupted."""
+        execution = self._execution(event)
+        self._stays.add(execution.id)
+        try:
+            for paused in (True, False):
+                self._driver.set_paused(paused=paused)
+                self.world.run_for(0.0)
+        except PauseRefusedError as error:
+            raise LeftError(f"the mission can't be paused: {error}") from None
+        execution.interrupted()
+
+    def _tick(self, event: Event, tick: Callable[[], object]) -> None:
+        """Have the tree ticked, or the mission aborted, when times and data are as the step says."""
+        over = [float(str(one.question[1])) for one in event.choices if one.question[0] == "time" and one.answer]
+        over_s = [one if one == START_TIMEOUT_S else one / 1e9 for one in over]  # the director counts seconds, nodes nanoseconds
+        self.world.run_for(max([STEP_S, *(one + MORE_S for one in over_s)]))
         for one in event.choices:
             self._progress(one)
         self._tell_data(event)
         before = {leaf: node.leaf.handle for leaf, node in enumerate(self._leaves)}
         self._oracle.begin(lambda _: None)
         self._oracle.choices = list(event.choices)
-        self._driver.tick()
+        tick()
         self.world.run_for(0.0)
+        self._follow_stop()
         started = []
         for leaf, node in enumerate(self._leaves):
-            if node.leaf.handle is not None and node.leaf.handle is not before[leaf]:
+            handle = node.leaf.handle
+            if handle is not None and handle is not before.get(leaf) and handle.id in self._held:  # else nobody could be asked
                 started.append(leaf)
-                self._handles[leaf] = node.leaf.handle
+                self._handles[leaf] = handle
         if sorted(started) != sorted(event.started):
             raise LeftError(f"the tree asks for {self._names(started)}, and for {self._names(event.started)} in the counterexample")
+
+    def _follow_stop(self) -> None:
+        """Know the leaves of the tree that brings the robot to rest, once there is one: they come after the mission's."""
+        stop = self._driver.director.stop_root
+        if stop is not None and not self._stops:
+            self._stops = True
+            more = [node for node in stop.iterate() if isinstance(node, SkillNode)]
+            for node in more:
+                node.leaf.with_inputs({})
+            self._leaves += more
 
     def _tell_data(self, event: Event) -> None:
         """Tell values that fit what the tick answers about data."""

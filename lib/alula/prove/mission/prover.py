@@ -2,8 +2,9 @@
 
 from __future__ import annotations
 
+import re
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from pathlib import Path
 
 from alula.language.errors import Diagnostic, Severity
@@ -15,7 +16,7 @@ from alula.prove.limits import Deadline, OutOfTimeError
 from alula.prove.mission.accepted import acceptances, divided
 from alula.prove.mission.answers import Answers, Row
 from alula.prove.mission.conditions import NO_FAULTS, Faults
-from alula.prove.mission.findings import findings, waits
+from alula.prove.mission.findings import WAITS, findings, waits
 from alula.prove.mission.holding import SINGLE, held
 from alula.prove.mission.managers import Failures
 from alula.prove.mission.oracle import UndecidedError
@@ -25,7 +26,16 @@ from alula.prove.mission.waits import Waits
 from alula.prove.mission.wanted import wanted
 
 LOOKED_AT = Failures(hooks=False, aborts=False)
-"""What the models say can fail, and functions that refuse inputs; hooks that raise, processes that die and aborts are left out."""
+"""What the models say can fail, and functions that refuse inputs."""
+ALSO = Failures(deaths=True, pauses=True)
+"""What is looked at afterwards: hooks that raise, managers' processes that die, an abort and a pause from outside besides."""
+SHARE = 0.5
+"""How long that may take, by the time that the rest has."""
+TOLD = frozenset({"ALU701", "ALU708"})
+"""Codes of which that is told, too, besides what waits for ever and the file's properties of single situations.
+
+What nothing answers is not: the last of all answers can always fail so. What never happens is asked of the models' failures alone.
+"""
 
 
 @dataclass(frozen=True)
@@ -46,18 +56,20 @@ def prove_mission(
     models: Sequence[Skillset],
     part: MissionPart,
     *,
-    failures: Failures = LOOKED_AT,
     faults: Faults = NO_FAULTS,
     timeout_s: float = 30.0,
     tell: Callable[[str], None] | None = None,
 ) -> Proved:
     """Return what is wrong with the runs of a mission that ``check_mission`` finds no error in.
 
+    Runs in which hooks raise, processes die or people interfere are looked at afterwards, in a time of their own (``SHARE``).
     ``faults`` says in which states faults show, for properties that name them. ``tell`` hears now and then how far a long search is.
     Ctrl-C ends the search as the end of the time does: what was found by then is returned.
     """
-    deadline = Deadline.after(timeout_s, tell)
-    return prove_within(deadline, path, models, part, failures=failures, faults=faults, given=f"{timeout_s:.3g} s")
+    search = _Search(path, models, part, faults)
+    seen = search.within(Deadline.after(timeout_s, tell), f"{timeout_s:.3g} s")
+    share_s = timeout_s * SHARE
+    return search.also(seen, Deadline.after(share_s, tell), f"{share_s:.3g} s").proved()
 
 
 def prove_within(
@@ -66,38 +78,99 @@ def prove_within(
     models: Sequence[Skillset],
     part: MissionPart,
     *,
-    failures: Failures = LOOKED_AT,
     faults: Faults = NO_FAULTS,
     given: str,
 ) -> Proved:
-    """Return the same within a deadline; ``given`` is what messages call it."""
-    try:
-        system = System.read(path, models, part, failures, deadline)
-        properties, wrong = wanted(system.nodes, system.skillsets, faults)
-        # What must come is looked at one situation after another, for which it needs time of its own.
-        several = any(one.kind not in SINGLE for one in properties)
-        regions = Regions(system, deadline.half(deadline.doing) if several else deadline)
-        _explore(regions)
-    except (UndecidedError, InputError) as error:
-        message = f"its runs can't be looked at: {error}"
-        return Proved([Diagnostic("ALU711", message, _whole(path), Severity.WARNING)], [], complete=False)
-    except OutOfTimeError:
-        return Proved([_bound(path, 0, given)], [], complete=False)
-    answers = Answers(regions)
-    known = acceptances(regions.system.nodes)
-    looked = Waits(regions)
-    seen_waiting, complete = _waits(looked, regions, deadline.half(deadline.doing) if several else deadline)
-    found, accepted = divided([*findings(regions, answers), *seen_waiting], known, str(path), complete=complete)
-    found += wrong
-    undecided = []
-    for one in properties if not wrong else ():
-        seen = held(regions, one, faults, deadline, always_ends=looked.always_ends)
-        found += [seen.finding] if seen.finding else []
-        undecided += [one.name] if not seen.finding and not seen.complete else []
-    complete = complete and not undecided
-    if not complete:
-        found.append(_bound(path, len(regions.regions), given, undecided))
-    return Proved(found, answers.rows, complete, accepted)
+    """Return what the models alone make go wrong, within a deadline; ``given`` is what messages call it."""
+    return _Search(path, models, part, faults).within(deadline, given).proved()
+
+
+@dataclass(frozen=True)
+class _Seen:
+    """What was found up to now; ``regions`` are None where none could be looked at."""
+
+    path: Path
+    regions: Regions | None
+    found: tuple[Diagnostic, ...] = ()
+    rows: tuple[Row, ...] = ()
+    bounds: tuple[Diagnostic, ...] = ()
+
+    def proved(self) -> Proved:
+        """Return it without what the file accepts."""
+        if self.regions is None:
+            return Proved([*self.found, *self.bounds], [], complete=False)
+        known = acceptances(self.regions.system.nodes)
+        complete = not self.bounds
+        found, accepted = divided(self.found, known, str(self.path), complete=complete)
+        return Proved([*found, *self.bounds], list(self.rows), complete, accepted)
+
+
+class _Search:
+    """Looks at the runs of one mission."""
+
+    def __init__(self, path: Path, models: Sequence[Skillset], part: MissionPart, faults: Faults) -> None:
+        self._path = path
+        self._models = models
+        self._part = part
+        self._faults = faults
+
+    def within(self, deadline: Deadline, given: str) -> _Seen:
+        """Look at what the models say, and at the properties of the file."""
+        try:
+            system = System.read(self._path, self._models, self._part, LOOKED_AT, deadline)
+            properties, wrong = wanted(system.nodes, system.skillsets, self._faults)
+            # What must come is looked at one situation after another, for which it needs time of its own.
+            several = any(one.kind not in SINGLE for one in properties)
+            regions = Regions(system, deadline.half(deadline.doing) if several else deadline)
+            _explore(regions)
+        except (UndecidedError, InputError) as error:
+            message = f"its runs can't be looked at: {error}"
+            return _Seen(self._path, None, (Diagnostic("ALU711", message, _whole(self._path), Severity.WARNING),))
+        except OutOfTimeError:
+            return _Seen(self._path, None, bounds=(_bound(self._path, 0, given),))
+        answers = Answers(regions)
+        looked = Waits(regions)
+        found = findings(regions, answers)
+        seen_waiting, complete = _waits(looked, regions, deadline.half(deadline.doing) if several else deadline)
+        found += [*seen_waiting, *wrong]
+        undecided = []
+        for one in properties if not wrong else ():
+            seen = held(regions, one, self._faults, deadline, always_ends=looked.always_ends)
+            found += [seen.finding] if seen.finding else []
+            undecided += [one.name] if not seen.finding and not seen.complete else []
+        bounds = () if complete and not undecided else (_bound(self._path, len(regions.regions), given, undecided),)
+        return _Seen(self._path, regions, tuple(found), tuple(answers.rows), bounds)
+
+    def also(self, before: _Seen, deadline: Deadline, given: str) -> _Seen:
+        """Look at runs in which hooks raise, managers die, or somebody aborts or pauses the mission; of those, what is new."""
+        if before.regions is None or before.bounds:
+            return before
+        try:
+            regions = Regions(before.regions.system.looking_at(ALSO, deadline), deadline)
+            _explore(regions)
+            found = [one for one in findings(regions, Answers(regions)) if one.code in TOLD]
+            seen_waiting, complete = _waits(Waits(regions), regions, deadline)
+        except UndecidedError as error:
+            message = f"its runs with hooks that raise, managers that die, an abort or a pause can't be looked at: {error}"
+            undecided = Diagnostic("ALU711", message, _whole(self._path), Severity.WARNING)
+            return replace(before, found=(*before.found, undecided))
+        except OutOfTimeError:
+            return replace(before, bounds=(*before.bounds, _bound(self._path, 0, given, also=True)))
+        if not any(one.code == WAITS for one in before.found):  # else the same wait, come to otherwise
+            found += seen_waiting
+        properties, wrong = wanted(regions.system.nodes, regions.system.skillsets, self._faults)
+        for one in properties if not wrong else ():
+            against = held(regions, one, self._faults, deadline).finding if one.kind in SINGLE else None
+            found += [against] if against else []
+        known = {_what(one) for one in before.found}
+        new = [one for one in found if _what(one) not in known]
+        bounds = () if complete else (_bound(self._path, len(regions.regions), given, also=True),)
+        return replace(before, found=(*before.found, *new), bounds=bounds)
+
+
+def _what(finding: Diagnostic) -> tuple[str, Span, str]:
+    """Return what a finding is about; what stands in parentheses may be otherwise in another run."""
+    return finding.code, finding.span, re.sub(r"\([^)]*\)", "", finding.message)
 
 
 def _waits(looked: Waits, regions: Regions, deadline: Deadline) -> tuple[list[Diagnostic], bool]:
@@ -117,8 +190,9 @@ def _explore(regions: Regions) -> None:
         return
 
 
-def _bound(path: Path, regions: int, given: str, undecided: Sequence[str] = ()) -> Diagnostic:
-    message = f"not all runs were looked at: {regions} groups of situations, those that fewest ticks lead to, in {given}"
+def _bound(path: Path, regions: int, given: str, undecided: Sequence[str] = (), *, also: bool = False) -> Diagnostic:
+    what = "not all runs in which hooks raise, managers die, or somebody aborts or pauses it" if also else "not all runs"
+    message = f"{what} were looked at: {regions} groups of situations, those that fewest ticks lead to, in {given}"
     if undecided:
         message += f"; no run was found against {', '.join(f'`{one}`' for one in undecided)}, which proves nothing yet"
     return Diagnostic("ALU710", message, _whole(path), Severity.NOTE, "allow more with `--time`")

@@ -109,7 +109,8 @@ class Regions:
         self._merged: dict[int, int] = {}
         """By their numbers regions that others stand for now."""
         self._by_memory: dict[int, list[int]] = {}
-        self._closures: dict[tuple[int, frozenset[int], bool], Closure] = {}
+        self._closures: dict[tuple[int, frozenset[int], tuple[bool, bool]], Closure] = {}
+        self._answers: dict[tuple[frozenset[int], Question], tuple[tuple[Answer, frozenset[int]], ...]] = {}
         self._commanded: dict[tuple[int, int, int, tuple[int, ...], tuple[int, ...]], int] = {}
 
     def explore(self, begin: State | None = None, until: Callable[[Region], bool] = lambda _: False) -> None:
@@ -192,11 +193,14 @@ class Regions:
 
     def _divided(self, known: Decision, sets: Sets) -> Iterator[tuple[Answer, Sets]]:
         place = self.system.place_of(known.question)
-        found: dict[Answer, list[int]] = {}
-        for number in sets[place]:
-            found.setdefault(self.system.answer(number, known.question), []).append(number)
-        for answer, numbers in found.items():
-            yield answer, (*sets[:place], frozenset(numbers), *sets[place + 1 :])
+        key = (sets[place], known.question)
+        if key not in self._answers:
+            found: dict[Answer, list[int]] = {}
+            for number in sets[place]:
+                found.setdefault(self.system.answer(number, known.question), []).append(number)
+            self._answers[key] = tuple((answer, frozenset(numbers)) for answer, numbers in found.items())
+        for answer, numbers in self._answers[key]:
+            yield answer, (*sets[:place], numbers, *sets[place + 1 :])
 
     def _view(self, sets: Sets) -> _Any:
         return _Any(self.system, sets)
@@ -221,8 +225,7 @@ class Regions:
         return None
 
     def _add(self, memory: int, roots: Sets, origin: tuple[int, Ticked] | None) -> int:
-        over = self.system.ticker.memories[memory].end is not None
-        closures = tuple(self.closure(place, numbers, over=over) for place, numbers in enumerate(roots))
+        closures = tuple(self.closure(place, numbers, memory) for place, numbers in enumerate(roots))
         sets = tuple(one.all for one in closures)
         self.situations += math.prod(map(len, sets))
         depth = 0 if origin is None else self.regions[origin[0]].depth + 1
@@ -241,9 +244,8 @@ class Regions:
             self._by_memory[region.memory].remove(other)
             self._merged[other] = number
             gone = self.regions[other]
-            over = self.system.ticker.memories[region.memory].end is not None
             roots = [a.roots | b.roots for a, b in zip(region.closures, gone.closures, strict=True)]
-            region.closures = tuple(self.closure(place, numbers, over=over) for place, numbers in enumerate(roots))
+            region.closures = tuple(self.closure(place, numbers, region.memory) for place, numbers in enumerate(roots))
             region.sets = tuple(one.all for one in region.closures)
             region.origins += gone.origins
             region.depth = min(region.depth, gone.depth)
@@ -269,9 +271,9 @@ class Regions:
         self._merged.clear()
         self._by_memory.clear()
 
-    def closure(self, place: int, roots: frozenset[int], *, over: bool) -> Closure:
-        """Return what can come of managers before the next tick; when the mission is over, only what still runs goes on."""
-        key = (place, roots, over)
+    def closure(self, place: int, roots: frozenset[int], memory: int) -> Closure:
+        """Return what can come of managers before the next tick of a mission with this memory."""
+        key = (place, roots, self.system.bars(memory))
         if key not in self._closures:
             before: dict[int, tuple[int, Event] | None] = dict.fromkeys(sorted(roots))
             depth = dict.fromkeys(before, 0)
@@ -279,7 +281,7 @@ class Regions:
             while todo:
                 number = todo.popleft()
                 for event, after in self.system.moves_of(place, number):
-                    if after not in before and not (over and event.leaf < 0):
+                    if after not in before and not self.system.leaves_out(event, memory):
                         before[after], depth[after] = (number, event), depth[number] + 1
                         todo.append(after)
             self._closures[key] = Closure(before, depth)
@@ -329,7 +331,7 @@ class Regions:
             if system.outcome(state) is not None:
                 return events + _way(before, state), state
             for event, after in system.steps(state):
-                if after not in before:
+                if after not in before and event.kind is not Kind.ABORT:
                     before[after] = (state, event)
                     todo.append(after)
         return events, first

@@ -16,6 +16,7 @@ from alula.model.model import Skillset
 from alula.prove.mission.measured import Conditions, Measurements
 from alula.prove.mission.moments import Moment
 from alula.prove.mission.oracle import Oracle
+from alula.prove.mission.states import Compared, SeenState
 from alula.prove.mission.unknown import UnknownNumber, unknown
 from alula.runtime.handle import SkillHandle
 from alula.trees.node import Node, pointer
@@ -32,6 +33,8 @@ class Robot:
     oracle: Oracle
     conditions: Conditions = Conditions()  # noqa: RUF009 - a value
     """What the mission's conditions ask of data."""
+    compared: Compared = Compared()  # noqa: RUF009 - a value
+    """The resources that its scripts only compare with states."""
     starting: int = -1
     """The leaf that starts a skill now."""
     started: list[int] = field(default_factory=list)
@@ -116,6 +119,8 @@ class States(Mapping[str, str]):
     def __getitem__(self, name: str) -> str:
         if name not in self._skillset.resource_index:
             raise KeyError(name)
+        if f"{self._skillset.name}.{name}" in self._robot.compared.resources:
+            return SeenState(self._robot.oracle, self._robot.compared, self._skillset.name, name)  # type: ignore[return-value]
         state = self._robot.oracle.look(("resource", self._skillset.name, name))
         if state is None:
             raise KeyError(name)

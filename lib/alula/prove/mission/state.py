@@ -35,6 +35,8 @@ class Kind(Enum):
     """It is there again, as after power-up."""
     ABORT = "abort"
     """Someone aborts the mission."""
+    PAUSE = "pause"
+    """Someone pauses the mission and has it go on, which an execution refuses: it is interrupted."""
 
 
 class Execution(NamedTuple):

@@ -17,6 +17,7 @@ its end, and nothing else happens.
 
 from __future__ import annotations
 
+import copy
 from collections.abc import Iterator, Mapping, Sequence
 from pathlib import Path
 
@@ -36,6 +37,7 @@ from alula.prove.mission.oracle import Answer, Oracle, Question
 from alula.prove.mission.reading import what_is_read
 from alula.prove.mission.robot import Client, Memory, Robot, Waits, opaque
 from alula.prove.mission.state import Event, Execution, Kind, Managers, State
+from alula.prove.mission.states import Compared
 from alula.prove.mission.ticking import ABORT, TICK, OneStop, Ticker
 from alula.prove.mission.ticking import Outcome as Ticked
 from alula.prove.mission.unknown import UNKNOWN
@@ -86,7 +88,7 @@ class System:
         files = read_files(path)
         skillsets = [one for one in models if one.name in _named(files)]
         oracle = Oracle()
-        robot = Robot(oracle, Conditions.of(files, skillsets))
+        robot = Robot(oracle, Conditions.of(files, skillsets), Compared.of(files, skillsets))
         inputs = {port.name: UNKNOWN for port in _ports(files)} if known is None else known
         nodes = opaque(robot, part) if known is None else MissionPart(part.nodes, memory=Memory)
         plan = plan_of_file(path, path.stem, skillsets, inputs, nodes)
@@ -108,6 +110,16 @@ class System:
             node.leaf.with_inputs(_Starting(robot, number))
         return cls(ticker, body, skillsets, failures, deadline or Deadline.after(_GIVEN_S))
 
+    def looking_at(self, failures: Failures, deadline: Deadline) -> System:
+        """Return the same mission with other failures: what is known of its ticks, and the numbers, hold for both."""
+        other = copy.copy(self)
+        other.failures = failures
+        other._steps = [  # noqa: SLF001 - the same class
+            ManagersSteps(one, self._skills_of(one), failures, deadline, self.told_end) for one in self.skillsets
+        ]
+        other._moves = {}  # noqa: SLF001 - the same class
+        return other
+
     # --- steps -------------------------------------------------------------------------------------------------------
 
     def initial(self) -> State:
@@ -116,14 +128,13 @@ class System:
 
     def steps(self, state: State) -> Iterator[tuple[Event, State]]:
         """Yield each step out of a state."""
-        over = self.outcome(state) is not None
-        if not over:
+        if self.outcome(state) is None:
             yield from self._ticks(state, TICK, Kind.TICK)
             if self.failures.aborts and self.may_abort(state.memory):
                 yield from self._ticks(state, ABORT, Kind.ABORT)
         for place, number in enumerate(state.managers):
             for event, after in self.moves_of(place, number):
-                if over and event.leaf < 0:
+                if self.leaves_out(event, state.memory):
                     continue
                 spent = state.spent + (event.failure and self.failures.most is not None)
                 if self.failures.most is None or spent <= self.failures.most:
@@ -145,9 +156,19 @@ class System:
         return None
 
     def may_abort(self, number: int) -> bool:
-        """Tell whether an abort changes what the tree of this memory does."""
+        """Tell whether a mission with this memory can be aborted; one that has not begun just ends."""
         memory = self.ticker.memories[number]
-        return memory.started and not memory.stops and len(self.trees) > 1 and memory.phase == "_run"
+        return memory.started and not memory.stops and memory.end is None
+
+    def leaves_out(self, event: Event, memory: int) -> bool:
+        """Tell whether something can't happen to managers with this memory: when the mission is over, only what still runs goes on."""
+        if event.kind is Kind.PAUSE:
+            return not self.ticker.may_pause(memory)
+        return event.leaf < 0 and self.ticker.memories[memory].end is not None
+
+    def bars(self, memory: int) -> tuple[bool, bool]:
+        """Return what these hang on."""
+        return self.ticker.memories[memory].end is not None, self.failures.pauses and self.ticker.may_pause(memory)
 
     def moves_of(self, place: int, number: int) -> tuple[tuple[Event, int], ...]:
         """Return what can happen in the managers of one skillset, by its place in ``skillsets``: no other skillset has a part in it."""
@@ -231,6 +252,8 @@ class System:
         match question:
             case ("resource", str(skillset), str(name)):
                 return self._steps[self._place[skillset]].resource(managers, name)
+            case ("state", str(skillset), str(name), str(state)):
+                return self._steps[self._place[skillset]].resource(managers, name) == state
             case ("alive", _):
                 return managers.states is not None
             case ("interrupted", _, bool(holds_all)):

@@ -10,8 +10,10 @@ from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, field
 from typing import NamedTuple
 
+from py_trees.behaviour import Behaviour
+
 from alula.missions.director import Director
-from alula.missions.filed.plan import STOP_HERE, FiledMission
+from alula.missions.filed.plan import FiledMission
 from alula.prove.mission.measured import of_data
 from alula.prove.mission.memory import Body, Keeper, TreeMemory
 from alula.prove.mission.oracle import Answer, Asked, Oracle, Question, UndecidedError, View
@@ -60,11 +62,9 @@ class OneStop:
         """As the mission."""
         return self._mission.stopping
 
-    def stop_here(self) -> Node:
-        """Return the tree that there is."""
-        if self._stop is None:
-            raise UndecidedError(f"the mission has no tree `{STOP_HERE}`")
-        return self._stop.root
+    def stop_here(self) -> Behaviour:
+        """Return the tree that there is; where the file has none, there is nothing to add to the halt."""
+        return self._mission.stop_here() if self._stop is None else self._stop.root
 
 
 class Ticker:
@@ -83,6 +83,7 @@ class Ticker:
         """All that ticks have asked of data."""
         self._numbers: dict[TreeMemory, int] = {}
         self._known: dict[tuple[int, str], Decision | Outcome] = {}
+        self._pausing: dict[int, bool] = {}
         self._touched: set[tuple[int, str]] = set()
         self._of = {id(node): number for number, node in enumerate(self.nodes)}
         oracle.begin(lambda _: None)
@@ -102,6 +103,15 @@ class Ticker:
                     answers = (*answers, view(known.question))
                 known = known.next.get(answers[-1]) or self.known(memory, act, view, answers)
             yield known
+
+    def may_pause(self, memory: int) -> bool:
+        """Tell whether a mission with this memory can be paused."""
+        if memory not in self._pausing:
+            self._oracle.begin(lambda _: None)
+            self._keeper.put(self.memories[memory])
+            self._pausing[memory] = not self._body.director.refusal(paused=True)
+            self._keeper.leave()
+        return self._pausing[memory]
 
     def known(self, memory: int, act: str, view: View, answers: Sequence[Answer]) -> Decision | Outcome:
         """Return what follows from the first answers of a tick; where that is not known yet, it is done with ``view``."""

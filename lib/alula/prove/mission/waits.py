@@ -104,9 +104,19 @@ class Waits:
                 sorted((one for one in closure.all if self._rests(place, one)), key=closure.depth.__getitem__)
                 for place, closure in enumerate(region.closures)
             ]
-            for managers in product(*resting):
-                found.setdefault(State(region.memory, managers), number)
-                deadline.check()
+            for choices in self._one_dead(resting):
+                for managers in product(*choices):
+                    found.setdefault(State(region.memory, managers), number)
+                    deadline.check()
+
+    def _one_dead(self, resting: list[list[int]]) -> Iterator[list[list[int]]]:
+        """Yield choices with the managers of one skillset dead at most: with those of several there are too many."""
+        alive = [[one for one in several if self._system.managers_of(one).states is not None] for several in resting]
+        yield alive
+        for place, several in enumerate(resting):
+            dead = [one for one in several if one not in alive[place]]
+            if dead:
+                yield [*alive[:place], dead, *alive[place + 1 :]]
 
     def _explore(self, todo: list[State], deadline: Deadline, values: Values) -> None:
         """Look at what comes after situations while data have these values."""

@@ -46,18 +46,27 @@ def _lines(system: System, event: Event) -> Iterator[str]:
             yield f"{event.skill} is interrupted{_changes(event)}{_violated(event, event.leaf)}"
         case Kind.BREAK:
             yield f"data or time break `{event.result}` of {event.skill}{_changes(event)}{_violated(event, event.leaf)}"
-        case Kind.FAIL:
-            yield f"{event.skill} fails: its function raises{_changes(event)}{_violated(event, event.leaf)}"
         case Kind.EXTERN:
             others = [one for one in event.changes if one[0] != event.name]
             more = _changes(event._replace(changes=tuple(others)))
             yield f"the functional layer: {event.skill} {event.source} -> {event.result}{_violated(event, -1)}{more}"
         case Kind.EVENT:
             yield f"event {event.skill}{_changes(event)}{_violated(event, -1)}"
+        case _:
+            yield _failed(event)
+
+
+def _failed(event: Event) -> str:
+    """Return what models say nothing of."""
+    match event.kind:
+        case Kind.FAIL:
+            return f"{event.skill} fails: its function raises{_changes(event)}{_violated(event, event.leaf)}"
+        case Kind.PAUSE:
+            how = f"is interrupted, because it does not go on{_changes(event)}{_violated(event, event.leaf)}"
+            return f"someone pauses the mission and has it go on: {event.skill} {how}"
         case Kind.DIE:
-            yield f"the managers of {event.skillset} die"
-        case Kind.RESTART:
-            yield f"the managers of {event.skillset} are there again"
+            return f"the managers of {event.skillset} die"
+    return f"the managers of {event.skillset} are there again"
 
 
 def _leaf(system: System, leaf: int) -> str:

@@ -1,6 +1,7 @@
 """From a syntax tree to what runs, as BT.CPP's ``operators.hpp`` evaluates it.
 
-`&&` and `||` evaluate both sides; `?:` evaluates one branch, a comparison stops at the first pair that fails. Arithmetic gives doubles.
+`&&` and `||` evaluate both sides, but for the comparison of a state that decides nothing; `?:` evaluates one branch, a comparison stops at
+the first pair that fails. Arithmetic gives doubles.
 """
 
 from __future__ import annotations
@@ -164,13 +165,30 @@ def _of_unknown(symbol: str, left: Value, right: Value) -> Value:
     return unknown
 
 
+_DECIDES = {"&&": 0.0, "||": 1.0}
+"""The left operand with which the right one decides nothing."""
+
+
+def _asks_only(node: Node) -> bool:
+    """Tell whether nothing but its value comes of an operand: a robot's resource or data is compared with the name of a state.
+
+    Where that decides nothing it is not asked, which nobody sees, and a search of all runs has less to look at.
+    """
+    if not (isinstance(node, Comparison) and len(node.operators) == 1 and node.operators[0] in {"==", "!="}):
+        return False
+    dotted = [isinstance(one, Name) and "." in one.name for one in node.operands]
+    return sorted(dotted) == [False, True] and all(isinstance(one, Name) for one in node.operands)
+
+
 def _chain(node: Chain) -> Code:
     first, *rest = (compile_node(operand) for operand in node.operands)
-    steps = list(zip(node.operators, rest, node.operands[1:], strict=True))
+    steps = list(zip(node.operators, rest, node.operands[1:], map(_asks_only, node.operands[1:]), strict=True))
 
     def run(scope: Scope) -> Value:
         value = first(scope)
-        for symbol, code, place in steps:
+        for symbol, code, place, asks_only in steps:
+            if asks_only and type(value) is float and value == _DECIDES.get(symbol):
+                continue
             right = code(scope)
             try:
                 value = _combine(symbol, value, right)

@@ -1,0 +1,108 @@
+"""States of resources as a mission's scripts see them: no more is asked of one than whether it is the state that it is compared with.
+
+    ("state", "navigation", "flight_status", "IN_AIR")     # a question of a tick: is it this state?
+
+So ticks that a script can't tell apart are one tick. Of a resource that a script uses otherwise its state itself is asked.
+"""
+
+from __future__ import annotations
+
+from collections import Counter
+from collections.abc import Iterable, Iterator, Mapping
+from dataclasses import dataclass, field
+from typing import Self
+
+from alula.missions.filed.world import states_of
+from alula.model.model import Skillset
+from alula.prove.mission.oracle import Oracle
+from alula.prove.mission.reading import SCRIPT_PORTS, scripts_of
+from alula.trees.reading import POSTCONDITIONS, PRECONDITIONS, TreeFiles, type_name
+from alula.trees.script import ScriptError, parse
+from alula.trees.script.syntax import Call, Comparison, Name, Node, children, walk
+
+STATE = "state"
+EQUAL = frozenset({"==", "!="})
+
+
+@dataclass(frozen=True)
+class Compared:
+    """The resources (``skillset.resource``) that scripts only compare with states; ``states``: their names by scripts' numbers."""
+
+    resources: frozenset[str] = frozenset()
+    states: Mapping[float, str] = field(default_factory=dict)
+
+    @classmethod
+    def of(cls, files: TreeFiles, skillsets: Iterable[Skillset]) -> Compared:
+        """Read those of a mission's files; none where a script comes from the blackboard, for then anything may be asked."""
+        several = list(skillsets)
+        states = {f"{one.name}.{resource.name}": frozenset(resource.states) for one in several for resource in one.resources}
+        elements = [element for tree in files.trees.values() for element in tree.iterate()]
+        if any(
+            element.get(name).lstrip().startswith("{") for element in elements for name in (*SCRIPT_PORTS, *PRECONDITIONS, *POSTCONDITIONS)
+        ):
+            return cls()
+        named: Counter[str] = Counter(type_name(element) for element in elements)
+        compared: Counter[str] = Counter()
+        for program in (program for element in elements for text in scripts_of(element) for program in _parsed(text)):
+            named.update(one.name for one in _read(program))
+            compared.update(name for one in walk(program) if isinstance(one, Comparison) for name in _compared(one, states))
+        numbers = {number: name for name, number in states_of(several).items()}
+        return cls(frozenset(name for name in states if named[name] == compared[name]), numbers)
+
+
+def _parsed(text: str) -> tuple[Node, ...]:
+    try:
+        return tuple(parse(text).statements)
+    except ScriptError:
+        return ()
+
+
+def _read(node: Node) -> Iterator[Name]:
+    """Yield the names whose values are needed: what a function is asked of is passed on as a name."""
+    if isinstance(node, Name):
+        yield node
+    for child in children(node):
+        if not (isinstance(node, Call) and isinstance(child, Name)):
+            yield from _read(child)
+
+
+def _compared(node: Comparison, states: Mapping[str, frozenset[str]]) -> Iterator[str]:
+    """Yield the resource that a comparison asks for one of its states."""
+    if len(node.operands) == len(EQUAL) and EQUAL.issuperset(node.operators) and all(isinstance(one, Name) for one in node.operands):
+        left, right = (one.name for one in node.operands if isinstance(one, Name))
+        yield from (name for name, state in ((left, right), (right, left)) if state in states.get(name, ()))
+
+
+class SeenState(float):
+    """The number of a state, of which a tick asks no more than a script compares it with; also where managers are not there: it is none."""
+
+    __slots__ = ("compared", "oracle", "resource")
+    oracle: Oracle
+    compared: Compared
+    resource: tuple[str, str]
+
+    def __new__(cls, oracle: Oracle, compared: Compared, skillset: str, name: str) -> Self:
+        """Make one."""
+        made = super().__new__(cls, float("inf"))
+        made.oracle, made.compared, made.resource = oracle, compared, (skillset, name)
+        return made
+
+    def __sub__(self, other: object) -> _Away:  # type: ignore[override]  # scripts compare so, and do nothing else with it
+        return _Away(self, other)
+
+    __rsub__ = __sub__  # type: ignore[assignment]
+
+
+@dataclass(frozen=True, eq=False)
+class _Away:
+    """How far a state is from another."""
+
+    state: SeenState
+    other: object
+
+    def __abs__(self) -> _Away:
+        return self
+
+    def __le__(self, _near: float) -> bool:
+        one = self.state
+        return bool(one.oracle.look((STATE, *one.resource, one.compared.states[self.other])))  # type: ignore[index]  # a number of one
