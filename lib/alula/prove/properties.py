@@ -11,7 +11,7 @@ step of the loop: then the execution that has run longest can be the one that en
 from __future__ import annotations
 
 from collections import deque
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Collection, Iterator
 
 from alula.language.counterexamples import Counterexample
 from alula.language.errors import Diagnostic, Severity
@@ -22,8 +22,8 @@ from alula.prove.explore import Edge, Graph
 from alula.prove.steps import State, World
 
 
-def check_property(graph: Graph, wanted: Property) -> Diagnostic | None:
-    """Return why a property does not hold, or None when it does."""
+def check_property(graph: Graph, wanted: Property, unknown: Collection[int] = ()) -> Diagnostic | None:
+    """Return why a property does not hold, or None when it does; what comes after the ``unknown`` situations was not looked at."""
     graph.deadline.check()
     holds = [true_in(graph.world, wanted.condition, state) for state in graph.states]
     match wanted.kind:
@@ -32,10 +32,14 @@ def check_property(graph: Graph, wanted: Property) -> Diagnostic | None:
         case PropertyKind.ALWAYS:
             return _found(graph, wanted, next((n for n, value in enumerate(holds) if not value), None))
         case PropertyKind.EVENTUALLY:
-            return lasso(graph, wanted, [0], holds)
+            return lasso(graph, wanted, [0], _with(holds, unknown))
         case PropertyKind.LEADS_TO:
             then = [true_in(graph.world, wanted.consequence or Constant(value=False), state) for state in graph.states]
-            return lasso(graph, wanted, [n for n, value in enumerate(holds) if value], then)
+            return lasso(graph, wanted, [n for n, value in enumerate(holds) if value], _with(then, unknown))
+
+
+def _with(values: list[bool], true: Collection[int]) -> list[bool]:
+    return [value or number in true for number, value in enumerate(values)] if true else values
 
 
 def true_in(world: World, condition: Expression, state: State) -> bool:

@@ -8,8 +8,8 @@ from dataclasses import dataclass, replace
 from alula.language.errors import Diagnostic, Severity
 from alula.language.outside import Arrow, opened, untaken
 from alula.model.model import Skillset
-from alula.prove import explicit, symbolic
-from alula.prove.abstract import without_data
+from alula.prove import explicit, few, symbolic
+from alula.prove.abstract import Abstraction, without_data
 from alula.prove.limits import Deadline, OutOfTimeError
 from alula.prove.local import Suspect, local_checks
 
@@ -68,10 +68,21 @@ class _Search:
         abstraction = without_data(skillset, self.deadline, outside)
         self.deadline.doing = "situations one by one"
         found = explicit.search(skillset, abstraction, self.suspects, self.deadline, most=self.most, copies=self.copies)
-        if found is None:
-            self.deadline.doing = "situations as sets"
-            found = symbolic.search(skillset, abstraction, self.suspects, self.deadline, copies=self.copies)
-        return found
+        return self._as_sets(skillset, abstraction) if found is None else found
+
+    def _as_sets(self, skillset: Skillset, abstraction: Abstraction) -> list[Diagnostic]:
+        """Return all global findings; what a few skills show against a property is among them also where time is too short for the rest."""
+        quick = self.deadline.half("properties, with a few skills")
+        refuted = few.refuted(abstraction, skillset.properties, quick, copies=self.copies)
+        self.deadline.doing = "situations as sets"
+        others = replace(skillset, properties=tuple(wanted for wanted in skillset.properties if wanted.name not in refuted))
+        try:
+            return [*refuted.values(), *symbolic.search(others, abstraction, self.suspects, self.deadline, copies=self.copies)]
+        except OutOfTimeError:
+            if not refuted:
+                raise
+            unsure = [_unsure(suspect, self.deadline) for suspect in self.suspects]
+            return [*refuted.values(), *unsure, _undecided(others, self.deadline)]
 
     def open_findings(self) -> list[Diagnostic]:
         """Return the findings of the model alone, and the errors that arrows which nothing takes lead to."""

@@ -45,10 +45,22 @@ class Move:
     """The execution that starts, ends or breaks, as ``step`` calls it."""
 
 
-class World:
-    """The steps of one skillset. ``copies`` is how many executions of one skill are looked at, at most."""
+@dataclass(frozen=True)
+class Part:
+    """What may happen of its own accord in a part of a skillset: skills that start, resources changed from outside, events."""
 
-    def __init__(self, abstraction: Abstraction, *, copies: int = 2) -> None:
+    skills: frozenset[str]
+    resources: frozenset[str]
+    events: frozenset[str]
+
+
+class World:
+    """The steps of one skillset. ``copies`` is how many executions of one skill are looked at, at most.
+
+    With a ``part`` of it, nothing else is asked for: each run of it is a run of the skillset.
+    """
+
+    def __init__(self, abstraction: Abstraction, *, copies: int = 2, part: Part | None = None) -> None:
         self.abstraction = abstraction
         self.skillset: Skillset = abstraction.skillset
         self.copies = copies
@@ -56,9 +68,12 @@ class World:
         """Skills of which more executions could have started than are looked at, and would have mattered."""
         self._breakers = abstraction.breakers
         self._births = abstraction.births
+        self._startable = [s for s in self.skillset.skills if part is None or s.name in part.skills]
+        self._changing = [r for r in self.skillset.resources if part is None or r.name in part.resources]
+        self._happening = [e for e in self.skillset.events if part is None or e.name in part.events]
         self._names = tuple(resource.name for resource in self.skillset.resources)
         self._ordered = {s.name for s in self.skillset.skills if any(i.effect.assignments for i in s.invariants)}
-        self.idle = {s.name for s in self.skillset.skills if not any(effect.assignments for effect in _effects(s))}
+        self.idle = {s.name for s in self.skillset.skills if not any(effect.assignments for effect in effects_of(s))}
 
     # --- situations -----------------------------------------------------------------------------------------------
 
@@ -93,14 +108,14 @@ class World:
         yield from self._breaks(situation)
 
     def _extern(self, situation: Situation) -> Iterator[Move]:
-        for resource in self.skillset.resources:
+        for resource in self._changing:
             source = situation.states[resource.name]
             for target in resource.targets(source, extern=True):
                 step = semantics.transition(self.skillset, situation, resource.name, target)
                 yield self._move(self._taker(resource.name, source, target), (resource.name, target), step)
 
     def _events(self, situation: Situation) -> Iterator[Move]:
-        for event in self.skillset.events:
+        for event in self._happening:
             if not holds(event.guard, situation.states, {}):
                 continue
             if semantics.event_refusal(self.skillset, situation, event.name):
@@ -110,7 +125,7 @@ class World:
 
     def _starts(self, situation: Situation) -> Iterator[Move]:
         counts = [execution.skill for execution in situation.running]
-        for skill in self.skillset.skills:
+        for skill in self._startable:
             if next(semantics.unmet_preconditions(skill, situation.states, {}), None) is not None:
                 continue
             if self._fails(skill, skill.start, situation):
@@ -200,7 +215,8 @@ class World:
         return tuple(("after start", skill.name, birth.invariant) for birth in births)
 
 
-def _effects(skill: Skill) -> Iterator[Effect]:
+def effects_of(skill: Skill) -> Iterator[Effect]:
+    """Yield the effects of a skill: of its start, its interruption, its invariants and its results."""
     yield skill.start
     yield skill.interrupt.effect
     for invariant in skill.invariants:

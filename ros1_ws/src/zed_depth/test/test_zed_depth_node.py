@@ -29,8 +29,11 @@ WALLS = 20
 
 @cache
 def wall(disparity_px: float, number: int) -> tuple[np.ndarray, np.ndarray]:
-    """Return one of the pairs that a flight shows by turns, each with a noise of its own: made once for all tests."""
-    return wall_pair(disparity_px, seed=number)
+    """Return one of the pairs that a flight shows by turns, each with a noise of its own: made once for all tests.
+
+    At each distance it is another wall: were it the same one, of which the left image stays as it is, the cameras would have been turned.
+    """
+    return wall_pair(disparity_px, seed=number, wall=round(10 * disparity_px))
 
 
 class Camera:

@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING
 import cv2
 import numpy as np
 
-from zed_depth.depth_scale import followed
+from zed_depth.feature_motion import followed
 from zed_depth.stereo import MatcherSettings, coarse_disparity, noise_level
 
 if TYPE_CHECKING:

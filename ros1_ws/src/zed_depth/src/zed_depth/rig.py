@@ -12,21 +12,27 @@ from perception_core import FINE, NS, FaultKind, Finding, broken, first_trouble,
 from zed_depth.calibration import CalibrationError, InfoLike, StereoCalibration, StereoGeometry
 from zed_depth.confidence import confidence_of
 from zed_depth.depth_scale import ScaleJudge
+from zed_depth.feature_motion import Views
 from zed_depth.fixed_columns import fixed_columns_finding
 from zed_depth.image_fit import fit_of
 from zed_depth.image_health import SHARPNESS_FELL, ImageJudge
 from zed_depth.stereo import DisparityRange, StereoMatcher, depth_of
+from zed_depth.torn_images import TornJudge
+from zed_depth.vergence import VergenceJudge, VergenceLimits
 from zed_depth.view_health import ViewLimits, view_of
 
 if TYPE_CHECKING:
     from numpy.typing import NDArray
 
-    from zed_depth.depth_scale import CameraPose
+    from zed_depth.feature_motion import CameraPose
     from zed_depth.pairing import StereoPair
     from zed_depth.settings import ZedSettings
 
 
 MEND_SHARE = 0.6  # of max_vertical_px
+JUMPED_PX = 0.7  # the middle change of the disparities from pair to pair; with more, it is in doubt
+JUMP_STRIDE = 4
+LEAST_COMPARED = 0.05  # of the pixels
 SHARE_FELL = 0.92  # of the pixels that had a depth, or a parallax, in the pair before; with less, it is in doubt
 
 
@@ -61,8 +67,9 @@ class StereoRig:
     def __init__(self, settings: ZedSettings, camera_pose: CameraPose = lambda _stamp_ns: None) -> None:
         self._settings = settings
         self._camera_pose = camera_pose
-        self._scale = ScaleJudge(settings.scale)
+        self._begin_motion()
         self._images = ImageJudge(settings.images)
+        self._torn = TornJudge()
         self._infos: dict[str, InfoLike] = {}
         self._lock = Lock()
         self._matching = Lock()
@@ -75,7 +82,9 @@ class StereoRig:
         self._valid = FINE  # of the last pair of which the depth was asked for
         self._fit = FINE  # of the last pair that was matched
         self._matched_ns: int | None = None
-        self._shares: dict[str, float] = {}  # of the pixels with a depth and with a parallax, in the last pair that was not in doubt
+        # of the last pair that was not in doubt: shares of the pixels with a depth and with a parallax, and some disparities
+        self._shares: dict[str, float] = {}
+        self._sample: NDArray[np.float32] | None = None
         self._doubted_ns: int | None = None  # the first pair in doubt
 
     def take_info(self, side: str, info: InfoLike) -> None:
@@ -100,12 +109,16 @@ class StereoRig:
         with self._lock:
             self._calibration, self._info_finding, self._view_ns = calibration, finding, None
             self._valid, self._fit, self._matched_ns = FINE, FINE, None
-            self._shares, self._doubted_ns = {}, None
-        self._scale = ScaleJudge(self._settings.scale)
+            self._shares, self._sample, self._doubted_ns = {}, None, None
+        self._begin_motion()
+
+    def _begin_motion(self) -> None:
+        """Forget what earlier views told, and what was found by it."""
+        self._views, self._scale, self._vergence = Views(), ScaleJudge(self._settings.scale), VergenceJudge(VergenceLimits())
 
     def finding(self, pair: StereoPair) -> Finding:
         """Return what this pair tells of the rig; call it once for each pair, in order."""
-        images = first_trouble(self._images.finding(pair), fixed_columns_finding(pair.left, pair.right))
+        images = first_trouble(self._images.finding(pair), fixed_columns_finding(pair.left, pair.right), self._torn.finding(pair))
         with self._lock:
             calibration, info = self._calibration, self._info_finding
         if calibration is None or not images.ok:
@@ -120,13 +133,18 @@ class StereoRig:
         if prepared is not None:
             view = view_of(*prepared, offset_px=calibration.geometry.offset_px, limits=self._view_limits())
             self._view = view.finding
-            if view.landmarks is not None:
-                self._scale.take(pair.stamp_ns, view.landmarks, calibration.geometry, self._camera_pose)
+            if view.landmarks is not None and view.right is not None:
+                if self._vergence.look(pair.stamp_ns, view.landmarks, view.right, calibration.geometry, self._camera_pose):
+                    self._views.clear()
+                compared = self._views.take(pair.stamp_ns, view.landmarks, self._camera_pose)
+                if compared is not None:
+                    self._vergence.compare(*compared, calibration.geometry)
+                    self._scale.compare(*compared, calibration.geometry)
             self._sharpness = self._images.sharpness
             with self._lock:
                 self._view_ns = pair.stamp_ns
         with self._lock:
-            return first_trouble(self._view, self._scale.finding, self._fit, self._valid)
+            return first_trouble(self._view, self._vergence.finding, self._scale.finding, self._fit, self._valid)
 
     def _view_limits(self) -> ViewLimits:
         """Return the limits; once found off, the rows must be clearly right again, or what is at the limit would flap."""
@@ -163,7 +181,7 @@ class StereoRig:
         nearer = np.count_nonzero(parallax) / disparity.size
         with self._lock:
             self._valid = self._valid_finding(disparity)
-            doubt = self._doubt({"depth": share, "parallax": nearer}, pair.stamp_ns)
+            doubt = self._doubt({"depth": share, "parallax": nearer}, disparity[::JUMP_STRIDE, ::JUMP_STRIDE], pair.stamp_ns)
         return replace(depth, doubt=depth.doubt or doubt)
 
     def _valid_finding(self, disparity: NDArray[np.float32]) -> Finding:
@@ -187,30 +205,39 @@ class StereoRig:
                 self._valid = self._valid_finding(disparity)
         return Depth(depth_of(disparity, geometry), geometry, disparity, images, fit.finding.reason or fit.doubt)
 
-    def _doubt(self, shares: dict[str, float], stamp_ns: int) -> str:
-        """Return why a pair with these shares of pixels is in doubt, or an empty text; with the lock held."""
+    def _doubt(self, shares: dict[str, float], sample: NDArray[np.float32], stamp_ns: int) -> str:
+        """Return why a pair with these shares of pixels and these disparities is in doubt, or an empty text; with the lock held."""
         before, doubted_ns, checked_ns = self._shares, self._doubted_ns, self._view_ns
         fits = doubted_ns is not None and checked_ns is not None and doubted_ns < checked_ns <= stamp_ns
         again = doubted_ns is not None and stamp_ns < doubted_ns  # the clock went back
         fell = [name for name in before if shares[name] < SHARE_FELL * before[name]]
-        if fits or again or not fell:
-            self._shares, self._doubted_ns = shares, None
+        jump_px = 0.0 if self._sample is None else middle_change(self._sample, sample)
+        if fits or again or not (fell or abs(jump_px) > JUMPED_PX):
+            self._shares, self._sample, self._doubted_ns = shares, sample, None
             return ""
         if doubted_ns is None:
             self._doubted_ns = stamp_ns
-        return f"only {shares[fell[0]]:.0%} of the image has a {fell[0]}, {before[fell[0]]:.0%} had one just before"
+        if fell:
+            return f"only {shares[fell[0]]:.0%} of the image has a {fell[0]}, {before[fell[0]]:.0%} had one just before"
+        return f"the disparities changed by {jump_px:.1f} px from one pair to the next"
 
     def rest(self) -> None:
         """Forget the share of valid depth: no depth is measured for a while."""
         with self._lock:
             self._valid = FINE
-            self._shares, self._doubted_ns = {}, None
+            self._shares, self._sample, self._doubted_ns = {}, None, None
 
     def _matcher_for(self, geometry: StereoGeometry) -> StereoMatcher:
         if self._matcher is None or self._matcher[0] != geometry:
             search = DisparityRange.to_see(geometry, self._settings.near_depth_m)
             self._matcher = geometry, StereoMatcher(self._settings.matcher, search)
         return self._matcher[1]
+
+
+def middle_change(before: NDArray[np.float32], now: NDArray[np.float32]) -> float:
+    """Return the middle change of disparities (h, w), of the pixels that have one in both images; 0 where few have."""
+    changes = (now - before)[np.isfinite(before) & np.isfinite(now)] if before.shape == now.shape else np.empty(0)
+    return float(np.median(changes)) if len(changes) > LEAST_COMPARED * before.size else 0.0
 
 
 def _same(one: InfoLike, other: InfoLike) -> bool:

@@ -17,7 +17,7 @@ import numpy as np
 
 from perception_core import FINE, FaultKind, Finding, broken, unsure
 from zed_depth.covered_lens import covered_finding
-from zed_depth.depth_scale import Landmarks
+from zed_depth.feature_motion import Landmarks
 from zed_depth.features import Matches, brighter, features_of, match, match_by_disparity, refine
 
 if TYPE_CHECKING:
@@ -58,10 +58,14 @@ class ViewLimits:
 
 @dataclass(frozen=True)
 class View:
-    """What both images together tell: the finding, and the features in which they agree, where it is OK."""
+    """What both images together tell: the finding; the features in which they agree, and the right image by the left one's light.
+
+    These are there where the cameras see the same and their rows are right, though one of them be turned aside.
+    """
 
     finding: Finding
     landmarks: Landmarks | None = None
+    right: Gray | None = None
 
 
 def view_of(left: Gray, right: Gray, *, offset_px: float, limits: ViewLimits) -> View:
@@ -86,18 +90,19 @@ def view_of(left: Gray, right: Gray, *, offset_px: float, limits: ViewLimits) ->
         return View(trouble)
     gain = _gain(left, right, matches, fit.agree)
     # A feature is followed by its light: as bright as in the left image.
-    sure = refine(left, brighter(right, 1.0 / gain), matches, fit.agree)
+    lit = brighter(right, 1.0 / gain)
+    sure = refine(left, lit, matches, fit.agree)
     matched_px = disparity_px = matches.disparity_px[fit.agree] - offset_px
     if len(sure.vertical_px) >= ENOUGH_MATCHES:
         fit = fit_rows(sure, first_guess_px)
         disparity_px = sure.disparity_px[fit.agree] - offset_px if np.any(fit.agree) else matched_px
     # A lens that is partly covered leaves few features, which may seem to be turned: it is looked for first.
     trouble = (
-        covered_finding(left, right, offset_px, gain)
-        or _rows_finding(fit, left.shape, limits)
-        or _disparity_finding(matched_px, disparity_px, limits)
+        covered_finding(left, right, offset_px, gain) or _rows_finding(fit, left.shape, limits) or _parallax_finding(matched_px, limits)
     )
-    return View(FINE, Landmarks(left, sure.places, sure.disparity_px)) if trouble is None else View(trouble)
+    if trouble is not None:
+        return View(trouble)
+    return View(_beyond_finding(disparity_px, limits) or FINE, Landmarks(left, sure.places, sure.disparity_px), lit)
 
 
 def _scene_finding(matches: Matches, fit: RowFit, limits: ViewLimits) -> Finding | None:
@@ -174,18 +179,23 @@ def _rows_finding(fit: RowFit, shape: tuple[int, ...], limits: ViewLimits) -> Fi
     return broken(FaultKind.CALIBRATION, f"{told}: calibrate the pair") if troubles[told] > limits.max_vertical_px else None
 
 
-def _disparity_finding(matched_px: Floats, refined_px: Floats, limits: ViewLimits) -> Finding | None:
-    """Judge disparities of matched features (N,), and of those that are known to a fraction of a pixel (M,), from infinity on."""
+def _parallax_finding(matched_px: Floats, limits: ViewLimits) -> Finding | None:
+    """Judge disparities of matched features (N,), from infinity on."""
     negative = float(np.mean(matched_px < -1.0))
     if negative > limits.max_negative:
         return broken(FaultKind.CALIBRATION, f"left and right are swapped: {negative:.0%} of the features have a negative disparity")
-    beyond = np.count_nonzero(refined_px < -limits.beyond_px)
-    if beyond > max(FEW_MISTAKEN, limits.max_beyond * len(refined_px)):
-        told = f"the cameras are turned aside against each other: {beyond} of {len(refined_px)} features seem to be beyond infinity"
-        return broken(FaultKind.CALIBRATION, f"{told}: calibrate the pair")
     if float(np.percentile(np.abs(matched_px), 95.0)) < limits.min_parallax_px:
         return unsure(FaultKind.VIEW, "no parallax: everything is far away, or both cameras show the same")
     return None
+
+
+def _beyond_finding(refined_px: Floats, limits: ViewLimits) -> Finding | None:
+    """Judge disparities (N,) that are known to a fraction of a pixel, from infinity on."""
+    beyond = np.count_nonzero(refined_px < -limits.beyond_px)
+    if beyond <= max(FEW_MISTAKEN, limits.max_beyond * len(refined_px)):
+        return None
+    told = f"the cameras are turned aside against each other: {beyond} of {len(refined_px)} features seem to be beyond infinity"
+    return broken(FaultKind.CALIBRATION, f"{told}: calibrate the pair")
 
 
 def _gain(left: Gray, right: Gray, matches: Matches, agree: NDArray[np.bool_]) -> float:

@@ -14,9 +14,9 @@ WIDTH, HEIGHT = 480, 270
 DOWN_DEG = np.linspace(10.0, 80.0, 16)  # of the beams that meet the ground
 
 
-def wall_pair(disparity_px: float, *, seed: int) -> tuple[NDArray[np.uint8], NDArray[np.uint8]]:
-    """Return the left and right image (270, 480) of a textured wall square to the view; the noise, not the wall, depends on the seed."""
-    texture = cv2.GaussianBlur(np.random.default_rng(7).uniform(0, 255, (HEIGHT, WIDTH + 128)).astype(np.float32), (0, 0), 1.2)
+def wall_pair(disparity_px: float, *, seed: int, wall: int = 7) -> tuple[NDArray[np.uint8], NDArray[np.uint8]]:
+    """Return the left and right image (270, 480) of a textured ``wall`` square to the view; the noise alone depends on the seed."""
+    texture = cv2.GaussianBlur(np.random.default_rng(wall).uniform(0, 255, (HEIGHT, WIDTH + 128)).astype(np.float32), (0, 0), 1.2)
     texture = (texture - texture.mean()) * 2.5 + 120.0
     shift = np.array([[1.0, 0.0, -disparity_px], [0.0, 1.0, 0.0]])
     moved = cv2.warpAffine(texture, shift, (WIDTH + 128, HEIGHT), flags=cv2.INTER_CUBIC)
