@@ -182,7 +182,7 @@ def _cloud(columns: NDArray[np.float32]) -> bytes:
 
 
 CASES = [
-    Case("stereo 480x270, 80 disparities", partial(stereo, 480, 270, 240.0)),
+    Case("stereo 480x270, 64 disparities", partial(stereo, 480, 270, 240.0)),
     Case("stereo 1280x720, matched at half", partial(stereo, 1280, 720, 700.0)),
     Case("lidar 30,000 points", partial(lidar, 30_000)),
     Case("lidar 120,000 points", partial(lidar, 120_000)),

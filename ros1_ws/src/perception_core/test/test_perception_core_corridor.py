@@ -9,7 +9,8 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from perception_core import Corridor, Support, VehicleMotion, direction_of_motion, nearest_obstacle
+from perception_core import Corridor, Support, VehicleMotion, direction_of_motion
+from perception_core.nearest import nearest_obstacle
 
 EAST = np.array([1.0, 0.0, 0.0])
 ORIGIN = np.array([0.0, 0.0, 3.0])

@@ -18,10 +18,12 @@ from resource_reporter.sending import DirectConnection
 LARGE = 1 << 23  # more than a socket takes at once
 
 
-@pytest.fixture
-def ends() -> Iterator[tuple[TCPROSTransport, socket.socket]]:
-    """A publisher's transport, and the other end of its socket."""
+@pytest.fixture(params=[None, 1e5])
+def ends(request: pytest.FixtureRequest) -> Iterator[tuple[TCPROSTransport, socket.socket]]:
+    """A publisher's transport, and the other end of its socket; rospy's sockets have a timeout or none."""
     ours, theirs = socket.socketpair()
+    ours.settimeout(request.param)
+    theirs.settimeout(None)
     transport = TCPROSTransport(TCPROSTransportProtocol("test", None), "test")
     transport.set_socket(ours, "test")
     yield transport, theirs
@@ -40,11 +42,19 @@ def read(theirs: socket.socket, count: int) -> bytes:
 def test_what_the_socket_takes_is_sent_by_the_caller(ends: tuple[TCPROSTransport, socket.socket]) -> None:
     transport, theirs = ends
     connection = DirectConnection(transport, 1)
-    for number in range(100):
+    for number in range(10):
         connection.write_data(b"%3d" % number)
     theirs.setblocking(False)  # all is there already
-    assert theirs.recv(1000) == b"".join(b"%3d" % number for number in range(100))
-    assert (transport.stat_bytes, transport.stat_num_msg) == (300, 100)
+    assert theirs.recv(1000) == b"".join(b"%3d" % number for number in range(10))
+    assert (transport.stat_bytes, transport.stat_num_msg) == (30, 10)
+
+
+def test_nobody_waits_for_a_subscriber_that_takes_nothing(ends: tuple[TCPROSTransport, socket.socket]) -> None:
+    transport, theirs = ends
+    connection = DirectConnection(transport, 0)  # all are kept
+    for number in range(5000):
+        connection.write_data(b"%5d" % number)  # hangs where it waits
+    assert read(theirs, 25_000) == b"".join(b"%5d" % number for number in range(5000))
 
 
 def test_a_message_that_was_begun_is_ended_and_the_newest_of_those_behind_it_follow(

@@ -19,8 +19,8 @@ from perception_core import (
     VehicleMotion,
     deskew,
     direction_of_motion,
-    nearest_obstacle,
 )
+from perception_core.nearest import nearest_obstacle
 
 Floats = NDArray[np.float64]
 NOTHING_M = 0.05  # from the sensor; a point that is nearer is no return

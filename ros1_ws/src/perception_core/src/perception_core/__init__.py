@@ -8,7 +8,6 @@ from perception_core.corridor import (
     VehicleMotion,
     corridor_coordinates,
     direction_of_motion,
-    nearest_obstacle,
 )
 from perception_core.health import FINE, FaultKind, Finding, HealthLimits, HealthWatch, Verdict, broken, first_trouble, unsure
 from perception_core.poses import NS, PoseBuffer, Poses, PoseUnavailableError
@@ -44,7 +43,6 @@ __all__ = [
     "deskew",
     "direction_of_motion",
     "first_trouble",
-    "nearest_obstacle",
     "straighten",
     "tunable",
     "unsure",

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import select
 import socket
 
 import rospy
@@ -19,6 +20,8 @@ class DirectConnection(QueuedConnection):  # type: ignore[misc]  # rospy has no 
     _error: Exception | None
 
     def __init__(self, connection: rospy.impl.transport.Transport, queue_size: int) -> None:
+        self._writable = select.poll()
+        self._writable.register(connection.socket, select.POLLOUT)
         self._rest = b""  # of a message of which the socket took a part
         self._relaying = False
         super().__init__(connection, queue_size)
@@ -45,7 +48,8 @@ class DirectConnection(QueuedConnection):  # type: ignore[misc]  # rospy has no 
         if to.socket is None or to.done:
             return 0
         try:
-            sent: int = to.socket.send(data, socket.MSG_DONTWAIT)
+            # rospy's sockets have a timeout, up to which Python waits for a full one, or none at all: MSG_DONTWAIT is not enough.
+            sent: int = to.socket.send(data, socket.MSG_DONTWAIT) if self._writable.poll(0) else 0
         except OSError:
             return 0
         to.stat_bytes += sent

@@ -7,7 +7,8 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from perception_core import Ahead, Corridor, PoseBuffer, Support, VehicleMotion, direction_of_motion, nearest_obstacle
+from perception_core import Ahead, Corridor, PoseBuffer, Support, VehicleMotion, direction_of_motion
+from perception_core.nearest import nearest_obstacle
 from zed_depth.calibration import StereoGeometry
 from zed_depth.stereo import points_of
 
