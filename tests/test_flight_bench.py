@@ -2,13 +2,14 @@
 
 from __future__ import annotations
 
+import os
 import resource
 import sys
 from pathlib import Path
 
 import pytest
 
-from flight_bench.__main__ import main
+from flight_bench.__main__ import environment_of, main
 from flight_bench.figures import Figures, as_json, ratio, table
 from flight_bench.watching import FRONT, PHASES, SUPERVISOR, UNSEEN, watch
 
@@ -46,6 +47,14 @@ def test_medians_ratios_and_files_tell_of_each_checkout(tmp_path: Path) -> None:
     assert f"| {FRONT} |" in shown
     assert ratio(flights, flights).startswith("processor time, first by second: all 1.00 (1.00 to 1.00)")
     assert [one["checkout"] for one in as_json(flights)] == ["here"] * 3
+
+
+def test_another_checkout_is_told_nothing_of_where_this_one_lies(tmp_path: Path) -> None:
+    own = Path(os.environ["ALULA_ROOT"])
+    assert environment_of(own) == dict(os.environ)
+    told = environment_of(tmp_path)
+    assert not any(str(own) in value for name, value in told.items() if name.startswith("ALULA"))
+    assert told["PATH"]
 
 
 @pytest.mark.parametrize(

@@ -39,13 +39,20 @@ def parse_arguments(arguments: Sequence[str] | None) -> argparse.Namespace:
 def fly(checkout: Path, run: Sequence[str], folder: Path) -> Figures:
     """Fly once; raises BenchError."""
     out = folder / "run"
-    taken = watch([str(checkout / "alula"), "run", *run, "--robot", str(checkout), "--out", str(out)], out, folder / "words.txt")
+    command = [str(checkout / "alula"), "run", *run, "--robot", str(checkout), "--out", str(out)]
+    taken = watch(command, out, folder / "words.txt", environment_of(checkout))
     try:
         summary = json.loads((out / "summary.json").read_text(encoding="utf-8"))
     except OSError:
         words = (folder / "words.txt").read_text(encoding="utf-8", errors="replace").strip().splitlines()
         raise BenchError(f"the flight left no summary (exit code {taken.code}): {words[-1] if words else 'it said nothing'}") from None
     return Figures(str(checkout), str(summary["outcome"]), taken, accuracy_of(summary))
+
+
+def environment_of(checkout: Path) -> dict[str, str]:
+    """Return the environment for a checkout's commands; another one than this must not build into this one's folders."""
+    own = checkout == Path(os.environ["ALULA_ROOT"])
+    return {name: value for name, value in os.environ.items() if own or not name.startswith("ALULA_")}
 
 
 def measure(options: argparse.Namespace) -> list[list[Figures]]:

@@ -120,11 +120,11 @@ class Phases:
         return any(self._place is None or (event.get("resource"), event.get("from_state")) == self._place for event in events)
 
 
-def watch(command: Sequence[str], out: Path, log: Path) -> Watched:
+def watch(command: Sequence[str], out: Path, log: Path, environment: Mapping[str, str] | None = None) -> Watched:
     """Run a command that makes a run in ``out`` to its end; what it prints goes to ``log``."""
     tally, phases, wall_s = Tally(), Phases(out), dict.fromkeys(PHASES, 0.0)
     with log.open("wb") as words:
-        child = subprocess.Popen(command, stdin=subprocess.DEVNULL, stdout=words, stderr=subprocess.STDOUT)
+        child = subprocess.Popen(command, stdin=subprocess.DEVNULL, stdout=words, stderr=subprocess.STDOUT, env=environment)
     root, phase, since_s = psutil.Process(child.pid), START, time.monotonic()
     while os.waitid(os.P_PID, child.pid, os.WEXITED | os.WNOHANG | os.WNOWAIT) is None:
         phase = phases.look(tally.look(root, phase))
