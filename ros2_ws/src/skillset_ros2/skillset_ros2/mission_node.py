@@ -39,6 +39,7 @@ from alula.trees.view import NodeView
 from skillset_ros2 import NodeExecutor, SkillsetClient
 from skillset_ros2.base import QUIET
 from skillset_ros2.fleet_clock import FleetClock
+from skillset_ros2.simulated_time import SimulatedTime
 
 TURN_S = 0.1  # wall clock; how soon a signal is seen when nothing else happens
 LATCHED = QoSProfile(depth=1, reliability=ReliabilityPolicy.RELIABLE, durability=DurabilityPolicy.TRANSIENT_LOCAL)
@@ -54,6 +55,7 @@ class MissionNode(Node):  # type: ignore[misc]  # rclpy is not typed
 
     def __init__(self, out: Path, plan: MissionPlan) -> None:
         super().__init__("mission")
+        self._simulated_time = SimulatedTime(self)
         self._plan = plan
         values = {name: self._parameter(name, value) for name, value in plan.parameters.items()}
         self._record = MissionRecord(out, plan, self._clock_ns, values)
@@ -109,6 +111,11 @@ class MissionNode(Node):  # type: ignore[misc]  # rclpy is not typed
         self.driver.finish(end)
         for problem in self._record.problems:
             self.get_logger().error(problem)
+
+    def destroy_node(self) -> None:
+        """Take no more ticks of a simulated clock, and destroy the node."""
+        self._simulated_time.close()
+        super().destroy_node()
 
     def _hear(self, skillset: str, event: Event) -> None:
         """Take an event under the mission's name of its skillset; robots of a fleet have other clocks, so their events are of now."""
