@@ -51,8 +51,6 @@ NODES = "/nodes"
 
 PICTURE = "/picture"
 """A small picture of a camera: ``{camera, jpeg}``, base64; what each shows, the robot's ``page`` says."""
-PICTURES_FILE = "pictures.jsonl"
-"""Where a run writes them, a line each, with ``stamp_s``."""
 
 RECORDINGS_FILE = "page.jsonl"
 """Where a report leaves, an entry a line, what it told of the run's other recordings: with these the live page is the report's equal."""

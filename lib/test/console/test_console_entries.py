@@ -31,10 +31,10 @@ from hypothesis.extra import numpy as stn
 
 from alula.common.record import DATA, EVENTS, FILE, MISSION, OPERATOR, REPORTS, TICKS, TREE, Entry
 from alula.common.robots import RobotError, load_robot_folder
-from alula.common.run_log import note_act
+from alula.common.run_log import PICTURES_FILE, note_act
 from alula.console.areas import areas_of
 from alula.console.clouds import MAX_POINTS, CloudError, packed, read_points, thinned
-from alula.console.entries import AREAS, CAUSES, MAP, NODES, PICTURE, PICTURES_FILE, ROUTE, RUN, Converter
+from alula.console.entries import AREAS, CAUSES, MAP, NODES, PICTURE, ROUTE, RUN, Converter
 from alula.console.feed import CHUNK_BYTES, Feed, Place, place_of
 from alula.console.following import RunFollower
 from alula.console.page import MAX_PICTURES, PARTS, REPORT, make_page, write_report
