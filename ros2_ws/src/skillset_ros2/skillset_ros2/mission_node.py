@@ -37,7 +37,7 @@ from alula.runtime.codecs import event_of
 from alula.trees.groot.address import ServerError
 from alula.trees.view import NodeView
 from skillset_ros2 import NodeExecutor, SkillsetClient
-from skillset_ros2.base import QUIET
+from skillset_ros2.base import QUIET, QUIET_PUBLISHER
 from skillset_ros2.fleet_clock import FleetClock
 from skillset_ros2.simulated_time import SimulatedTime
 
@@ -54,7 +54,8 @@ class MissionNode(Node):  # type: ignore[misc]  # rclpy is not typed
     """`/mission`: ticks the tree at 10 Hz of the mission clock and after every event, and keeps the run's record."""
 
     def __init__(self, out: Path, plan: MissionPlan) -> None:
-        super().__init__("mission")
+        # Its parameters are what it was started with; their services are entities that each turn of the executor gathers.
+        super().__init__("mission", start_parameter_services=False)
         self._simulated_time = SimulatedTime(self)
         self._plan = plan
         values = {name: self._parameter(name, value) for name, value in plan.parameters.items()}
@@ -76,7 +77,7 @@ class MissionNode(Node):  # type: ignore[misc]  # rclpy is not typed
         self._beat_s = -math.inf  # wall clock
         robots = sorted(filter(None, self._robots))
         self._fleet_clock = FleetClock(self, robots) if robots and self.get_parameter("use_sim_time").value else None
-        self._tree = self.create_publisher(String, "mission/tree", LATCHED)
+        self._tree = self.create_publisher(String, "mission/tree", LATCHED, event_callbacks=QUIET_PUBLISHER)
         for name in plan.skillsets:
             space, skillset = plan.place(name)
             topic = f"{space}/{skillset}/events" if space else f"{skillset}/events"
@@ -136,7 +137,7 @@ class MissionNode(Node):  # type: ignore[misc]  # rclpy is not typed
             if self._paces and robot not in self._heartbeats and all(client.ready for client in clients):
                 # Latched: time waits for the first heartbeats, which may be sent before a bridge has connected.
                 topic = f"{robot}/mission/heartbeat" if robot else "mission/heartbeat"
-                self._heartbeats[robot] = self.create_publisher(Header, topic, LATCHED)
+                self._heartbeats[robot] = self.create_publisher(Header, topic, LATCHED, event_callbacks=QUIET_PUBLISHER)
                 self.driver.wake()  # the first one at once: the clock may stand still until it comes
 
     def _beat(self) -> None:

@@ -19,6 +19,8 @@ from skillset_ros2.names import action_type
 from skillset_ros2.simulated_time import SimulatedTime
 
 HooksFactory = Callable[[Node], Mapping[str, SkillHooks]]
+WITHOUT_PARAMETER_SERVICES = {"start_parameter_services": False}
+"""The parameters are what a node was started with; their six services are entities that each turn of the executor gathers."""
 
 
 class SkillsetNode(Node):  # type: ignore[misc]  # rclpy has no types
@@ -49,7 +51,7 @@ class SkillsetNode(Node):  # type: ignore[misc]  # rclpy has no types
         on_rival: Callable[[str], None] | None = None,
         **node_options: Any,
     ) -> None:
-        super().__init__(skillset.name, **node_options)
+        super().__init__(skillset.name, **WITHOUT_PARAMETER_SERVICES | node_options)
         self._simulated_time = SimulatedTime(self)
         self.skillset = skillset
         self.served_skills = tuple(skill.name for skill in skillset.skills)
@@ -94,7 +96,7 @@ class HooksNode(Node):  # type: ignore[misc]
     """The hooks of one skill in a process of their own, node ``<skillset>_<skill>``; the engine is at ``address``."""
 
     def __init__(self, skillset: Skillset, skill: str, hooks: HooksFactory, address: str, **node_options: Any) -> None:
-        super().__init__(f"{skillset.name}_{skill}", **node_options)
+        super().__init__(f"{skillset.name}_{skill}", **WITHOUT_PARAMETER_SERVICES | node_options)
         self._simulated_time = SimulatedTime(self)
         self.served_skills = (skill,)
         self._server = HookServer(skillset.name, skill, hooks(self)[skill], address, self.get_logger().error)

@@ -10,7 +10,6 @@ import threading
 from typing import Any
 
 from rclpy.callback_groups import MutuallyExclusiveCallbackGroup
-from rclpy.event_handler import SubscriptionEventCallbacks
 from rclpy.guard_condition import GuardCondition
 from rclpy.impl.implementation_singleton import rclpy_implementation
 from rclpy.node import Node
@@ -20,10 +19,10 @@ from rclpy.waitable import NumberOfEntities, Waitable
 from rosgraph_msgs.msg import Clock
 
 from alula.runtime.codecs import stamp_ns_of
+from skillset_ros2.base import QUIET
 
 NEVER_NS = 1 << 63
 NEWEST = QoSProfile(depth=1, reliability=ReliabilityPolicy.BEST_EFFORT)
-QUIET = SubscriptionEventCallbacks(use_default_callbacks=False)
 
 
 class _Elsewhere(MutuallyExclusiveCallbackGroup):  # type: ignore[misc]  # rclpy has no types
