@@ -9,6 +9,7 @@ import base64
 import json
 import logging
 import threading
+import time
 from collections.abc import Mapping
 from pathlib import Path
 from queue import Queue
@@ -18,7 +19,7 @@ import cv2
 import numpy as np
 from numpy.typing import NDArray
 
-from alula.console.entries import PICTURES_FILE
+from alula.common.run_log import PICTURES_FILE
 
 WIDTH_PX = 256
 QUALITY = 55
@@ -27,6 +28,7 @@ DEPTH_M = 20.0
 PERIOD_S = 1.0
 STEADY_S = 300.0
 """Later than so long after its first picture, a camera's pictures become rarer in proportion: hours fit into some megabytes."""
+LOOK_S = 0.2  # wall clock
 COLOURS = {"rgb8": cv2.COLOR_RGB2BGR, "bgr8": None, "mono8": cv2.COLOR_GRAY2BGR}
 
 log = logging.getLogger("alula.thumbnails")
@@ -86,6 +88,14 @@ def next_image(topic: str) -> Any:
         subscriber.unregister()
 
 
+def wait_until(due_s: float) -> None:
+    """Wait for a moment of the mission clock, at most ``LOOK_S`` longer; ``rospy.sleep`` would wake at each of its ticks."""
+    import rospy
+
+    while rospy.get_time() < due_s and not rospy.is_shutdown():
+        time.sleep(LOOK_S)
+
+
 class Thumbnails:
     """Writes ``pictures.jsonl`` into a run's folder: ``{stamp_s, camera, jpeg}``, mission clock and base64. Needs an initialised rospy."""
 
@@ -108,7 +118,7 @@ class Thumbnails:
                 stamp_s = message.header.stamp.to_sec()
                 first_s = stamp_s if first_s is None else first_s
                 self.add(camera, stamp_s, message)
-                rospy.sleep(period_s(stamp_s - first_s))
+                wait_until(stamp_s + period_s(stamp_s - first_s))
             except (ValueError, OSError) as error:
                 log.warning("no more pictures of %s: %s", camera, error)
                 return

@@ -17,6 +17,8 @@ from alula.common.faults import FaultChange
 from alula.common.record import Entry
 
 FILE = "run_log.jsonl"
+PICTURES_FILE = "pictures.jsonl"
+"""Beside it: small pictures of what the robot's cameras see, a line each, ``{stamp_s, camera, jpeg}``."""
 DEATH, AGAIN, FAULT, WAIT, ACT, END, MOCKED, MISSION = "death", "again", "fault", "wait", "act", "end", "mocked", "mission"
 """The kinds of lines: see ``alula.report.deaths``, ``alula.common.faults.FaultChange``, ``read_waits``, ``note_act``,
 ``alula.report.ends``, ``note_mocked`` and ``account``."""

@@ -51,8 +51,6 @@ NODES = "/nodes"
 
 PICTURE = "/picture"
 """A small picture of a camera: ``{camera, jpeg}``, base64; what each shows, the robot's ``page`` says."""
-PICTURES_FILE = "pictures.jsonl"
-"""Where a run writes them, a line each, with ``stamp_s``."""
 
 OF_RECORDINGS = frozenset({PATH, WORLD, FAULT, HEALTH})
 """Topics of what a report tells of the run's other recordings than the record."""

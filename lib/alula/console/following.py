@@ -14,7 +14,7 @@ from alula.console.areas import areas_of
 from alula.console.causes import Causes
 from alula.console.clouds import CloudError, packed, read_points
 from alula.console.embedded import REPORT, read_report
-from alula.console.entries import AREAS, CAUSES, MAP, OF_RECORDINGS, PICTURE, PICTURES_FILE, RUN, SUMMARY, Converter, Wire
+from alula.console.entries import AREAS, CAUSES, MAP, OF_RECORDINGS, PICTURE, RUN, SUMMARY, Converter, Wire
 from alula.console.lines import LinesFollower
 
 OF_THE_MACHINE = ("out_dir", "run_id")
@@ -35,7 +35,10 @@ class RunFollower:
         self._converter = Converter()
         self._causes = Causes()
         self._record = RecordFollower(folder / FILE)
-        self._lines = [LinesFollower(folder / run_log.FILE, OPERATOR, kind=run_log.ACT), LinesFollower(folder / PICTURES_FILE, PICTURE)]
+        self._lines = [
+            LinesFollower(folder / run_log.FILE, OPERATOR, kind=run_log.ACT),
+            LinesFollower(folder / run_log.PICTURES_FILE, PICTURE),
+        ]
         self._files: list[tuple[Path, str, Callable[[Path], Any]]] = [
             (folder / "run.json", RUN, self._run),
             (folder / "run.json", AREAS, lambda path: areas_of(str(_json(path).get("world") or ""))),

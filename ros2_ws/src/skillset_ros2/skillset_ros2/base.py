@@ -11,7 +11,7 @@ from typing import Any, TypeVar
 
 from rclpy.callback_groups import MutuallyExclusiveCallbackGroup
 from rclpy.clock import Clock, ClockType
-from rclpy.event_handler import SubscriptionEventCallbacks
+from rclpy.event_handler import PublisherEventCallbacks, SubscriptionEventCallbacks
 from rclpy.node import Node
 from rclpy.qos import QoSProfile
 
@@ -32,6 +32,7 @@ AT_ONCE = 100
 QUIET = SubscriptionEventCallbacks(use_default_callbacks=False)
 """For the skillset's own topics, whose both ends are made here: each of rclpy's warnings about the other end's QoS and type is one more
 entity that the executor gathers at each of its turns, and more than half of them all. A node made elsewhere gets its own warning."""
+QUIET_PUBLISHER = PublisherEventCallbacks(use_default_callbacks=False)
 CallbackT = TypeVar("CallbackT", bound=Callable[..., Any])
 ID_DIGITS = 12
 """So many hexadecimal digits of a goal's UUID are its execution's id."""

@@ -11,7 +11,7 @@ from typing import Any
 import skillset_interfaces.msg
 import skillset_interfaces.srv
 from rclpy.duration import Duration
-from rclpy.event_handler import PublisherEventCallbacks, SubscriptionEventCallbacks
+from rclpy.event_handler import SubscriptionEventCallbacks
 from rclpy.node import Node
 from rclpy.qos import QoSProfile
 from std_msgs.msg import Header
@@ -20,7 +20,7 @@ from alula.runtime.codecs import Codecs, ServiceCodec, set_stamp, stamp_ns_of
 from alula.runtime.middleware import CALL_S, Goal, GoalListener, OnError, OnHeartbeat, OnReply, OnValue, Serve, Topic
 from alula.runtime.timers import Job
 from skillset_ros2.actions import RclpyLink, RclpyServer
-from skillset_ros2.base import RclpyBase
+from skillset_ros2.base import QUIET_PUBLISHER, RclpyBase
 from skillset_ros2.calls import Calls, Discovery
 from skillset_ros2.convert import message_class
 from skillset_ros2.names import ALIVE, SERVICE, SOURCE, action_type, in_namespace, latched
@@ -47,8 +47,7 @@ class RclpyMiddleware(RclpyBase):
     def advertise(self, topic: Topic) -> RclpyPublisher:
         """Open a topic for publishing."""
         codec = self._codecs.topic(topic)
-        quiet = PublisherEventCallbacks(use_default_callbacks=False)
-        made = self.node.create_publisher(codec.kind, self.name(topic.name), latched(topic.depth), event_callbacks=quiet)
+        made = self.node.create_publisher(codec.kind, self.name(topic.name), latched(topic.depth), event_callbacks=QUIET_PUBLISHER)
         return RclpyPublisher(made, functools.partial(codec.encode, self._skillset))
 
     def subscribe(self, topic: Topic, callback: OnValue) -> Callable[[], bool]:
@@ -165,7 +164,7 @@ class RclpyMiddleware(RclpyBase):
                 self.log(f"other managers of {self._skillset} were started later; they will end")
 
         self.listen(self.name("alive"), Header, hear, latched(1))
-        publisher: Any = self.node.create_publisher(Header, self.name("alive"), ALIVE)
+        publisher: Any = self.node.create_publisher(Header, self.name("alive"), ALIVE, event_callbacks=QUIET_PUBLISHER)
         self._send_heartbeat = lambda: publisher.publish(heartbeat)
         self._send_heartbeat()
 

@@ -37,8 +37,9 @@ from alula.runtime.codecs import event_of
 from alula.trees.groot.address import ServerError
 from alula.trees.view import NodeView
 from skillset_ros2 import NodeExecutor, SkillsetClient
-from skillset_ros2.base import QUIET
+from skillset_ros2.base import QUIET, QUIET_PUBLISHER
 from skillset_ros2.fleet_clock import FleetClock
+from skillset_ros2.simulated_time import SimulatedTime
 
 TURN_S = 0.1  # wall clock; how soon a signal is seen when nothing else happens
 LATCHED = QoSProfile(depth=1, reliability=ReliabilityPolicy.RELIABLE, durability=DurabilityPolicy.TRANSIENT_LOCAL)
@@ -53,7 +54,9 @@ class MissionNode(Node):  # type: ignore[misc]  # rclpy is not typed
     """`/mission`: ticks the tree at 10 Hz of the mission clock and after every event, and keeps the run's record."""
 
     def __init__(self, out: Path, plan: MissionPlan) -> None:
-        super().__init__("mission")
+        # Its parameters are what it was started with; their services are entities that each turn of the executor gathers.
+        super().__init__("mission", start_parameter_services=False)
+        self._simulated_time = SimulatedTime(self)
         self._plan = plan
         values = {name: self._parameter(name, value) for name, value in plan.parameters.items()}
         self._record = MissionRecord(out, plan, self._clock_ns, values)
@@ -74,7 +77,7 @@ class MissionNode(Node):  # type: ignore[misc]  # rclpy is not typed
         self._beat_s = -math.inf  # wall clock
         robots = sorted(filter(None, self._robots))
         self._fleet_clock = FleetClock(self, robots) if robots and self.get_parameter("use_sim_time").value else None
-        self._tree = self.create_publisher(String, "mission/tree", LATCHED)
+        self._tree = self.create_publisher(String, "mission/tree", LATCHED, event_callbacks=QUIET_PUBLISHER)
         for name in plan.skillsets:
             space, skillset = plan.place(name)
             topic = f"{space}/{skillset}/events" if space else f"{skillset}/events"
@@ -110,6 +113,11 @@ class MissionNode(Node):  # type: ignore[misc]  # rclpy is not typed
         for problem in self._record.problems:
             self.get_logger().error(problem)
 
+    def destroy_node(self) -> None:
+        """Take no more ticks of a simulated clock, and destroy the node."""
+        self._simulated_time.close()
+        super().destroy_node()
+
     def _hear(self, skillset: str, event: Event) -> None:
         """Take an event under the mission's name of its skillset; robots of a fleet have other clocks, so their events are of now."""
         told = event_of(event)
@@ -129,7 +137,7 @@ class MissionNode(Node):  # type: ignore[misc]  # rclpy is not typed
             if self._paces and robot not in self._heartbeats and all(client.ready for client in clients):
                 # Latched: time waits for the first heartbeats, which may be sent before a bridge has connected.
                 topic = f"{robot}/mission/heartbeat" if robot else "mission/heartbeat"
-                self._heartbeats[robot] = self.create_publisher(Header, topic, LATCHED)
+                self._heartbeats[robot] = self.create_publisher(Header, topic, LATCHED, event_callbacks=QUIET_PUBLISHER)
                 self.driver.wake()  # the first one at once: the clock may stand still until it comes
 
     def _beat(self) -> None:

@@ -16,8 +16,11 @@ from alula.runtime.hooks import SkillHooks
 from alula.runtime.managers import HOOKS_RETURN_S, DataBindings, Managers, generated_bindings
 from skillset_ros2.middleware import RclpyMiddleware
 from skillset_ros2.names import action_type
+from skillset_ros2.simulated_time import SimulatedTime
 
 HooksFactory = Callable[[Node], Mapping[str, SkillHooks]]
+WITHOUT_PARAMETER_SERVICES = {"start_parameter_services": False}
+"""The parameters are what a node was started with; their six services are entities that each turn of the executor gathers."""
 
 
 class SkillsetNode(Node):  # type: ignore[misc]  # rclpy has no types
@@ -48,7 +51,8 @@ class SkillsetNode(Node):  # type: ignore[misc]  # rclpy has no types
         on_rival: Callable[[str], None] | None = None,
         **node_options: Any,
     ) -> None:
-        super().__init__(skillset.name, **node_options)
+        super().__init__(skillset.name, **WITHOUT_PARAMETER_SERVICES | node_options)
+        self._simulated_time = SimulatedTime(self)
         self.skillset = skillset
         self.served_skills = tuple(skill.name for skill in skillset.skills)
         for name in self.served_skills:
@@ -82,12 +86,18 @@ class SkillsetNode(Node):  # type: ignore[misc]  # rclpy has no types
         """Fail whatever runs for this reason, so that functions are stopped, and take no more requests."""
         self.managers.close(reason)
 
+    def destroy_node(self) -> None:
+        """Take no more ticks of a simulated clock, and destroy the node."""
+        self._simulated_time.close()
+        super().destroy_node()
+
 
 class HooksNode(Node):  # type: ignore[misc]
     """The hooks of one skill in a process of their own, node ``<skillset>_<skill>``; the engine is at ``address``."""
 
     def __init__(self, skillset: Skillset, skill: str, hooks: HooksFactory, address: str, **node_options: Any) -> None:
-        super().__init__(f"{skillset.name}_{skill}", **node_options)
+        super().__init__(f"{skillset.name}_{skill}", **WITHOUT_PARAMETER_SERVICES | node_options)
+        self._simulated_time = SimulatedTime(self)
         self.served_skills = (skill,)
         self._server = HookServer(skillset.name, skill, hooks(self)[skill], address, self.get_logger().error)
 
@@ -99,3 +109,8 @@ class HooksNode(Node):  # type: ignore[misc]
         """Fail whatever runs here for this reason, so that functions are stopped."""
         if not self._server.close(reason, HOOKS_RETURN_S):
             self.get_logger().error(f"a hook has not returned within {HOOKS_RETURN_S:g} s; it is left behind")
+
+    def destroy_node(self) -> None:
+        """Take no more ticks of a simulated clock, and destroy the node."""
+        self._simulated_time.close()
+        super().destroy_node()
