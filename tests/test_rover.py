@@ -176,3 +176,33 @@ def test_stock_clients_drive_it_by_its_navigation_and_by_its_skills(ready: Path,
     assert (by_navigation["state"], by_navigation["text"]) == (3, "arrived")  # actionlib's SUCCEEDED
     assert by_skills["heard"]
     assert by_navigation["heard"]
+
+
+STEP = re.compile(r"[Ii]n\s`([\w./]+)`, (before|in place of) `([^`]+)`:\n\n```\w+\n(.*?)```", re.DOTALL)
+"""In which file, how, where: the lines."""
+
+
+def test_the_page_that_adds_a_skill_works_as_it_stands(rover: Path, tmp_path: Path) -> None:
+    copy = tmp_path / "rover"
+    shutil.copytree(rover, copy, ignore=shutil.ignore_patterns(".alula", "runs"))
+    steps = STEP.findall((copy / "ADD_A_SKILL.md").read_text(encoding="utf-8"))
+    assert [Path(file).name for file, *_ in steps] == [
+        *("cargo.skill", "mock.yaml", "answers.xml", "bindings.yaml", "cargo.py", "node.py", "faults.yaml"),
+    ]
+    for file, how, marker, lines in steps:
+        path = copy / file
+        before, found, after = path.read_text(encoding="utf-8").partition(marker)
+        assert found, f"{file} has no {marker}"
+        path.write_text(before + lines + (after.lstrip("\n") if how == "in place of" else found + after), encoding="utf-8")
+        if path.suffix == ".py":
+            compile(path.read_text(encoding="utf-8"), path, "exec")
+    done = run(copy, "alula.commands.check", str(copy / "skillsets/cargo.skill"))
+    assert done.returncode == 0, done.stdout + done.stderr
+    (tmp_path / "mute.yaml").write_text("skills: {cargo.honk: {result: MUTE}}", encoding="utf-8")
+    for words, ends in (([], ["HONKED", "ARRIVED"]), (["--behaviour", str(tmp_path / "mute.yaml")], ["MUTE", "ANSWERED", "ARRIVED"])):
+        out = tmp_path / f"run{len(words)}"
+        done = run(copy, "alula.commands.run", "deliver", "--mock", "--fail", "laser@30", *words, "--out", str(out))
+        assert done.returncode == 0, done.stdout + done.stderr
+        skills = [(one["skill"], one["result"]) for one in json.loads((out / "summary.json").read_text(encoding="utf-8"))["skills"]]
+        at = next(at for at, (skill, _) in enumerate(skills) if skill == "honk")
+        assert [result for _, result in skills[at : at + len(ends)]] == ends
