@@ -62,6 +62,8 @@ class SimulatedTime(Waitable):  # type: ignore[misc]
         node.add_waitable(self)
         self._thread = threading.Thread(target=self._follow, name=f"{node.get_name()}_clock", daemon=True)
         self._thread.start()
+        # Of a node that is given up while it is made, nobody ends it.
+        node.context.on_shutdown(self.close)
 
     def close(self) -> None:
         """Take no more ticks; a second call does nothing."""

@@ -160,3 +160,12 @@ def test_a_node_with_the_wall_clock_is_left_as_it_is(ros2_domain):
     assert len(list(node.waitables)) == waitables
     time.close()
     node.destroy_node()
+
+
+def test_the_thread_ends_with_the_context_of_a_node_that_was_given_up(ros2_domain):
+    context = rclpy.Context()
+    rclpy.init(context=context, domain_id=ros2_domain)
+    SimulatedTime(Node("given_up", context=context, parameter_overrides=[Parameter("use_sim_time", value=True)]))
+    assert "given_up_clock" in {thread.name for thread in threading.enumerate()}
+    context.try_shutdown()
+    assert "given_up_clock" not in {thread.name for thread in threading.enumerate()}
