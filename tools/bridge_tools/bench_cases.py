@@ -33,7 +33,10 @@ class Way(Enum):
 
 @dataclass(frozen=True)
 class TopicCase:
-    """Messages of one kind at a rate, on one or several topics. ``small_segments``: the ROS 2 ends keep Fast DDS's defaults."""
+    """Messages of one kind at a rate, on one or several topics.
+
+    ``small_segments``: the ROS 2 ends keep Fast DDS's defaults; ``queue`` is their depth.
+    """
 
     name: str
     kind: str
@@ -43,6 +46,7 @@ class TopicCase:
     way: Way
     topics: int = 1
     small_segments: bool = True
+    queue: int = 10
 
     @property
     def number(self) -> int:
@@ -68,6 +72,7 @@ def all_cases(seconds: float) -> list[Case]:
     ways = tuple(Way)
     bridged = (Way.UP, Way.DOWN)
     cases: list[Case] = [TopicCase("string", "string", STRING_BYTES, 1000.0, seconds, way) for way in ways]
+    cases += [TopicCase("string, deep queue", "string", STRING_BYTES, 1000.0, seconds, way, queue=10_000) for way in bridged]
     for small, name in ((True, "image"), (False, "image, large segments")):
         cases += [
             TopicCase(name, "image", IMAGE_BYTES, 15.0, seconds, way, small_segments=small) for way in ways if small or way is not Way.ROS1

@@ -158,7 +158,7 @@ class Bench:
     def _topics(self, case: TopicCase, names: list[str], stack: contextlib.ExitStack) -> dict[str, float]:
         from_world, to_world = case.way.worlds
         order = {"kind": case.kind, "topics": names, "size_bytes": case.size_bytes, "rate_hz": case.rate_hz}
-        order |= {"number": case.number, "seconds": case.seconds}
+        order |= {"number": case.number, "seconds": case.seconds, "queue": case.queue}
         receiver = stack.enter_context(self.end(to_world, order | {"do": "receive"}, small_segments=case.small_segments))
         receiver.expect("ready")
         sender = stack.enter_context(self.end(from_world, order | {"do": "send"}, small_segments=case.small_segments))
@@ -186,7 +186,7 @@ class Bench:
         """Measure from the bridge's start to the first message that is received, and what the bridge takes while nothing crosses."""
         names = self.fresh(1)
         case = TopicCase("start", "string", 64, 1.0, 1.0, Way.UP)
-        order = {"kind": "string", "topics": names, "size_bytes": 64, "rate_hz": 1.0, "number": 1, "seconds": 1.0}
+        order = {"kind": "string", "topics": names, "size_bytes": 64, "rate_hz": 1.0, "number": 1, "seconds": 1.0, "queue": case.queue}
         with contextlib.ExitStack() as stack:
             receiver = stack.enter_context(self.end(2, order | {"do": "receive"}))
             receiver.expect("ready")

@@ -1,4 +1,4 @@
-"""The ROS 2 end of the benchmark: a plain rclpy node with its default quality of service. See ``bench_ends/protocol.py``."""
+"""The ROS 2 end of the benchmark: a plain rclpy node, reliable and with a queue as ordered. See ``bench_ends/protocol.py``."""
 
 from __future__ import annotations
 
@@ -18,7 +18,6 @@ from std_srvs.srv import SetBool
 
 from bridge_tools.bench_ends import protocol
 
-DEPTH = 10
 READY_S = 60.0
 
 
@@ -53,7 +52,7 @@ TYPES = {"string": String, "image": Image, "cloud": PointCloud2}
 
 def send(order: protocol.Order, node: Node) -> None:
     """Publish messages of the ordered kind and size, at the ordered rate."""
-    publishers = [node.create_publisher(TYPES[order["kind"]], topic, DEPTH) for topic in order["topics"]]
+    publishers = [node.create_publisher(TYPES[order["kind"]], topic, order["queue"]) for topic in order["topics"]]
     message = message_of(order["kind"], order["size_bytes"])
     protocol.send(order, [publisher.publish for publisher in publishers], message, stamp)
 
@@ -66,7 +65,7 @@ def receive(order: protocol.Order, node: Node) -> None:
         return lambda message: meter.take(topic, stamp_of(message))
 
     for topic in order["topics"]:
-        node.create_subscription(TYPES[order["kind"]], topic, taker(topic), DEPTH)
+        node.create_subscription(TYPES[order["kind"]], topic, taker(topic), order["queue"])
     _spin(node)
     protocol.receive(meter)
 
