@@ -23,7 +23,8 @@ from alula.missions.filed.part import NO_PART
 from alula.missions.filed.world import World
 from alula.missions.pending import PendingInterrupts
 from alula.model.model import Skillset
-from alula.prove.mission.measured import Conditions, Kind, Measurements, agree, told
+from alula.prove.mission.fitting import agree, told
+from alula.prove.mission.measured import Conditions, Kind, Measurements
 from alula.prove.mission.oracle import Answer, Asked, Oracle
 from alula.prove.mission.play import play
 from alula.prove.mission.prover import Proved, prove_mission

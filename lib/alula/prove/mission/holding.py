@@ -19,7 +19,7 @@ from alula.model.model import Property, PropertyKind
 from alula.prove.limits import Deadline, OutOfTimeError
 from alula.prove.mission.calm import calm_of, reaching
 from alula.prove.mission.conditions import Faults, faults_shown, true_in
-from alula.prove.mission.measured import Values, agree, all_values
+from alula.prove.mission.fitting import Values, agree, all_values
 from alula.prove.mission.regions import Regions
 from alula.prove.mission.run import MissionFinding, run_of
 from alula.prove.mission.state import Event, Kind, State

@@ -22,8 +22,9 @@ from alula.missions.record import MissionRecord
 from alula.missions.skillset import MissionClient
 from alula.model.execution_state import ExecutionState
 from alula.prove.mission.acting import Function, HeldMiddleware
-from alula.prove.mission.measured import COMPARE, of_data
-from alula.prove.mission.measured import told as values_told
+from alula.prove.mission.fitting import COMPARE
+from alula.prove.mission.fitting import told as values_told
+from alula.prove.mission.measured import of_data
 from alula.prove.mission.oracle import Answer, Asked, Oracle, Question
 from alula.prove.mission.playable import AS_WANTED, breaks, playable, refuses
 from alula.prove.mission.robot import Robot, opaque, progress_of

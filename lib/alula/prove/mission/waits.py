@@ -12,7 +12,7 @@ from itertools import product
 
 from alula.prove.limits import Deadline, OutOfTimeError
 from alula.prove.mission.calm import calm_of, reaching
-from alula.prove.mission.measured import Values, agree, all_values, answers
+from alula.prove.mission.fitting import Values, agree, all_values, answers
 from alula.prove.mission.regions import Regions
 from alula.prove.mission.state import Event, State
 from alula.prove.mission.words import choice
