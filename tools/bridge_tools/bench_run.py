@@ -20,6 +20,7 @@ from typing import Any, Self
 import psutil
 
 from alula.common.network import free_port
+from alula.common.processes import die_with_parent
 from bridge_tools.bench_cases import ROS1_TYPES, Case, ServiceCase, TopicCase, Way
 from ros_bridge.errors import BridgeError
 from ros_bridge.master import Connection, wait_for_master
@@ -43,7 +44,14 @@ class Process:
         self._command = " ".join(command)
         self.started_ns = time.monotonic_ns()
         self._process = subprocess.Popen(
-            command, env=dict(environment), text=True, stdin=subprocess.PIPE, stdout=stdout, stderr=stderr, start_new_session=True
+            command,
+            env=dict(environment),
+            text=True,
+            stdin=subprocess.PIPE,
+            stdout=stdout,
+            stderr=stderr,
+            start_new_session=True,
+            preexec_fn=die_with_parent,  # noqa: PLW1509  (one prctl, no allocation)
         )
         self._lines: queue.Queue[str | None] = queue.Queue()
         threading.Thread(target=self._read, args=(watch_errors,), daemon=True).start()

@@ -27,6 +27,7 @@ from typing import Any
 import psutil
 
 from alula.common.network import free_port
+from alula.common.processes import die_with_parent
 from bridge_tools import two_worlds
 from bridge_tools.fuzz import memory_mb
 
@@ -94,7 +95,7 @@ class Master:
         self._process = self._start()
 
     def _start(self) -> subprocess.Popen[bytes]:
-        process = subprocess.Popen(self._command, stdout=self._log, stderr=self._log)
+        process = subprocess.Popen(self._command, stdout=self._log, stderr=self._log, preexec_fn=die_with_parent)  # noqa: PLW1509
         end_s = time.monotonic() + START_WITHIN_S
         while time.monotonic() < end_s:
             with contextlib.suppress(OSError), socket.create_connection(("127.0.0.1", int(self._command[-1])), timeout=1.0):
@@ -132,7 +133,8 @@ def bridge_process(folder: Path) -> Iterator[subprocess.Popen[bytes]]:
     """Run a bridge; what it says is in ``bridge.log`` in the folder."""
     (folder / "soak.yaml").write_text(configuration(), encoding="utf-8")
     with (folder / "bridge.log").open("wb") as log:
-        process = subprocess.Popen([sys.executable, "-m", "ros_bridge", "--config", str(folder / "soak.yaml")], stderr=log)
+        command = [sys.executable, "-m", "ros_bridge", "--config", str(folder / "soak.yaml")]
+        process = subprocess.Popen(command, stderr=log, preexec_fn=die_with_parent)  # noqa: PLW1509
         try:
             end_s = time.monotonic() + START_WITHIN_S
             while "bridging" not in (folder / "bridge.log").read_text(encoding="utf-8"):

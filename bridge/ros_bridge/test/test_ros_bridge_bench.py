@@ -4,8 +4,10 @@ import json
 import subprocess
 import sys
 
+import psutil
 import pytest
 
+from alula_testing.waits import until
 from bridge_tools import bench, bench_run
 from bridge_tools.bench_cases import FLAT_OUT, OFFICIAL, ServiceCase, TopicCase, Way, all_cases
 from bridge_tools.bench_ends import protocol
@@ -17,6 +19,15 @@ def test_every_case_of_the_official_figures_is_measured():
     paced = next(case for case in all_cases(10.0) if (case.name, case.way) == ("string", Way.UP))
     assert (paced.number, paced.rate_hz, paced.size_bytes) == (10_000, 1000.0, 64)
     assert next(case for case in all_cases(10.0) if isinstance(case, ServiceCase)).calls == 500
+
+
+def test_nothing_of_a_bench_that_was_killed_runs_on():
+    program = "from bridge_tools.bench_run import Process; print(Process(['sleep', '1000'], {}).pid, flush=True); input()"
+    with subprocess.Popen([sys.executable, "-c", program], stdin=subprocess.PIPE, stdout=subprocess.PIPE, text=True) as bench_itself:
+        pid = int(bench_itself.stdout.readline())
+        assert psutil.pid_exists(pid)
+        bench_itself.kill()
+    until(lambda: not psutil.pid_exists(pid), "the process of a bench that was killed has ended")
 
 
 def test_percentiles_are_of_the_sorted_durations():
