@@ -32,7 +32,6 @@ class Failures:
         deaths: managers' processes may end, and come back.
         aborts: someone may abort the mission.
         pauses: someone may pause the mission; what does not go on afterwards is interrupted, which the tree has not asked for.
-        most: how many failures happen in one run, of all kinds; None: any number.
     """
 
     refusals: bool = True
@@ -40,7 +39,6 @@ class Failures:
     deaths: bool = False
     aborts: bool = True
     pauses: bool = False
-    most: int | None = None
 
 
 def searched(skillset: Skillset, deadline: Deadline) -> Abstraction:

@@ -67,11 +67,10 @@ class Managers(NamedTuple):
 
 
 class State(NamedTuple):
-    """A situation, by numbers that ``System`` has the meaning of; ``spent`` is how many failures have happened, where they are counted."""
+    """A situation, by numbers that ``System`` has the meaning of."""
 
     memory: int
     managers: tuple[int, ...]
-    spent: int = 0
 
 
 class Ending(NamedTuple):

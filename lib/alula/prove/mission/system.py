@@ -136,14 +136,11 @@ class System:
             for event, after in self.moves_of(place, number):
                 if self.leaves_out(event, state.memory):
                     continue
-                spent = state.spent + (event.failure and self.failures.most is not None)
-                if self.failures.most is None or spent <= self.failures.most:
-                    managers = (*state.managers[:place], after, *state.managers[place + 1 :])
-                    yield event, State(state.memory, managers, spent)
+                yield event, State(state.memory, (*state.managers[:place], after, *state.managers[place + 1 :]))
 
     def _ticks(self, state: State, act: str, kind: Kind) -> Iterator[tuple[Event, State]]:
         for ticked in self.ticker.outcomes(state.memory, lambda question: self._observed(state, question), act):
-            after = State(ticked.memory, self._commanded(state, ticked), state.spent)
+            after = State(ticked.memory, self._commanded(state, ticked))
             if after != state:
                 started, interrupted, choices, touched = ticked[1:]
                 yield Event(kind, started=started, interrupted=interrupted, choices=choices, touched=touched), after
@@ -151,7 +148,7 @@ class System:
     def stays(self, state: State) -> Event | None:
         """Return a tick after which all is as before, None where each changes something."""
         for ticked in self.ticker.outcomes(state.memory, lambda question: self._observed(state, question)):
-            if State(ticked.memory, self._commanded(state, ticked), state.spent) == state:
+            if State(ticked.memory, self._commanded(state, ticked)) == state:
                 return Event(Kind.TICK, started=ticked.started, choices=ticked.choices, touched=ticked.touched)
         return None
 
