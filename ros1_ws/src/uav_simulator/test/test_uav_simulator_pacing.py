@@ -214,3 +214,16 @@ def test_a_taken_port_is_named(kind):
             kind(Link().endpoint, first.port)
     finally:
         first.close()
+
+
+def test_time_waits_for_a_node_that_knows_an_old_time_though_it_is_done_with_its_measurements():
+    pacer = Pacer(["/node/done=zed", "/node/health=0.15"], limit_s=0.3, timeout_s=15.0)
+    pacer.begin(1.0)
+    pacer.heard("/node/health", 1.1)
+    for stamp_s in (1.1, 1.2):
+        pacer.measured("zed", stamp_s, stamp_s)
+        pacer.heard("/node/done", stamp_s)
+    assert pacer.may_advance(1.24, 0.0)
+    assert not pacer.may_advance(1.26, 0.0)
+    pacer.heard("/node/health", 1.2)
+    assert pacer.may_advance(1.26, 0.0)

@@ -4,6 +4,10 @@ A topic is held against the simulated clock, or, written ``TOPIC=SENSOR``, again
 node that works on images has done its share when the last image is dealt with, and need not say anything while there are none. It has
 nearly the sensor's period for that, as on a machine that is fast enough: so its verdicts come as regularly as the measurements.
 ``TOPIC=0.06`` sets the seconds by which a topic may lag behind the clock; ``TOPIC=inf`` is waited for at the beginning only.
+
+A node that is done with its measurements may know an old time all the same: the clock comes over another connection than the images, and
+on a busy machine later. It would take measurements of now for such of the future, and miss them when its clock catches up. So its
+health, which has its own time, is waited for, too.
 """
 
 from __future__ import annotations
