@@ -18,11 +18,10 @@ from tf2_msgs.msg import TFMessage
 from rover_navigation.geometry import Points, Pose, compose, inverse, wrapped
 from rover_navigation.grid_map import GridMap
 from rover_navigation.health import LaserMonitor
-from rover_navigation.matching import Match, match, search
+from rover_navigation.matching import locate, match
 from rover_navigation.ros import points_of_scan, pose_message, pose_of, transform
 
 BELIEVED = 0.5  # a match of a smaller quality corrects nothing
-FOUND = 0.75  # a search that finds less has found nothing
 TURN_RAD_S = 0.8
 EVERY_RAD = math.radians(40.0)  # a scan is kept for the search
 REMEMBERED = 100  # odometries, for scans that arrive after the one of their moment
@@ -85,10 +84,10 @@ class Localization:
         else:
             assert self._search_ends is not None
             ends, self._search_ends = self._search_ends, None
-            found = search(self._grid, self._kept) if self._kept else Match(self._pose, 0.0)
-            if found.quality >= FOUND:
-                self._T_map_odom = compose(found.pose, inverse(self._kept[-1][0]))
-            ends(found.quality >= FOUND, f"{100.0 * found.quality:.0f} % of the beams match")
+            found, text = locate(self._grid, self._kept)
+            if found is not None:
+                self._T_map_odom = compose(found, inverse(self._kept[-1][0]))
+            ends(found is not None, text)
         self._host.publish(COMMAND.topic, command)
 
     # --- measurements -------------------------------------------------------------------------------------------------
