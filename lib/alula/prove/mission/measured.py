@@ -18,7 +18,7 @@ from typing import Self
 from alula.model.model import Skillset
 from alula.prove.mission.oracle import Asked, Oracle, UndecidedError
 from alula.prove.mission.reading import scripts_of
-from alula.prove.mission.unknown import UnknownNumber, UnknownText
+from alula.prove.mission.unknown import Distance, UnknownNumber, UnknownText
 from alula.trees.document import Element
 from alula.trees.reading import TreeFiles
 from alula.trees.script import ScriptError, parse
@@ -241,24 +241,10 @@ class MeasuredNumber(UnknownNumber):
 
     __hash__ = float.__hash__
 
-    def __sub__(self, other: object) -> _Away:  # type: ignore[override]  # scripts compare so; what computes is refused before
-        return _Away(self, other)
+    def __sub__(self, other: object) -> Distance:  # type: ignore[override]  # scripts compare so; what computes is refused before
+        return Distance(lambda: self == other)
 
     __rsub__ = __sub__  # type: ignore[assignment]
-
-
-@dataclass(frozen=True, eq=False)
-class _Away:
-    """How far a measured number is from another."""
-
-    number: MeasuredNumber
-    other: object
-
-    def __abs__(self) -> _Away:
-        return self
-
-    def __le__(self, _near: float) -> bool:
-        return self.number == self.other
 
 
 class MeasuredText(UnknownText):

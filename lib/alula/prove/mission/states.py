@@ -16,6 +16,7 @@ from alula.missions.filed.world import states_of
 from alula.model.model import Skillset
 from alula.prove.mission.oracle import Oracle
 from alula.prove.mission.reading import SCRIPT_PORTS, scripts_of
+from alula.prove.mission.unknown import Distance
 from alula.trees.reading import POSTCONDITIONS, PRECONDITIONS, TreeFiles, type_name
 from alula.trees.script import ScriptError, parse
 from alula.trees.script.syntax import Call, Comparison, Name, Node, children, walk
@@ -87,22 +88,8 @@ class SeenState(float):
         made.oracle, made.compared, made.resource = oracle, compared, (skillset, name)
         return made
 
-    def __sub__(self, other: object) -> _Away:  # type: ignore[override]  # scripts compare so, and do nothing else with it
-        return _Away(self, other)
+    def __sub__(self, other: object) -> Distance:  # type: ignore[override]  # scripts compare so, and do nothing else with it
+        states = self.compared.states[other]  # type: ignore[index]  # a number of one
+        return Distance(lambda: bool(self.oracle.look((STATE, *self.resource, states))))
 
     __rsub__ = __sub__  # type: ignore[assignment]
-
-
-@dataclass(frozen=True, eq=False)
-class _Away:
-    """How far a state is from another."""
-
-    state: SeenState
-    other: object
-
-    def __abs__(self) -> _Away:
-        return self
-
-    def __le__(self, _near: float) -> bool:
-        one = self.state
-        return bool(one.oracle.look((STATE, *one.resource, one.compared.states[self.other])))  # type: ignore[index]  # a number of one

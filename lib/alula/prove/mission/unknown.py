@@ -7,7 +7,8 @@ with them as with numbers; what their bounds do not decide may be either way.
 from __future__ import annotations
 
 import math
-from collections.abc import Hashable
+from collections.abc import Callable, Hashable
+from dataclasses import dataclass
 from typing import Self
 
 from alula.prove.mission.oracle import Oracle, UndecidedError
@@ -15,6 +16,19 @@ from alula.trees.values import BOOL, NUMBERS, STRING, PortType
 
 LARGE = 2.0**53
 """Bounds of C's numbers are compared with, too; no unknown number is meant to be beyond."""
+
+
+@dataclass(frozen=True)
+class Distance:
+    """How far a number that is not known is from another: scripts only ask whether that is next to nothing, and this asks for it then."""
+
+    is_none: Callable[[], bool]
+
+    def __abs__(self) -> Distance:
+        return self
+
+    def __le__(self, _near: float) -> bool:
+        return self.is_none()
 
 
 class Unknown:

@@ -137,7 +137,7 @@ def _searched(grid: GridMap, here: Points) -> NDArray[np.float64]:
     for size_m, size_rad, every in LEVELS[1:]:
         poses = (poses[:, None, :] + halves * (size_m, size_m, size_rad)).reshape(-1, 3)
         poses = poses[np.argsort(_misses_m(grid, poses, here[::every], size_m))[:BRANCHES]]
-    return poses
+    return np.asarray(poses, dtype=np.float64)
 
 
 def _misses_m(grid: GridMap, poses: NDArray[np.float64], points: Points, size_m: float) -> NDArray[np.float64]:
