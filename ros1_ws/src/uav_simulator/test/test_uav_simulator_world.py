@@ -210,6 +210,22 @@ def test_contacts_are_counted_once_each_and_clearance_from_the_radius():
     assert monitor.min_clearance_m < 0.0
 
 
+def test_what_is_far_is_not_looked_for_at_each_moment_and_the_least_clearance_is_exact():
+    world = Scene(build_parts(CONFIG, 0))
+    monitor, looks, exact_m = ContactMonitor(world, 0.85), [], math.inf
+    nearest = world.nearest_obstacle
+    world.nearest_obstacle = lambda place: looks.append(place) or nearest(place)
+    way = along_route(CONFIG, 0.02)
+    for x, y, z in way.tolist():
+        monitor.step(body_at(x, y, z), LandedState.IN_AIR)
+        exact_m = min(exact_m, nearest((x, y, z)).distance_m - 0.85, z - 0.85)
+        assert monitor.min_clearance_m == exact_m
+    assert monitor.collisions == 0
+    assert len(looks) < len(way) / 4
+    monitor.step(body_at(4.9, -3.9, 3.0), LandedState.IN_AIR)
+    assert monitor.collisions == 1
+
+
 def test_landing_is_no_contact_and_flying_into_the_ground_is():
     monitor = ContactMonitor(Scene(build_parts(CONFIG, 0)), 0.85)
     monitor.step(body_at(0.0, 0.0, 3.0), LandedState.IN_AIR)

@@ -135,9 +135,10 @@ class Surface:
         self._trees = trees or [(0, _tree(self.points))]  # with the number of the first patch in each
 
     def joined(self, patches: Patches) -> Surface:
-        """Return this surface with more patches, in a tree of their own: building one tree of all patches takes long."""
-        more = (len(self.points), _tree(patches.points))
-        return Surface(join([Patches(self.points, self.normals), patches]), [*self._trees, more])
+        """Return this surface with more patches, in a second tree with those joined before: building one of all patches takes long."""
+        whole, grown = self._trees[0], join([Patches(self.points, self.normals), patches])
+        first = whole[1].n
+        return Surface(grown, [whole, (first, _tree(grown.points[first:]))])
 
     def nearest(self, points: Floats, *, within_m: float) -> tuple[NDArray[np.intp], NDArray[np.intp]]:
         """Return which of the points (N, 3) have a patch within reach, and the index of that patch."""

@@ -5,13 +5,15 @@ from __future__ import annotations
 import math
 
 from uav_simulator.autopilot.types import LandedState
-from uav_simulator.vehicle.rigid_body import RigidBody
+from uav_simulator.frames import Vec3
+from uav_simulator.vehicle.rigid_body import ZERO, RigidBody
 from uav_simulator.world.scene import Nearest, Scene
 
 CRUISE_HEIGHT_M = 2.0  # clearance counts once the take-off has ended or this height is reached
 HARD_M_S = 3.0  # down; ArduCopter lands with 0.5 m/s, a pilot's throttle at zero brings it down with 2.5 (PILOT_SPEED_UP)
 LEANING_RAD = math.radians(45.0)  # more than any slope that a multicopter lands on
 RELEASE_M = 0.05  # a contact ends at this distance, so that scraping along a wall is one contact
+ROUNDING_M = 1e-3  # of distances between points in float32
 
 
 class ContactMonitor:
@@ -31,6 +33,8 @@ class ContactMonitor:
         self._touching = False
         self._cruising = False
         self._sink_m_s = self._lean_rad = 0.0
+        self._looked_from: Vec3 | None = None  # with what was seen there
+        self._seen = Nearest(math.inf, ZERO)
 
     def step(self, body: RigidBody, state: LandedState) -> None:
         """Look at the present moment; call at 50 Hz."""
@@ -42,7 +46,7 @@ class ContactMonitor:
             self._cruising = True
         if state is LandedState.LANDING:
             self._cruising = False
-        obstacle = self._world.nearest_obstacle(body.position)
+        obstacle = self._nearest_obstacle(body.position)
         clearance = obstacle.distance_m - self._radius_m
         if clearance < 0.0 and not body.on_ground:
             body.bounce(_away(body, obstacle), -clearance)
@@ -52,6 +56,18 @@ class ContactMonitor:
             clearance = min(clearance, body.position[2] - self._radius_m)
             self.min_clearance_m = min(self.min_clearance_m, clearance)
         self._count(clearance)
+
+    def _nearest_obstacle(self, position: Vec3) -> Nearest:
+        """Return the nearest obstacle, or one that is no farther, where neither can be a contact or the least clearance.
+
+        Nothing comes nearer than by what the vehicle has moved since the last look, which is mostly less than there is room for.
+        """
+        if self._looked_from is not None:
+            least_m = self._seen.distance_m - math.dist(position, self._looked_from) - ROUNDING_M
+            if least_m - self._radius_m > max(RELEASE_M, min(self.min_clearance_m, position[2] - self._radius_m)):
+                return Nearest(least_m, self._seen.point)
+        self._looked_from, self._seen = position, self._world.nearest_obstacle(position)
+        return self._seen
 
     def _meet_the_ground(self, body: RigidBody) -> None:
         """Count a fall; an autopilot that restarts in the air says at once that it stands."""

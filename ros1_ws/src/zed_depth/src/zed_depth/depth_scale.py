@@ -16,13 +16,13 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from perception_core import FINE, NS, FaultKind, Finding, broken
-from zed_depth.feature_motion import LEAST_FEATURES, motion_of, predicted, relative, tracked, turned_far
+from zed_depth.feature_motion import LEAST_FEATURES, motion_of, predicted, turned_far
 
 if TYPE_CHECKING:
     from numpy.typing import NDArray
 
     from zed_depth.calibration import StereoGeometry
-    from zed_depth.feature_motion import KnownView, Landmarks
+    from zed_depth.feature_motion import Compared, Landmarks
 
     Floats = NDArray[np.float64]
 
@@ -60,13 +60,12 @@ class ScaleJudge:
         self.finding: Finding = FINE
         """What was found last: a wrong scale stays wrong while the vehicle stands, until motion shows otherwise."""
 
-    def compare(self, earlier: KnownView, later: KnownView, geometry: StereoGeometry) -> None:
+    def compare(self, views: Compared, geometry: StereoGeometry) -> None:
         """Take two views of a vehicle that moved in between."""
-        T_later_earlier = relative(earlier, later)  # noqa: N806 -- T_target_source
-        seen, places = tracked(earlier.landmarks, later.landmarks.image, T_later_earlier, geometry, LEAST_DISPARITY_PX)
-        estimate = scale_of(seen, places, T_later_earlier, geometry)
+        near = views.seen.disparity_px - geometry.offset_px >= LEAST_DISPARITY_PX
+        estimate = scale_of(views.seen.only(near), views.places[near], views.T_later_earlier, geometry)
         if estimate is not None and estimate.sigma <= self._limits.max_sigma:
-            self.judge(later.stamp_ns, estimate.scale)
+            self.judge(views.stamp_ns, estimate.scale)
 
     def judge(self, stamp_ns: int, scale: float) -> None:
         """Take an estimate of the scale."""

@@ -95,12 +95,6 @@ class Views:
         return None if earlier is None else (earlier, view)
 
 
-def relative(earlier: KnownView, later: KnownView) -> Floats:
-    """Return T_later_earlier, (4, 4), by the poses of two views."""
-    T_later_earlier: Floats = np.linalg.inv(later.T_map_camera) @ earlier.T_map_camera  # noqa: N806 -- T_target_source
-    return T_later_earlier
-
-
 def turned_far(T_later_earlier: Floats) -> bool:  # noqa: N803 -- T_target_source
     """Return whether the camera turned too far between two views for them to be compared."""
     cosine = float(np.clip((np.trace(T_later_earlier[:3, :3]) - 1.0) / 2.0, -1.0, 1.0))
@@ -127,17 +121,36 @@ def tracked(
     image: Gray,
     T_later_earlier: Floats,  # noqa: N803 -- T_target_source
     geometry: StereoGeometry,
-    least_px: float,
 ) -> tuple[Landmarks, Floats]:
-    """Return those landmarks that are found again in a later image, and their places (N, 2) there; of ``least_px`` of disparity on."""
+    """Return those landmarks that are found again in a later image, and their places (N, 2) there."""
     turned, moved = predicted(earlier, T_later_earlier, geometry)
     guesses = projected(turned + moved, geometry)
     height, width = image.shape
-    near = (earlier.disparity_px - geometry.offset_px >= least_px) & ((turned + moved)[:, 2] > LEAST_DEPTH)
-    near &= np.all((guesses >= 0.0) & (guesses < [width, height]), axis=1)
-    places = followed(earlier.image, image, earlier.places[near], guesses[near], levels=LEVELS)
+    seen = (turned + moved)[:, 2] > LEAST_DEPTH
+    seen &= np.all((guesses >= 0.0) & (guesses < [width, height]), axis=1)
+    places = followed(earlier.image, image, earlier.places[seen], guesses[seen], levels=LEVELS)
     known = np.isfinite(places[:, 0])
-    return earlier.only(near).only(known), places[known]
+    return earlier.only(seen).only(known), places[known]
+
+
+@dataclass(frozen=True)
+class Compared:
+    """Two views of a vehicle that moved in between.
+
+    ``seen`` are the earlier view's landmarks that the later one shows, too, ``places`` (N, 2) theirs in it. ``T_later_earlier`` (4, 4) is
+    the camera's motion by the poses, ``stamp_ns`` the later view's.
+    """
+
+    stamp_ns: int
+    T_later_earlier: Floats
+    seen: Landmarks
+    places: Floats
+
+    @classmethod
+    def of(cls, earlier: KnownView, later: KnownView, geometry: StereoGeometry) -> Compared:
+        """Follow the earlier view's landmarks to the later one."""
+        T_later_earlier: Floats = np.linalg.inv(later.T_map_camera) @ earlier.T_map_camera  # noqa: N806 -- T_target_source
+        return cls(later.stamp_ns, T_later_earlier, *tracked(earlier.landmarks, later.landmarks.image, T_later_earlier, geometry))
 
 
 def predicted(landmarks: Landmarks, T_later_earlier: Floats, geometry: StereoGeometry) -> tuple[Floats, Floats]:  # noqa: N803
@@ -164,7 +177,7 @@ def motion_of(turned: Floats, moves: Floats, places: Floats, geometry: StereoGeo
     Gauss-Newton with weights of Cauchy from the best of some ``first`` factors (M, K) on; the rays are scaled to a depth of 1 at the
     earlier view. None where fewer than `LEAST_FEATURES` agree.
     """
-    factors = max(first, key=lambda tried: _agreeing(places - projected(turned + np.tensordot(tried, moves, 1), geometry))).copy()
+    factors = first[np.argmax(_agreeing(places - projected(turned + np.tensordot(first, moves, 1), geometry)))].copy()
     normal, variance = np.eye(len(factors) + 3), 0.0
     weights = np.zeros(len(places))
     for outlier_px in OUTLIER_PX:
@@ -184,16 +197,18 @@ def motion_of(turned: Floats, moves: Floats, places: Floats, geometry: StereoGeo
     return Motion(factors, sigmas, turned + np.tensordot(factors, moves, 1), weights)
 
 
-def _agreeing(errors: Floats) -> int:
-    """Return how many errors (N, 2) in pixels are near the middle one: a wrong attitude moves all features alike."""
-    off = errors - np.median(errors, axis=0)
-    return int(np.count_nonzero(np.sum(off**2, axis=1) < AGREE_PX**2))
+def _agreeing(errors: Floats) -> NDArray[np.intp]:
+    """Return how many errors (M, N, 2) in pixels are near the middle one, (M,): a wrong attitude moves all features alike."""
+    off = errors - np.median(errors, axis=1, keepdims=True)
+    agreeing: NDArray[np.intp] = np.sum(np.sum(off**2, axis=2) < AGREE_PX**2, axis=1)
+    return agreeing
 
 
 def projected(points: Floats, geometry: StereoGeometry) -> Floats:
-    """Return the places (N, 2) in pixels of points (N, 3)."""
-    ahead = np.maximum(points[:, 2], LEAST_DEPTH)
-    return np.column_stack([geometry.fx * points[:, 0] / ahead + geometry.cx, geometry.fy * points[:, 1] / ahead + geometry.cy])
+    """Return the places (..., 2) in pixels of points (..., 3)."""
+    x, y, z = np.moveaxis(points, -1, 0)
+    ahead = np.maximum(z, LEAST_DEPTH)
+    return np.stack([geometry.fx * x / ahead + geometry.cx, geometry.fy * y / ahead + geometry.cy], axis=-1)
 
 
 def _jacobian(points: Floats, moves: Floats, geometry: StereoGeometry) -> Floats:

@@ -57,12 +57,24 @@ class Features:
 
 def match(left: Features, right: Features) -> Matches:
     """Match the features of both images, mutually best ones only."""
-    pairs = []
+    chosen, theirs = np.empty((2, 0), dtype=np.intp)
     if left.words is not None and right.words is not None:
-        pairs = cv2.BFMatcher(cv2.NORM_HAMMING, crossCheck=True).match(left.words, right.words)
-    places = left.places[[pair.queryIdx for pair in pairs]]
-    moved = right.places[[pair.trainIdx for pair in pairs]] - places
+        chosen, theirs = _mutually_best(left.words, right.words)
+    places = left.places[chosen]
+    moved = right.places[theirs] - places
     return Matches(len(left.keys), len(right.keys), places, moved[:, 1], -moved[:, 0])
+
+
+def _mutually_best(words: Gray, others: Gray) -> tuple[NDArray[np.intp], NDArray[np.intp]]:
+    """Return the numbers of the descriptors (N, 32) and (M, 32) that are the least bits apart, either from the other's view.
+
+    Of bits that are 1 or -1 the products tell it, in less than half the time that OpenCV takes to compare them.
+    """
+    signs = [2.0 * np.unpackbits(each, axis=1).astype(np.float32) - 1.0 for each in (words, others)]
+    alike = signs[0] @ signs[1].T
+    best = np.argmax(alike, axis=1)
+    mutual = np.flatnonzero(np.argmax(alike, axis=0)[best] == np.arange(len(best)))
+    return mutual, best[mutual]
 
 
 def match_by_disparity(left: Gray, right: Gray, keys: Sequence[cv2.KeyPoint], offset_px: float) -> Matches:

@@ -12,7 +12,7 @@ from perception_core import FINE, NS, FaultKind, Finding, broken, first_trouble,
 from zed_depth.calibration import CalibrationError, InfoLike, StereoCalibration, StereoGeometry
 from zed_depth.confidence import confidence_of
 from zed_depth.depth_scale import ScaleJudge
-from zed_depth.feature_motion import Views
+from zed_depth.feature_motion import Compared, Views
 from zed_depth.fixed_columns import fixed_columns_finding
 from zed_depth.image_fit import fit_of
 from zed_depth.image_health import SHARPNESS_FELL, ImageJudge
@@ -136,10 +136,11 @@ class StereoRig:
             if view.landmarks is not None and view.right is not None:
                 if self._vergence.look(pair.stamp_ns, view.landmarks, view.right, calibration.geometry, self._camera_pose):
                     self._views.clear()
-                compared = self._views.take(pair.stamp_ns, view.landmarks, self._camera_pose)
-                if compared is not None:
-                    self._vergence.compare(*compared, calibration.geometry)
-                    self._scale.compare(*compared, calibration.geometry)
+                apart = self._views.take(pair.stamp_ns, view.landmarks, self._camera_pose)
+                if apart is not None:
+                    compared = Compared.of(*apart, calibration.geometry)
+                    self._vergence.compare(compared, calibration.geometry)
+                    self._scale.compare(compared, calibration.geometry)
             self._sharpness = self._images.sharpness
             with self._lock:
                 self._view_ns = pair.stamp_ns

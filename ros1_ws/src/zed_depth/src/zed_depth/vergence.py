@@ -17,13 +17,13 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from perception_core import FINE, NS, FaultKind, Finding, broken
-from zed_depth.feature_motion import LONGEST_NS, followed, motion_of, predicted, relative, tracked, turned_far
+from zed_depth.feature_motion import LONGEST_NS, followed, motion_of, predicted, tracked, turned_far
 
 if TYPE_CHECKING:
     from numpy.typing import NDArray
 
     from zed_depth.calibration import StereoGeometry
-    from zed_depth.feature_motion import CameraPose, KnownView, Landmarks
+    from zed_depth.feature_motion import CameraPose, Compared, Landmarks
 
     Floats = NDArray[np.float64]
     Gray = NDArray[np.uint8]
@@ -80,13 +80,11 @@ class VergenceJudge:
         self._judged(self._knocked_px, self._limits.max_knock_px, "all disparities changed by {:.1f} px at once")
         return True
 
-    def compare(self, earlier: KnownView, later: KnownView, geometry: StereoGeometry) -> None:
+    def compare(self, views: Compared, geometry: StereoGeometry) -> None:
         """Take two views of a vehicle that moved in between."""
-        T_later_earlier = relative(earlier, later)  # noqa: N806 -- T_target_source
-        seen, places = tracked(earlier.landmarks, later.landmarks.image, T_later_earlier, geometry, -np.inf)
-        offset = offset_of(seen, places, T_later_earlier, geometry)
+        offset = offset_of(views.seen, views.places, views.T_later_earlier, geometry)
         if offset is not None and offset[1] <= max(self._limits.max_sigma_px, SURE * abs(offset[0])):
-            self.judge(later.stamp_ns, offset[0])
+            self.judge(views.stamp_ns, offset[0])
 
     def judge(self, stamp_ns: int, offset_px: float) -> None:
         """Take an estimate of how much the disparities are too large."""
@@ -127,7 +125,7 @@ def knock_of(
         seen, places = seen.only(np.isfinite(places[:, 0])), places[np.isfinite(places[:, 0])]
         T_later_earlier = NOT_TURNED  # noqa: N806
     else:
-        seen, places = tracked(earlier, left, T_later_earlier, geometry, -np.inf)
+        seen, places = tracked(earlier, left, T_later_earlier, geometry)
     if turned_far(T_later_earlier) or len(places) < LEAST_FOLLOWED:
         return None
     inverse_m = (seen.disparity_px - geometry.offset_px) / (geometry.fx * geometry.baseline_m)

@@ -42,25 +42,31 @@ class Lidar:
         azimuth = np.arange(spec.columns) * (2.0 * math.pi / spec.columns)
         elevation = np.radians(np.linspace(-spec.half_angle_deg, spec.half_angle_deg, spec.beams))
         a, e = np.meshgrid(azimuth, elevation, indexing="ij")
-        self._directions = np.stack([np.cos(e) * np.cos(a), np.cos(e) * np.sin(a), np.sin(e)], axis=-1)  # (columns, beams, 3), sensor
+        self._directions = np.stack([np.cos(e) * np.cos(a), np.cos(e) * np.sin(a), np.sin(e)])  # (3, columns, beams), sensor
         self._offsets_s: Floats = np.linspace(0.0, spec.period_s, spec.columns, endpoint=False, dtype=np.float64)
-        self._body_directions = self._directions @ LIDAR.matrix.T
+        self._body_directions = np.einsum("ij,jcb->cbi", LIDAR.matrix, self._directions)
+        self._normals = np.ascontiguousarray(world.normals.T)
 
     def scan(self, track: PoseTrack, start_s: float) -> NDArray[np.void]:
         """Return the returns of the sweep that began at ``start_s``: POINT_DTYPE in the sensor's frame at each point's own time."""
         positions, rotations = track.at(start_s + self._offsets_s)
-        rays = np.empty((*self._directions.shape[:2], 6), dtype=np.float32)
-        rays[..., :3] = (positions + rotations @ np.asarray(LIDAR.translation))[:, None, :]
+        rays = np.empty((*self._body_directions.shape[:2], 6), dtype=np.float32)
+        # Axis by axis: numpy is several times as slow along rows of three.
+        for axis, origin in enumerate((positions + rotations @ np.asarray(LIDAR.translation)).T):
+            rays[..., axis] = origin[:, None]
         rays[..., 2] = np.maximum(rays[..., 2], GEAR_M)
-        rays[..., 3:] = np.einsum("cij,cbj->cbi", rotations, self._body_directions)
+        rays[..., 3:] = self._body_directions @ rotations.transpose(0, 2, 1)
         hits = self._world.cast(rays)
         spec = self.spec
-        seen = (hits.triangle != NO_HIT) & (hits.range_m >= spec.min_range_m) & (hits.range_m <= spec.max_range_m)
-        triangles = hits.triangle[seen]
-        ranges = hits.range_m[seen] + self._rng.normal(0.0, self._noise_m, len(triangles))
-        facing = np.abs(np.einsum("ij,ij->i", self._world.normals[triangles], rays[seen][:, 3:]))
-        points = np.empty(len(triangles), dtype=POINT_DTYPE)
-        points["x"], points["y"], points["z"] = (self._directions[seen] * ranges[:, None]).T
-        points["intensity"] = 255.0 * self._world.brightness[triangles] * facing
-        points["time"] = np.broadcast_to(self._offsets_s[:, None], seen.shape)[seen]
+        seen = np.flatnonzero((hits.triangle != NO_HIT) & (hits.range_m >= spec.min_range_m) & (hits.range_m <= spec.max_range_m))
+        triangles = hits.triangle.take(seen)
+        ranges = hits.range_m.take(seen) + self._rng.normal(0.0, self._noise_m, len(seen))
+        facing = np.zeros(len(seen))
+        for normal, direction in zip(self._normals, rays.reshape(-1, 6).T[3:], strict=True):
+            facing += normal.take(triangles) * direction.take(seen)
+        points = np.empty(len(seen), dtype=POINT_DTYPE)
+        for name, direction in zip(("x", "y", "z"), self._directions, strict=True):
+            points[name] = direction.take(seen) * ranges
+        points["intensity"] = 255.0 * self._world.brightness[triangles] * np.abs(facing)
+        points["time"] = self._offsets_s.take(seen // spec.beams)
         return points
