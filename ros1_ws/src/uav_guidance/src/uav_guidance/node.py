@@ -272,6 +272,6 @@ def _next_due(due_s: float, now_s: float) -> float:
 
 def main() -> None:
     """Run the guidance node, with its private parameters, until ROS shuts down."""
-    send_directly()
+    send_directly(not_heard=["/tf"])  # the transform from map to odom is heard there; 70 of 80 messages a second are its own
     rospy.init_node("uav_guidance")
     GuidanceNode(read_settings(GuidanceSettings())).run()
