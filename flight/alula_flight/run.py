@@ -20,7 +20,7 @@ import psutil
 
 from alula.commands.run_options import shown_at
 from alula.common.network import DOMAINS, DomainClaim, NoFreeDomainError, NoFreePortError, claim_domain
-from alula.common.processes import NAMESPACE_VARIABLE, RUN_ID_VARIABLE, die_with_parent, end_run, node_name, processes_of_run
+from alula.common.processes import NAMESPACE_VARIABLE, RUN_ID_VARIABLE, die_with_parent, end_run, ends_within, node_name, processes_of_run
 from alula.common.robots import RobotError
 from alula.common.scenarios import ScenarioError, load_scenario
 from alula.common.shared_memory import sweep_shared_memory
@@ -39,6 +39,7 @@ from alula_flight.outcome import CANNOT_START, GIVEN_UP, finish
 
 MISSION_TIMEOUT_S = 150.0  # wall clock; to bring the robot to rest
 TIMEOUT_S = 3.0  # wall clock, for what is left of a run to end by itself
+LOOK_S = 0.2  # wall clock; how often it is looked what is new
 MISSION_NODE = "mission"
 STOPPING = "stopping: the robot comes to rest first; Ctrl-C again ends everything at once"
 
@@ -104,8 +105,7 @@ class Front:
             while supervisor.poll() is None and not self._interrupts.at_once:
                 live.show_new()
                 self._members.look()
-                with contextlib.suppress(subprocess.TimeoutExpired):
-                    supervisor.wait(0.2)
+                ends_within(supervisor, LOOK_S)
             if supervisor.poll() is not None and supervisor.returncode < 0:
                 self._supervisor_died(supervisor.returncode, live)
             live.show_new()

@@ -14,7 +14,7 @@ import psutil
 import pytest
 
 from alula.common.network import DomainClaim, NoFreeDomainError, claim_domain, free_port, is_claimed
-from alula.common.processes import RUN_ID_VARIABLE, end_run, processes_of_run
+from alula.common.processes import RUN_ID_VARIABLE, end_run, ends_within, processes_of_run
 from alula.common.record import EVENTS, RecordWriter
 from alula.common.record import FILE as RECORD
 from alula.common.run_log import FILE
@@ -213,6 +213,18 @@ def test_deaths_are_written_at_once_and_a_cut_line_is_left_out(tmp_path):
         "driver died (signal SIGKILL) at 12.5 s of mission clock; it was started again at 14.0 s of mission clock",
         "driver died (signal SIGKILL) at 12.5 s of mission clock; it stayed dead",
     ]
+
+
+def test_the_end_of_a_child_is_waited_for_and_no_longer():
+    child = subprocess.Popen([sys.executable, "-c", "input()"], stdin=subprocess.PIPE)
+    assert not ends_within(child, 0.01)
+    child.communicate(b"\n")
+    assert ends_within(child, 60.0)
+    dying = subprocess.Popen([sys.executable, "-c", "input()"], stdin=subprocess.PIPE)
+    threading.Timer(0.1, dying.kill).start()
+    assert ends_within(dying, 60.0)
+    assert dying.returncode == -9
+    dying.communicate()
 
 
 def test_live_lines_wait_for_whole_events(tmp_path):

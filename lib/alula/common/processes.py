@@ -8,7 +8,9 @@ from __future__ import annotations
 import contextlib
 import ctypes
 import os
+import select
 import signal
+import subprocess
 import time
 from collections.abc import Callable
 
@@ -28,6 +30,19 @@ LOOK_S = 0.05
 def die_with_parent() -> None:
     """Ask the kernel for SIGTERM when the parent dies; to be run between fork and exec."""
     ctypes.CDLL(None, use_errno=True).prctl(PR_SET_PDEATHSIG, signal.SIGTERM)
+
+
+def ends_within(child: subprocess.Popen[bytes], timeout_s: float) -> bool:
+    """Wait for the end of a child; tell whether it has ended. ``Popen.wait`` with a timeout looks every few milliseconds."""
+    if child.poll() is None:
+        end = os.pidfd_open(child.pid)
+        try:
+            ended = select.poll()
+            ended.register(end, select.POLLIN)
+            ended.poll(timeout_s * 1000.0)
+        finally:
+            os.close(end)
+    return child.poll() is not None
 
 
 def processes_of_run(run_id: str) -> list[psutil.Process]:

@@ -5,8 +5,7 @@ from __future__ import annotations
 from collections.abc import Callable, Collection, Mapping
 from typing import Any, Protocol
 
-from alula.model.conditions import data_of
-from alula.model.model import Skillset
+from alula.model.semantics import asked_data
 from alula.runtime.client import Client as SkillsetClient
 from alula.runtime.handle import SkillHandle
 
@@ -135,7 +134,7 @@ class MissionClient:
         asked_for = asked_data(self.client.model) | set(self._followed)
         for data in self.client.model.data:
             every_s = 0.0 if data.name in asked_for else 1.0
-            self.client.data_feed(data.name).on_sample(Thinned(self._sample_of(data.name), every_s))
+            self.client.data_feed(data.name, every_s).on_sample(self._sample_of(data.name))
 
     def _sample_of(self, name: str) -> Callable[[Any], None]:
         def record(sample: Any) -> None:
@@ -143,27 +142,3 @@ class MissionClient:
                 self._recorder.sample(self.skillset, name, sample.value, sample.stamp_ns)
 
         return record
-
-
-class Thinned:
-    """Passes on samples that are at least ``every_s`` apart."""
-
-    def __init__(self, take: Callable[[Any], None], every_s: float) -> None:
-        self._take = take
-        self._every_s = every_s
-        self._last_s: float | None = None
-
-    def __call__(self, sample: Any) -> None:
-        """Pass the sample on, unless the last one is less than the period ago (by the samples' stamps)."""
-        now_s = None if sample.stamp_ns is None else sample.stamp_ns / NANOSECONDS
-        if now_s is not None and self._last_s is not None and now_s - self._last_s < self._every_s:
-            return
-        self._last_s = now_s
-        self._take(sample)
-
-
-def asked_data(model: Skillset) -> set[str]:
-    """Return the names of the data that conditions of the model ask for."""
-    conditions = [p.condition for skill in model.skills for p in skill.preconditions]
-    conditions += [condition for skill in model.skills for one in skill.invariants for condition in (one.condition, one.recovered)]
-    return {atom.data for condition in conditions for atom in data_of(condition)}

@@ -42,6 +42,8 @@ class TreeWatch:
     def __init__(self, root: Behaviour) -> None:
         self._root = root
         self._memories = {node: _Memory(node) for node in root.iterate()}
+        self._as_looked_at = False
+        """Whether nothing has changed since the last look."""
         if isinstance(root, Node):
             root.watchers.append(self._changed)  # its nodes are idle again before a tick ends
 
@@ -49,9 +51,11 @@ class TreeWatch:
         """Take note of the tree now."""
         if isinstance(self._root, Node):
             for memory in self._memories.values():
-                if memory.status is Status.RUNNING and not memory.left:
+                if memory.status is Status.RUNNING and not memory.left and memory.message != memory.node.feedback_message:
                     memory.message = memory.node.feedback_message
+                    self._as_looked_at = False
             return
+        self._as_looked_at = False
         # Of each node at each tick: a tenth of a mocked flight's time, so nothing is made here.
         invalid, running = Status.INVALID, Status.RUNNING
         for memory in self._memories.values():
@@ -63,6 +67,7 @@ class TreeWatch:
                 memory.left, memory.message = True, node.feedback_message
 
     def _changed(self, node: Node, _previous: Status, status: Status) -> None:
+        self._as_looked_at = False
         memory = self._memories.get(node)
         if memory is not None and status is not Status.INVALID:
             memory.status, memory.left, memory.message = status, False, node.feedback_message
@@ -72,7 +77,11 @@ class TreeWatch:
     def look(self) -> NodeView:
         """Return a view of the whole tree as it is now; the last one, itself, where nothing has changed since."""
         self.remember()
-        return self._view(self._root)
+        last = self._memories[self._root].view
+        if last is None or not self._as_looked_at:
+            last = self._view(self._root)
+            self._as_looked_at = True
+        return last
 
     def _view(self, node: Behaviour) -> NodeView:
         memory = self._memories[node]

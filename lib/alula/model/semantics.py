@@ -73,6 +73,13 @@ def _without_data(conditions: Sequence[tuple[str, Expression]]) -> None:
             raise UnsupportedModelError(f"{atom.span}: {place}: data {atom.data} can be tested in preconditions and invariants only")
 
 
+def asked_data(skillset: Skillset) -> frozenset[str]:
+    """Return the names of the data that conditions of the skillset ask for."""
+    conditions = [p.condition for skill in skillset.skills for p in skill.preconditions]
+    conditions += [condition for skill in skillset.skills for one in skill.invariants for condition in (one.condition, one.recovered)]
+    return frozenset(atom.data for condition in conditions for atom in data_of(condition))
+
+
 def initial(skillset: Skillset) -> Situation:
     """Return the situation at the start: every resource in its initial state, nothing running."""
     return Situation({resource.name: resource.initial for resource in skillset.resources})

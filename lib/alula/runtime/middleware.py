@@ -47,6 +47,7 @@ class Topic:
         type_name: of a data, ``package/Name``; empty: the codec of this name has it, or the graph tells.
         wrapped: the values are primitives, which come as std_msgs/Float64 and the like.
         outside: a topic of the functional layer, not of the skillset interface.
+        every_s: for subscribers; what comes within so many seconds of mission clock after a value that was taken is left out.
     """
 
     name: str
@@ -54,6 +55,7 @@ class Topic:
     type_name: str = ""
     wrapped: bool = False
     outside: bool = False
+    every_s: float = 0.0
 
 
 EVENTS = Topic("events", depth=1000)
@@ -61,9 +63,22 @@ RESOURCE_STATES = Topic("resource_states")
 SKILL_STATES = Topic("skill_states")
 
 
-def data_topic(data: Data, type_name: str = "") -> Topic:
+def data_topic(data: Data, type_name: str = "", every_s: float = 0.0) -> Topic:
     """Return the topic on which the managers pass on a data; its values are ``Sample``s, as are those of the functional layer."""
-    return Topic(f"data/{data.name}", type_name=type_name, wrapped=data.type in PRIMITIVES)
+    return Topic(f"data/{data.name}", type_name=type_name, wrapped=data.type in PRIMITIVES, every_s=every_s)
+
+
+def thinned(callback: OnValue, topic: Topic, now_ns: Callable[[], int]) -> OnValue:
+    """Return what passes on to a callback the values that a topic's ``every_s`` leaves."""
+    every_ns, taken_ns = round(topic.every_s * 1e9), [-(1 << 63)]
+
+    def take(value: Any) -> None:
+        now = now_ns()
+        if now - taken_ns[0] >= every_ns:
+            taken_ns[0] = now
+            callback(value)
+
+    return take if every_ns else callback
 
 
 @dataclass(frozen=True)

@@ -92,6 +92,31 @@ def test_data_are_fresh_until_three_periods_have_passed():
         world.managers["flying"].publish("nosuch", 1)
 
 
+def test_of_values_that_come_too_soon_one_after_the_other_some_are_left_out():
+    world, client = make(flying_skillset(flying_skill("takeoff"), data=(Data("battery", "float64"),)))
+    values: list = []
+    client.data_feed("battery", every_s=1.0).on_sample(lambda sample: values.append((sample.value, sample.stamp_ns)))
+    for number in range(25):
+        world.managers["flying"].publish("battery", number)
+        world.run_for(0.1)
+    assert values == [(number, number * 100_000_000) for number in (0, 10, 20)]
+
+
+def test_a_data_that_no_condition_asks_for_makes_no_step():
+    asked = Precondition("charged", DataIs("battery", (), Comparison.GT, 0.2))
+    data = (Data("battery", "float64"), Data("heat", "float64"))
+    world, client = make(flying_skillset(flying_skill("takeoff", preconditions=(asked,)), data=data))
+    engine = world.managers["flying"].engine
+    steps: list = []
+    commit = engine._context.commit
+    engine._context.commit = lambda *step, **more: steps.append(step) or commit(*step, **more)
+    world.managers["flying"].publish("heat", 40.0)
+    assert steps == []
+    assert client.read_data("heat").get(1.0).value == 40.0
+    world.managers["flying"].publish("battery", 0.5)
+    assert len(steps) == 1
+
+
 def test_an_invariant_over_data_is_broken_by_a_value_or_by_silence():
     full = Invariant("charged", DataIs("battery", (), Comparison.GT, 0.2))
     skill = flying_skill("takeoff", invariants=(full,))

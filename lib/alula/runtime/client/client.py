@@ -121,15 +121,15 @@ class Client:
         """Call ``callback(skills)`` after changes, with a ``SkillRecord`` by skill; the return value unsubscribes."""
         return self._news.on_skills.add(callback)
 
-    def data_feed(self, name: str) -> Feed:
-        """Return the values of a data; it is subscribed to when it is first asked for.
+    def data_feed(self, name: str, every_s: float = 0.0) -> Feed:
+        """Return the values of a data; it is subscribed to when it is first asked for, from then on at most once in ``every_s``.
 
         Raises:
             ValueError: there is no such data.
         """
         data = self._find_data(name)
         if name not in self._feeds:
-            self._feeds[name] = Feed(self._middleware, data, self.read_data)
+            self._feeds[name] = Feed(self._middleware, data, self.read_data, every_s)
         return self._feeds[name]
 
     def input_types(self, skill: str) -> dict[str, str]:

@@ -16,17 +16,18 @@ from alula.runtime.waiting import Pending
 class Feed:
     """Keeps the last sample of ``data/<name>`` and tells of each.
 
-    A value is stamped when it arrives; the first one may have been latched for long, so its stamp is asked of the managers.
+    With ``every_s``, values that come within so many seconds after one are left out. A value is stamped when it arrives; the first one
+    may have been latched for long, so its stamp is asked of the managers.
     """
 
-    def __init__(self, middleware: Middleware, data: Data, read: Callable[[str], Pending[DataReading]]) -> None:
+    def __init__(self, middleware: Middleware, data: Data, read: Callable[[str], Pending[DataReading]], every_s: float = 0.0) -> None:
         self.data = data
         self._middleware = middleware
         self._read = read
         self._lock = threading.Lock()
         self._callbacks: Callbacks[Callable[[Sample], None]] = Callbacks()
         self._sample: Sample | None = None
-        middleware.subscribe(data_topic(data), self._take)
+        middleware.subscribe(data_topic(data, every_s=every_s), self._take)
 
     @property
     def sample(self) -> Sample | None:

@@ -104,6 +104,7 @@ class SkillsetEngine:
         except UnsupportedModelError as error:
             raise SkillRuntimeError(str(error)) from error
         self.skillset = skillset
+        self._asked_data = semantics.asked_data(skillset)
         self._clock_ns = clock_ns
         self._hooks: HookCaller = LocalHooks(skillset, hooks) if isinstance(hooks, Mapping) else hooks
         self._defer = defer
@@ -214,6 +215,8 @@ class SkillsetEngine:
         if name not in known:
             raise SkillRuntimeError(f"skillset {self.skillset.name} has no data {name}; it has {', '.join(known) or 'none'}")
         self.tick()
+        if name not in self._asked_data:
+            return
         with self._lock:
             stops = self._context.commit(semantics.receive(self.skillset, self._context.situation, name, value))
         self._after_step(stops)

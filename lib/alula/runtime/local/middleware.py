@@ -17,7 +17,7 @@ from alula.model.model import Skill, Skillset
 from alula.runtime.core.events import ExecutionEvent
 from alula.runtime.local.clock import VirtualClock, WorldError
 from alula.runtime.local.values import Types, complete, fit, ros_type
-from alula.runtime.middleware import CALL_S, Goal, GoalListener, GoalResult, OnError, OnHeartbeat, OnReply, OnValue, Serve, Topic
+from alula.runtime.middleware import CALL_S, Goal, GoalListener, GoalResult, OnError, OnHeartbeat, OnReply, OnValue, Serve, Topic, thinned
 from alula.runtime.timers import Job, Timer
 from alula.runtime.waiting import CannotWaitError, Waiter
 
@@ -170,7 +170,8 @@ class VirtualMiddleware:
         if topic.outside:
             return lambda: True
         found = self.bus.topic(f"{self.skillset}/{topic.name}")
-        hear = lambda value: self.do(lambda: callback(value))  # noqa: E731
+        take = thinned(callback, topic, self.now_ns)
+        hear = lambda value: self.do(lambda: take(value))  # noqa: E731
         for value in found.values:
             self.bus.send(functools.partial(hear, value))
         found.subscribers.append(hear)

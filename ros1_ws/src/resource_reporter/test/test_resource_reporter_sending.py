@@ -6,6 +6,7 @@ import socket
 from collections.abc import Iterator
 
 import pytest
+import rospy
 from rospy.exceptions import TransportTerminated
 from rospy.impl.tcpros_base import TCPROSTransport, TCPROSTransportProtocol
 from rospy.topics import _PublisherImpl
@@ -86,6 +87,20 @@ def test_one_that_has_gone_is_told_to_the_publisher(ends: tuple[TCPROSTransport,
     until(lambda: transport.done, "the thread finds out")
     with pytest.raises(TransportTerminated):
         connection.write_data(b"told")
+
+
+@pytest.mark.parametrize(("subscriber", "heard"), [("/unnamed", b"end"), ("/other", b"wordend")])
+def test_a_node_does_not_send_to_itself_what_it_does_not_want_to_hear(
+    ends: tuple[TCPROSTransport, socket.socket], monkeypatch: pytest.MonkeyPatch, subscriber: str, heard: bytes
+) -> None:
+    transport, theirs = ends
+    monkeypatch.setattr(DirectConnection, "not_heard", frozenset({"/tf"}))
+    monkeypatch.setattr(rospy, "get_name", lambda: "/unnamed")
+    transport.name, transport.endpoint_id = "/tf", subscriber
+    assert DirectConnection(transport, 1).write_data(b"word")
+    monkeypatch.setattr(DirectConnection, "not_heard", frozenset({"/another"}))
+    assert DirectConnection(transport, 1).write_data(b"end")
+    assert read(theirs, len(heard)) == heard
 
 
 def test_publishers_of_rospy_send_so(ends: tuple[TCPROSTransport, socket.socket]) -> None:

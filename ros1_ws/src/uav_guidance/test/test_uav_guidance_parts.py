@@ -2,6 +2,7 @@
 
 import math
 from dataclasses import fields
+from threading import Thread
 
 import pytest
 from hypothesis import given
@@ -14,7 +15,7 @@ from perception_core.tunable import check_ranges, ranges
 from uav_guidance.commands import ATTEMPTS, Outcome, Procedure, arm, set_mode, take_off
 from uav_guidance.encoding import from_autopilot_to_us
 from uav_guidance.settings import GuidanceSettings
-from uav_guidance.stamping import FineClock, StampClock
+from uav_guidance.stamping import Alarm, FineClock, StampClock
 from uav_guidance.stillness import StillWatch
 from uav_guidance.streams import STREAMS_HZ, StreamKeeper
 from uav_guidance.texts import TextAssembler
@@ -314,3 +315,23 @@ def test_forwarded_heartbeats_are_not_the_autopilots():
     sender, receiver = mavlink.MAVLink(None, 255, 190), mavlink.MAVLink(None, 1, 191)
     frame = mavlink.MAVLink_heartbeat_message(6, 8, 0, 0, 0, 3).pack(sender)
     assert not from_autopilot_to_us(receiver.parse_buffer(frame)[0])
+
+
+@pytest.mark.parametrize("last", [100, 120, 10], ids=["at its moment", "behind it", "set back"])
+def test_an_alarm_wakes_at_its_moment_and_where_the_clock_is_set_back(last):
+    alarm, woken, wakes = Alarm(), [], []
+    alarm._ticked.notify = lambda notify=alarm._ticked.notify: (wakes.append(alarm._now_ns), notify())
+    alarm.tick(0)
+    assert not alarm.wait(100, 0.0)
+    sleeper = Thread(target=lambda: woken.append(alarm.wait(100, 60.0)))
+    sleeper.start()
+    for tick in (20, 40, 60):
+        alarm.tick(tick)
+    assert woken == []
+    assert wakes == [0]  # when nobody had set it yet
+    alarm.tick(last)
+    sleeper.join(60.0)
+    assert woken == [True]
+    assert wakes == [0, last]
+    assert alarm.wait(last, 60.0)  # it has passed
+    assert not alarm.wait(1000, 0.0)

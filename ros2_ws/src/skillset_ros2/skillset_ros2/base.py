@@ -50,8 +50,8 @@ class RestingGroup(MutuallyExclusiveCallbackGroup):  # type: ignore[misc]  # rcl
         self.resting: set[Any] = set()
 
     def can_execute(self, entity: Any) -> bool:
-        """Tell whether the executor should wait for an entity, and may call back."""
-        return entity not in self.resting and bool(super().can_execute(entity))
+        """Tell whether the executor should wait for an entity, and may call back. It is asked of each at each turn: no lock is taken."""
+        return entity not in self.resting and self._active_entity is None
 
 
 class RclpyBase:
@@ -147,18 +147,32 @@ class RclpyBase:
         """Return a name of the skillset's."""
         return f"{self._root}/{relative}"
 
-    def listen(self, name: str, kind: Any, callback: OnValue, qos: QoSProfile, events: Any = QUIET) -> Any:
-        """Subscribe; all messages that are there are taken in one turn of the executor."""
+    def listen(self, name: str, kind: Any, callback: OnValue, qos: QoSProfile, events: Any = QUIET, every_s: float = 0.0) -> Any:
+        """Subscribe; all messages that are there are taken in one turn of the executor.
+
+        With ``every_s`` the subscription rests after a message: those that come within so many seconds of mission clock do not wake the
+        executor, and are left out.
+        """
         made: list[Any] = []
 
         def hear(message: Any) -> None:
             callback(message)
+            if every_s and made:
+                self._group.resting.add(made[0])
+                self.at(self.now_ns() + round(every_s * 1e9), go_on)
+                return
             for _ in range(AT_ONCE if made else 0):
                 with made[0].handle:
                     taken = made[0].handle.take_message(kind, False)
                 if taken is None:
                     return
                 callback(taken[0])
+
+        def go_on() -> None:
+            with made[0].handle:
+                while made[0].handle.take_message(kind, True) is not None:
+                    pass
+            self._await(made[0], True)
 
         made.append(self.node.create_subscription(kind, name, self.on_loop(hear), qos, callback_group=self._group, event_callbacks=events))
         return made[0]

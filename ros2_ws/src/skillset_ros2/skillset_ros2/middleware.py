@@ -13,7 +13,6 @@ import skillset_interfaces.srv
 from rclpy.duration import Duration
 from rclpy.event_handler import SubscriptionEventCallbacks
 from rclpy.node import Node
-from rclpy.qos import QoSProfile
 from std_msgs.msg import Header
 
 from alula.runtime.codecs import Codecs, ServiceCodec, set_stamp, stamp_ns_of
@@ -57,18 +56,18 @@ class RclpyMiddleware(RclpyBase):
         codec = self._codecs.topic(topic)
         take: OnValue = lambda message: callback(codec.decode(message))  # noqa: E731
         if topic.outside:
-            self.listen(in_namespace(topic.name), codec.kind, take, SOURCE, events=None)
+            self.listen(in_namespace(topic.name), codec.kind, take, SOURCE, events=None, every_s=topic.every_s)
             return lambda: True
         if codec.kind is None:
-            self._listen_once_known(self.name(topic.name), take, latched(topic.depth))
+            self._listen_once_known(topic, take)
             return lambda: True
-        self.listen(self.name(topic.name), codec.kind, take, latched(topic.depth))
+        self.listen(self.name(topic.name), codec.kind, take, latched(topic.depth), every_s=topic.every_s)
         publishers = self.node.resolve_topic_name(self.name(topic.name))
         return Discovery(lambda: bool(self.node.count_publishers(publishers)))
 
-    def _listen_once_known(self, name: str, callback: OnValue, qos: QoSProfile) -> None:
+    def _listen_once_known(self, followed: Topic, callback: OnValue) -> None:
         """Subscribe as soon as the graph tells the topic's type."""
-        topic = self.node.resolve_topic_name(name)
+        topic = self.node.resolve_topic_name(self.name(followed.name))
         found: list[str] = []
 
         def known() -> bool:
@@ -77,7 +76,7 @@ class RclpyMiddleware(RclpyBase):
 
         def listen() -> None:
             try:
-                self.listen(topic, message_class(found[0]), callback, qos)
+                self.listen(topic, message_class(found[0]), callback, latched(followed.depth), every_s=followed.every_s)
             except (ImportError, AttributeError):
                 self.log(f"{topic}: no Python package has the type {found[0]}; its values can't be followed here")
 

@@ -6,23 +6,31 @@ second. What was sent before a tick is still dealt with before what is due at it
 
 from __future__ import annotations
 
+import struct
 import threading
 from typing import Any
 
 from rclpy.callback_groups import MutuallyExclusiveCallbackGroup
+from rclpy.clock import ClockType
 from rclpy.guard_condition import GuardCondition
 from rclpy.impl.implementation_singleton import rclpy_implementation
 from rclpy.node import Node
 from rclpy.qos import QoSProfile, ReliabilityPolicy
+from rclpy.time import Time
 from rclpy.time_source import CLOCK_TOPIC
 from rclpy.waitable import NumberOfEntities, Waitable
 from rosgraph_msgs.msg import Clock
 
-from alula.runtime.codecs import stamp_ns_of
 from skillset_ros2.base import QUIET
 
 NEVER_NS = 1 << 63
 NEWEST = QoSProfile(depth=1, reliability=ReliabilityPolicy.BEST_EFFORT)
+
+
+def _time_of(message: bytes) -> Time:
+    """Return the time of a serialized Clock; to make a message object of it takes as long as all the rest."""
+    seconds, nanoseconds = struct.unpack_from("<iI" if message[1] else ">iI", message, offset=4)
+    return Time(seconds=seconds, nanoseconds=nanoseconds, clock_type=ClockType.ROS_TIME)
 
 
 class _Elsewhere(MutuallyExclusiveCallbackGroup):  # type: ignore[misc]  # rclpy has no types
@@ -46,7 +54,7 @@ class SimulatedTime(Waitable):  # type: ignore[misc]
         self._lock = threading.Lock()
         self._waits = False
         self._due_ns = NEVER_NS
-        self._tick: Clock | None = None
+        self._tick: Time | None = None
         """The newest, where it is not applied yet."""
         self._thread: threading.Thread | None = None
         if not self._source.ros_time_is_active:
@@ -54,7 +62,7 @@ class SimulatedTime(Waitable):  # type: ignore[misc]
         # In place of rclpy's own, whose warnings about the other end's QoS are entities that wake the executor at each message.
         node.destroy_subscription(self._source._clock_sub)  # noqa: SLF001
         self._subscription = self._source._clock_sub = node.create_subscription(  # noqa: SLF001
-            Clock, CLOCK_TOPIC, self._take, NEWEST, callback_group=_Elsewhere(), event_callbacks=QUIET
+            Clock, CLOCK_TOPIC, lambda _: None, NEWEST, callback_group=_Elsewhere(), event_callbacks=QUIET
         )
         self._wake = GuardCondition(None, None, context=node.context)
         self._over = GuardCondition(None, None, context=node.context)
@@ -86,11 +94,11 @@ class SimulatedTime(Waitable):  # type: ignore[misc]
                 wait_set.add_subscription(handle)
                 wait_set.add_guard_condition(over)
                 wait_set.wait(-1)
-                taken = handle.take_message(Clock, False)
+                taken = handle.take_message(Clock, True)
                 if taken is not None:
-                    self._take(taken[0])
+                    self._take(_time_of(taken[0]))
 
-    def _take(self, tick: Clock) -> None:
+    def _take(self, tick: Time) -> None:
         with self._lock:
             self._tick = tick
             if self._waits:
@@ -100,14 +108,17 @@ class SimulatedTime(Waitable):  # type: ignore[misc]
         """Apply the tick while the executor waits, or wake it where something is due at it."""
         if self._tick is None:
             return
-        if stamp_ns_of(self._tick.clock) < self._due_ns:
+        if self._tick.nanoseconds < self._due_ns:
             self._apply()
         else:
             self._wake.trigger()
 
     def _apply(self) -> None:
         if self._tick is not None:
-            self._source.clock_callback(self._tick)
+            # As rclpy's own callback does it; a clock that is attached later begins with this.
+            self._source._last_time_set = self._tick  # noqa: SLF001
+            for clock in self._source._associated_clocks:  # noqa: SLF001
+                clock.set_ros_time_override(self._tick)
             self._tick = None
 
     # --- on the executor ---------------------------------------------------------------------------------------------

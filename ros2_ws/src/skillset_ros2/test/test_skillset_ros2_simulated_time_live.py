@@ -12,12 +12,14 @@ from rclpy.node import Node  # noqa: E402
 from rclpy.parameter import Parameter  # noqa: E402
 from rclpy.time import Time  # noqa: E402
 from rosgraph_msgs.msg import Clock  # noqa: E402
-from std_msgs.msg import String  # noqa: E402
+from std_msgs.msg import Float64, String  # noqa: E402
 
+from alula.runtime.middleware import Topic  # noqa: E402
 from alula_testing.ros2 import end_spinning, spin  # noqa: E402
 from alula_testing.waits import until  # noqa: E402
 from skillset_ros2.executor import SparingExecutor  # noqa: E402
 from skillset_ros2.middleware import RclpyMiddleware  # noqa: E402
+from skillset_ros2.names import latched  # noqa: E402
 from skillset_ros2.simulated_time import SimulatedTime  # noqa: E402
 
 SOON_S = 10.0
@@ -120,6 +122,26 @@ def test_a_timer_of_rclpy_rings_at_each_of_its_periods(simulated):
         simulated.tick()
         until(lambda number=number: len(rung) == number // 5, "the timer has rung", SOON_S)
     assert rung == [begun_ns + round(number * 5 * TICK_S * 1e9) for number in range(1, 5)]
+
+
+def test_what_comes_too_soon_after_a_value_is_left_out_and_does_not_wake_the_executor(simulated):
+    """A second is fifty ticks: of news at each of them, every fiftieth is heard."""
+    heard = []
+    topic = Topic("news", type_name="std_msgs/Float64", every_s=1.0)
+    simulated.middleware.subscribe(topic, lambda sample: heard.append((sample.value.data, simulated.middleware.now_ns())))
+    publisher = simulated.ticker.create_publisher(Float64, "navigation/news", latched(1))
+    until(lambda: publisher.get_subscription_count() == 1, "the news are followed", SOON_S)
+    sent = {}
+    before = simulated.node.looks
+    for number in range(3 * TICKS):
+        simulated.tick()
+        sent[float(number)] = simulated.middleware.now_ns()
+        publisher.publish(Float64(data=float(number)))
+        publisher.wait_for_all_acked()
+        if number % TICKS == 0:
+            until(lambda number=number: len(heard) == number // TICKS + 1, "the news are heard", SOON_S)
+    assert heard == [(number, sent[number]) for number in (0.0, float(TICKS), 2.0 * TICKS)]
+    assert (simulated.node.looks - before) / 2 < 3 * 3 + SPARE  # a value, a tick, and what is due at it: that the next one is awaited
 
 
 def test_what_was_sent_before_a_tick_comes_before_what_is_due_at_it(simulated):

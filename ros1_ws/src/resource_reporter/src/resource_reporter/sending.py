@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import select
 import socket
+from collections.abc import Collection
 
 import rospy
 from rospy.impl.tcpros_pubsub import QueuedConnection
@@ -16,10 +17,14 @@ class DirectConnection(QueuedConnection):  # type: ignore[misc]  # rospy has no 
     that of those that wait the newest ``queue_size`` are sent, are the same; of a message that was begun the rest always is.
     """
 
+    not_heard: frozenset[str] = frozenset()
+    """Topics whose messages are not sent to the node itself."""
     _queue: list[bytes]
     _error: Exception | None
 
     def __init__(self, connection: rospy.impl.transport.Transport, queue_size: int) -> None:
+        own = connection.endpoint_id == rospy.get_name()
+        self._silent = own and connection.name in {rospy.resolve_name(topic) for topic in self.not_heard}
         self._writable = select.poll()
         self._writable.register(connection.socket, select.POLLOUT)
         self._rest = b""  # of a message of which the socket took a part
@@ -28,6 +33,8 @@ class DirectConnection(QueuedConnection):  # type: ignore[misc]  # rospy has no 
 
     def write_data(self, data: bytes) -> bool:
         """Send a message, or let it wait for those before it; what went wrong in the thread is raised here."""
+        if self._silent:
+            return True
         with self._lock:
             if self._error:
                 error, self._error = self._error, None
@@ -72,6 +79,10 @@ class DirectConnection(QueuedConnection):  # type: ignore[misc]  # rospy has no 
                         self._error = error
 
 
-def send_directly() -> None:
-    """Have all publishers of this process send so, to all who subscribe from now on."""
+def send_directly(*, not_heard: Collection[str] = ()) -> None:
+    """Have all publishers of this process send so, to all who subscribe from now on.
+
+    ``not_heard``: topics that the node publishes and subscribes to for what others say there; to itself it sends nothing on them.
+    """
+    DirectConnection.not_heard = frozenset(not_heard)
     rospy.topics.QueuedConnection = DirectConnection

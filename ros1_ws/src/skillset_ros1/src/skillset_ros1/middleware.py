@@ -19,7 +19,7 @@ from roslib.message import get_message_class
 from std_msgs.msg import Header
 
 from alula.runtime.codecs import Codecs, set_stamp, stamp_ns_of
-from alula.runtime.middleware import CALL_S, Goal, GoalListener, OnError, OnHeartbeat, OnReply, OnValue, Serve, Topic
+from alula.runtime.middleware import CALL_S, Goal, GoalListener, OnError, OnHeartbeat, OnReply, OnValue, Serve, Topic, thinned
 from alula.runtime.timers import Job
 from skillset_ros1.actions import RospyLink, RospyServer, is_connected
 from skillset_ros1.base import RospyBase
@@ -67,7 +67,7 @@ class RospyMiddleware(RospyBase):
     def subscribe(self, topic: Topic, callback: OnValue) -> Callable[[], bool]:
         """Follow a topic; the type of a data comes with each message."""
         codec = self._codecs.topic(topic)
-        take: OnValue = lambda message: callback(codec.decode(message))  # noqa: E731
+        take = thinned(lambda message: callback(codec.decode(message)), topic, self.now_ns)
         if topic.outside:
             self.listen(topic.name, codec.kind, take, queue_size=SOURCE_QUEUE)
             return lambda: True

@@ -52,7 +52,7 @@ from uav_guidance.messages import (
     vec3,
 )
 from uav_guidance.settings import GuidanceSettings
-from uav_guidance.stamping import FineClock, StampClock
+from uav_guidance.stamping import Alarm, FineClock, StampClock
 from uav_guidance.streams import STREAMS_HZ, StreamKeeper
 from uav_guidance.texts import TextAssembler
 
@@ -60,6 +60,7 @@ log = logging.getLogger(__name__)
 
 STATE_HZ = 20.0
 HEARTBEAT_PERIOD_S = 1.0
+LOOK_S = 0.3  # wall clock; how often a sleep looks whether the node is shut down
 BUFFER_BYTES = 1 << 16
 TRANSFORMS_WAITING = 50  # our own, at 50 Hz, come back on the same topic
 # The autopilot's agreement is bounded on the mission clock; this bounds the wait of a caller should that clock stand still.
@@ -76,7 +77,9 @@ class GuidanceNode:
         self._streams = StreamKeeper()
         self._stamps = StampClock()
         self._fine_clock = FineClock()
-        if rospy.get_param("/use_sim_time", False):
+        self._alarm = Alarm()
+        self._simulated = bool(rospy.get_param("/use_sim_time", False))
+        if self._simulated:
             rospy.Subscriber("/clock", Clock, self._on_clock, queue_size=10, tcp_nodelay=True)
         self._texts = TextAssembler()
         self._heartbeat_s = -HEARTBEAT_PERIOD_S
@@ -108,10 +111,18 @@ class GuidanceNode:
         while not rospy.is_shutdown():
             self._step()
             due_s = _next_due(due_s, _now_s())
-            with contextlib.suppress(rospy.ROSInterruptException):
-                rospy.sleep(due_s - _now_s())
+            self._sleep_until(due_s)
         self._link.close()
         self._reporter.close()
+
+    def _sleep_until(self, due_s: float) -> None:
+        """Sleep until a moment of the mission clock, or until it is set back, or the node is shut down."""
+        if not self._simulated or _now_s() == 0.0:  # rospy waits for a clock that was not heard yet
+            with contextlib.suppress(rospy.ROSInterruptException):
+                rospy.sleep(due_s - _now_s())
+            return
+        while not (rospy.is_shutdown() or self._alarm.wait(round(due_s * 1e9), LOOK_S)):
+            pass
 
     # ---- services ------------------------------------------------------------------------------------------------------
 
@@ -177,7 +188,9 @@ class GuidanceNode:
                 self._guidance.on_transform(newest)
 
     def _on_clock(self, message: Clock) -> None:
-        self._fine_clock.tick(message.clock.to_nsec(), time.monotonic_ns())
+        now_ns = message.clock.to_nsec()
+        self._fine_clock.tick(now_ns, time.monotonic_ns())
+        self._alarm.tick(now_ns)
 
     def _on_connect(self) -> None:
         with self._changed:
@@ -272,6 +285,6 @@ def _next_due(due_s: float, now_s: float) -> float:
 
 def main() -> None:
     """Run the guidance node, with its private parameters, until ROS shuts down."""
-    send_directly()
+    send_directly(not_heard=["/tf"])  # the transform from map to odom is heard there; 70 of 80 messages a second are its own
     rospy.init_node("uav_guidance")
     GuidanceNode(read_settings(GuidanceSettings())).run()

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections import deque
 from statistics import median_low
+from threading import Condition
 
 WINDOW = 250
 JUMP_NS = 500_000_000
@@ -39,6 +40,35 @@ class FineClock:
             return self._tick_ns
         passed = min((wall_ns - self._tick_wall_ns) / self._usual_wall_ns, 1.0)
         return self._tick_ns + int(max(passed, 0.0) * self._step_ns)
+
+
+class Alarm:
+    """Wakes a thread at a moment of a clock whose ticks another thread tells; ``rospy.sleep`` wakes its caller at each of them."""
+
+    def __init__(self) -> None:
+        self._ticked = Condition()
+        self._now_ns = self._due_ns = 0
+        self._set_back = False
+
+    def tick(self, now_ns: int) -> None:
+        """Take a tick."""
+        with self._ticked:
+            self._set_back |= now_ns < self._now_ns
+            self._now_ns = now_ns
+            if self._over:
+                self._ticked.notify()
+
+    def wait(self, due_ns: int, timeout_s: float) -> bool:
+        """Wait for a moment, or until the clock is set back, at most ``timeout_s`` of wall clock; tell whether the wait is over."""
+        with self._ticked:
+            self._due_ns = due_ns
+            over = self._ticked.wait_for(lambda: self._over, timeout_s)
+            self._set_back &= not over
+            return over
+
+    @property
+    def _over(self) -> bool:
+        return self._set_back or self._now_ns >= self._due_ns
 
 
 class StampClock:

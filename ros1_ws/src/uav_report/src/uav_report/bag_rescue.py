@@ -13,12 +13,16 @@ from alula.report.files import Problems, ReportError
 BAG = "functional.bag"
 
 
-def usable_bag(folder: Path, problems: Problems) -> Path | None:
-    """Return an indexed bag, made from ``functional.bag.active`` if need be; None, with a problem noted, if there is none."""
+def usable_bag(folder: Path, problems: Problems) -> rosbag.Bag | None:
+    """Return an indexed bag, open, made from ``functional.bag.active`` if need be; None, with a problem noted, if there is none.
+
+    It is the caller's to close. Opening it reads the index, which takes as long as reading the messages of the report.
+    """
     finished = folder / BAG
     active = folder / f"{BAG}.active"
-    if finished.exists() and _is_indexed(finished):
-        return finished
+    bag = _indexed(finished) if finished.exists() else None
+    if bag is not None:
+        return bag
     damaged = finished if finished.exists() else active
     if not damaged.exists():
         problems.note(f"{BAG} is missing: nothing is known of the vehicle's true path")
@@ -29,15 +33,19 @@ def usable_bag(folder: Path, problems: Problems) -> Path | None:
         problems.note(f"{damaged.name} was cut off and nothing could be recovered of it: {error}")
         return None
     problems.note(f"{damaged.name} was cut off; {BAG} holds what could be recovered of it")
-    return finished
+    return rosbag.Bag(str(finished))
 
 
-def _is_indexed(path: Path) -> bool:
+def _indexed(path: Path) -> rosbag.Bag | None:
+    """Return an open bag; None where it has no index, or no message."""
     try:
-        with rosbag.Bag(str(path)) as bag:
-            return bool(bag.get_message_count())
+        bag = rosbag.Bag(str(path))
     except (rosbag.ROSBagException, OSError):
-        return False
+        return None
+    if bag.get_message_count():
+        return bag
+    bag.close()
+    return None
 
 
 def _reindex_copy(damaged: Path, copy: Path) -> None:
@@ -47,5 +55,7 @@ def _reindex_copy(damaged: Path, copy: Path) -> None:
         for _ in bag.reindex():
             pass
     # Only what was written counts: the open bag also remembers messages of a chunk that it gave up halfway.
-    if not _is_indexed(copy):
+    recovered = _indexed(copy)
+    if recovered is None:
         raise ReportError("it holds no whole chunk of messages")
+    recovered.close()

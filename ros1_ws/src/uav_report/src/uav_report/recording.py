@@ -3,19 +3,17 @@
 from __future__ import annotations
 
 import json
-from collections.abc import Iterator
 from dataclasses import dataclass, field
 from pathlib import Path
-from typing import Any, Protocol
+from typing import Protocol
 
 import numpy as np
-import rosbag
 from numpy.typing import NDArray
 
 from alula.common.faults import FaultChange
 from alula.report.files import Problems, finite, mapping
 from alula.report.observed import fault_changes
-from uav_report.bag_rescue import usable_bag
+from uav_report.bag_rescue import BAG, usable_bag
 
 TRUE_POSE = "/sim/true_pose"
 SIM_STATE = "/sim/state"
@@ -133,16 +131,16 @@ class _Samples:
 
 def read_recording(folder: Path, problems: Problems) -> Recording:
     """Read the run's bag, recovering it if it was cut off; what it lacks is None in the result."""
-    path = usable_bag(folder, problems)
-    if path is None:
+    bag = usable_bag(folder, problems)
+    if bag is None:
         return Recording()
     truth, estimate = _Samples(), _Samples()
     guidance: list[GuidanceAccount] = []
     simulator: list[str] = []
     health: dict[str, list[HealthChange]] = {sensor: [] for sensor in HEALTH.values()}
     map_points: int | None = None
-    with problems.survive(f"{path.name} could be read in part only"):
-        for topic, message in _messages(path):
+    with bag, problems.survive(f"{BAG} could be read in part only"):
+        for topic, message, _ in bag.read_messages(topics=[TRUE_POSE, SIM_STATE, GUIDANCE, MAPPING, *HEALTH]):
             if topic == TRUE_POSE:
                 truth.add(message.header.stamp.to_sec(), message.pose.position)
             elif topic == GUIDANCE:
@@ -165,12 +163,6 @@ def read_recording(folder: Path, problems: Problems) -> Recording:
         map_points=map_points,
         health=tuple(sorted((change for changes in health.values() for change in changes), key=lambda change: change.t_s)),
     )
-
-
-def _messages(path: Path) -> Iterator[tuple[str, Any]]:
-    with rosbag.Bag(str(path)) as bag:
-        for topic, message, _ in bag.read_messages(topics=[TRUE_POSE, SIM_STATE, GUIDANCE, MAPPING, *HEALTH]):
-            yield topic, message
 
 
 def _simulator_account(texts: list[str], problems: Problems) -> SimulatorAccount | None:
