@@ -92,6 +92,32 @@ def test_an_expression_that_is_called_as_a_folder_is_selects_tests_and_no_part()
     assert "2 deselected" in done.stdout
 
 
+PLACES = {
+    "flights": "tests/test_endings.py",
+    "library": "lib/test/model",
+    "ROS 1 world": "flight/test/test_members.py",
+    "across the rooms": "tests/test_manifests.py",
+    "ROS 2 world": "bridge/ros_bridge/test/test_ros_bridge_layout.py",
+}
+
+
+def test_each_part_is_run_once_though_there_are_more_than_lanes_and_shown_one_after_the_other(tmp_path: Path) -> None:
+    for entry in Path(os.environ["ALULA_STATE"]).iterdir():  # what is installed, and logs of its own
+        if not entry.name.startswith("test-"):
+            (tmp_path / entry.name).symlink_to(entry)
+    command = [ALULA_ROOT / "tests/run", *PLACES.values(), "-k", "no_test_is_called_so"]
+    environment = {name: value for name, value in os.environ.items() if not name.startswith("OMP_")}  # by which nproc goes
+    environment["ALULA_STATE"] = str(tmp_path)
+    done = subprocess.run(command, capture_output=True, text=True, check=False, env=environment, cwd=ALULA_ROOT)
+    assert done.returncode == 5, done.stdout + done.stderr
+    shown = [line for line in done.stdout.splitlines() if line.startswith("==") and line.endswith("==") and "/" in line]
+    assert shown == [f"== {name}: {place} ==" for name, place in PLACES.items()]
+    logs = {path.name: path.read_text(encoding="utf-8") for path in tmp_path.glob("test-*.log")}
+    assert {name: log.splitlines()[0] for name, log in logs.items()} == {
+        f"test-{name.replace(' ', '-')}.log": f"== {name}: {place} ==" for name, place in PLACES.items()
+    }
+
+
 DPKG = """\
 #!/bin/sh
 sed 's/^/installed /' "{packages}"

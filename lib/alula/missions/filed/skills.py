@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
+from functools import partial
 
 from alula.missions.blackboard import Blackboard
 from alula.missions.leaves import SkillLeaf
@@ -12,7 +13,7 @@ from alula.missions.skillset import Client
 from alula.model.execution_state import ExecutionState
 from alula.model.model import Resource, Skill, Skillset
 from alula.trees.node import Action, Condition, Wiring
-from alula.trees.palette import NodeType, Palette
+from alula.trees.palette import Palette
 from alula.trees.status import FAILURE, IDLE, RUNNING, SUCCESS, Answer
 
 
@@ -34,12 +35,11 @@ class SkillNode(Action):
     whatever comes of it; only what had ended since the last tick has its own outcome and outputs.
     """
 
-    crew: Crew
-    model: Skill
-    skillset: str
-
-    def __init__(self, wiring: Wiring) -> None:
+    def __init__(self, wiring: Wiring, model: Skill, skillset: str, crew: Crew) -> None:
         super().__init__(wiring)
+        self.crew = crew
+        self.model = model
+        self.skillset = skillset
         client = self.crew.clients[self.skillset]
         success = str(self.get(SUCCESS_PORT)).split(SEPARATOR)
         self.leaf: SkillLeaf[Blackboard] = SkillLeaf(
@@ -98,9 +98,11 @@ class SkillNode(Action):
 class ResourceNode(Condition):
     """Succeeds when a resource is in a state."""
 
-    crew: Crew
-    model: Resource
-    skillset: str
+    def __init__(self, wiring: Wiring, model: Resource, skillset: str, crew: Crew) -> None:
+        super().__init__(wiring)
+        self.crew = crew
+        self.model = model
+        self.skillset = skillset
 
     def update(self) -> Answer:
         """Ask."""
@@ -112,14 +114,11 @@ def robot_nodes(skillsets: Sequence[Skillset], crew: Crew | None = None) -> Pale
     """Return skills as actions, and resources as conditions; without a crew they can be checked and drawn, and not be ticked."""
     palette = Palette()
     for one in skillsets:
+        # No class for each: isinstance asks every subclass of a base that there is, and a campaign makes missions by the thousand.
         for skill in one.skills:
-            palette.add(_ticked(skill_type(one.name, skill), SkillNode, skill, one.name, crew))
+            known = skill_type(one.name, skill)
+            palette.add(known if crew is None else replace(known, make=partial(SkillNode, model=skill, skillset=one.name, crew=crew)))
         for resource in one.resources:
-            palette.add(_ticked(resource_type(one.name, resource), ResourceNode, resource, one.name, crew))
+            known = resource_type(one.name, resource)
+            palette.add(known if crew is None else replace(known, make=partial(ResourceNode, model=resource, skillset=one.name, crew=crew)))
     return palette
-
-
-def _ticked(known: NodeType, node: type[SkillNode | ResourceNode], model: Skill | Resource, skillset: str, crew: Crew | None) -> NodeType:
-    if crew is None:
-        return known
-    return replace(known, make=type(known.name, (node,), {"crew": crew, "model": model, "skillset": skillset, "__doc__": node.__doc__}))

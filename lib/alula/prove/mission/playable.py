@@ -8,6 +8,7 @@ from __future__ import annotations
 
 from collections.abc import Iterator
 from dataclasses import dataclass, replace
+from functools import lru_cache
 
 from alula.model.conditions import data_of
 from alula.model.expressions import And, Expression, Not, ResourceIs
@@ -28,6 +29,7 @@ class Playable:
     data: str = ""
 
 
+@lru_cache(maxsize=32)  # many runs are played of one mission
 def playable(skillset: Skillset) -> Playable:
     """Return a skillset without inputs, outputs and data, and with the arrows that the search counts as extern."""
     abstraction = searched(skillset, Deadline.after(30.0))

@@ -7,16 +7,30 @@ at situations at rest, from one tick to the next: the mission never ends after o
 from __future__ import annotations
 
 from collections import deque
-from collections.abc import Callable, Iterator, Mapping
+from collections.abc import Iterator, Mapping
+from dataclasses import dataclass
+from functools import partial
 from itertools import product
 
 from alula.prove.limits import Deadline, OutOfTimeError
 from alula.prove.mission.calm import calm_of, reaching
 from alula.prove.mission.fitting import Values, agree, all_values, answers
+from alula.prove.mission.measured import DATA
+from alula.prove.mission.oracle import Answer, Asked, Question
 from alula.prove.mission.regions import Regions
 from alula.prove.mission.state import Event, State
+from alula.prove.mission.ticking import Outcome
 from alula.prove.mission.words import choice
 from alula.trees.node import Node
+
+
+@dataclass(frozen=True)
+class _AfterTick:
+    """What is known of a tick's outcome: what it was told of data, and to what it has brought the managers of each skillset."""
+
+    ticked: Outcome
+    about_data: tuple[Asked, ...]
+    come: tuple[dict[int, tuple[int, ...]], ...]
 
 
 class Waits:
@@ -27,6 +41,9 @@ class Waits:
         self._system = regions.system
         self._calm = calm_of(regions.system, terminating=True)
         self._at_rest: dict[tuple[int, int], tuple[int, ...]] = {}
+        self._after_ticks: dict[int, _AfterTick] = {}
+        """By the identity of what a tick comes to, which the ticker keeps: these are asked for of millions of situations."""
+        self._answers: dict[Question, tuple[int, dict[int, Answer]]] = {}
         self._before: dict[State, list[State]] = {}
         self._after: dict[State, list[State]] = {}
         self._ends: set[State] = set()
@@ -104,10 +121,12 @@ class Waits:
                 sorted((one for one in closure.all if self._rests(place, one)), key=closure.depth.__getitem__)
                 for place, closure in enumerate(region.closures)
             ]
+            deadline.check()
             for choices in self._one_dead(resting):
                 for managers in product(*choices):
-                    found.setdefault(State(region.memory, managers), number)
-                    deadline.check()
+                    if (region.memory, managers) not in found:
+                        found[State(region.memory, managers)] = number
+                        deadline.check()
 
     def _one_dead(self, resting: list[list[int]]) -> Iterator[list[list[int]]]:
         """Yield choices with the managers of one skillset dead at most: with those of several there are too many."""
@@ -127,9 +146,11 @@ class Waits:
             deadline.doing = f"waits: {len(waiting)} situations to look at"
             deadline.check()
             state = waiting.popleft()
-            for after in self._next(state, values):
+            come = list(self._next(state, values))
+            if come:
+                self._after[state] = come
+            for after in come:
                 self._before.setdefault(after, []).append(state)
-                self._after.setdefault(state, []).append(after)
                 if self._over(after.memory):
                     self._ends.add(after)
                 elif after not in seen:
@@ -140,18 +161,38 @@ class Waits:
 
     def _next(self, state: State, values: Values) -> Iterator[State]:
         """Yield the situations at rest after a tick."""
-        system, regions = self._system, self._regions
-        view: Callable[[tuple[object, ...]], object] = lambda question: system.answer(  # noqa: E731
-            state.managers[system.place_of(question)], question
-        )
-        for ticked in system.ticker.outcomes(state.memory, view):
-            if not agree(values, ticked.choices):
+        for ticked in self._system.ticker.outcomes(state.memory, partial(self._answer, state.managers)):
+            known = self._after_ticks.get(id(ticked)) or self._after_tick(ticked)
+            if known.about_data and not agree(values, known.about_data):
                 continue
             if ticked.started:
                 self._asking.add(state)
-            after = [self._resting(place, regions.after(place, one, ticked)) for place, one in enumerate(state.managers)]
+            after = [
+                come.get(one) or self._come(place, one, known)
+                for place, (one, come) in enumerate(zip(state.managers, known.come, strict=True))
+            ]
             for managers in product(*after):
                 yield State(ticked.memory, managers)
+
+    def _answer(self, managers: tuple[int, ...], question: Question) -> Answer:
+        """Answer an observation by what the managers that it is of have answered before."""
+        known = self._answers.get(question)
+        if known is None:
+            known = self._answers[question] = (self._system.place_of(question), {})
+        place, answers = known
+        number = managers[place]
+        if number not in answers:
+            answers[number] = self._system.answer(number, question)
+        return answers[number]
+
+    def _after_tick(self, ticked: Outcome) -> _AfterTick:
+        about_data = tuple(one for one in ticked.choices if one.question[0] == DATA)
+        return self._after_ticks.setdefault(id(ticked), _AfterTick(ticked, about_data, tuple({} for _ in self._system.skillsets)))
+
+    def _come(self, place: int, number: int, known: _AfterTick) -> tuple[int, ...]:
+        """Return managers at rest after what a tick has asked for."""
+        come = known.come[place][number] = self._resting(place, self._regions.after(place, number, known.ticked))
+        return come
 
     def _over(self, memory: int) -> bool:
         return self._system.ticker.memories[memory].end is not None

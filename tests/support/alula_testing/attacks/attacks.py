@@ -61,6 +61,7 @@ def freeze(graph: LiveGraph) -> Found:
     before = client.start("hover", duration=1.0)
     graph.until(lambda: before.state is ExecutionState.RUNNING, f"{before} runs")
     os.kill(graph.managers.pid, signal.SIGSTOP)
+    os.waitid(os.P_PID, graph.managers.pid, os.WSTOPPED | os.WEXITED | os.WNOWAIT)  # on a busy machine threads run on for a while
     meanwhile = client.start("hover", duration=1.0)
     graph.until(lambda: before.done and meanwhile.done, f"{before} and {meanwhile} are given up")
     os.kill(graph.managers.pid, signal.SIGCONT)
