@@ -23,6 +23,7 @@ from alula.trees.groot.watching import Watch
 from alula.trees.reading import read_text
 from alula.trees.standard import standard_palette
 from alula.trees.status import NAMES
+from alula_testing.waits import until
 
 TICKS = 12
 TREES = {
@@ -191,13 +192,9 @@ def test_logs_are_alike(both):
     oracle, ours = both
     oracle.log.flush()
     wanted = [(one.uid, one.status) for one in read_log(ours.path).transitions]
-    found = []
-    for _ in range(200):  # its own thread writes
-        found = [(one.uid, one.status) for one in read_log(oracle.path).transitions]
-        if len(found) >= len(wanted):
-            break
-        oracle.viewer.ask("S")
-    assert wanted == found
+    logged = lambda: [(one.uid, one.status) for one in read_log(oracle.path).transitions]  # noqa: E731
+    until(lambda: oracle.viewer.ask("S") and len(logged()) >= len(wanted), "its own thread has written")
+    assert wanted == logged()
     theirs, mine = (one.path.read_bytes() for one in both)
     assert mine[:19] == theirs[:19]
     for data, one in ((theirs, oracle), (mine, ours)):
