@@ -6,7 +6,6 @@ answer comes to a callback; reports are kept and passed on to listeners.
 
 from __future__ import annotations
 
-import functools
 from collections.abc import Callable, Collection
 from typing import Any
 
@@ -22,19 +21,15 @@ from uav_msgs.srv import Command, SetHeadingReference, SetPositionReference, Str
 from skillset_ros2.base import QUIET
 from uav_skills.calls import CallQueue, Reply, ignore_response
 
-WATCH_PERIOD_S, EARLY_S = 0.1, 0.01
-SILENT_S = 0.15
-"""After a message, the timer begins to watch so much later: the sensors' messages come ten times a second, not quite evenly."""
+WATCH_PERIOD_S = 0.1
 LONGEST_STEP_S = 0.2
 MOTIONS = ("position", "heading")  # references that move the vehicle, and that may be stopped at any time
 LAST_FEW = QoSProfile(depth=10)
 LATCHED = QoSProfile(depth=1, durability=DurabilityPolicy.TRANSIENT_LOCAL)
 
 
-class Watch:
-    """Calls watchers about ten times a second of mission clock: beside the messages that come anyway, or by a timer while none do.
-
-    Each message wakes the process, and so would a timer: one that rings between messages costs as much as they do.
+class FunctionalPart:
+    """One part of the functional layer: a queue of calls, and a watch that notices when nothing is heard.
 
     ``now_s`` is mission clock without its jumps: when the clock itself did not come through for a while (the bridge was started
     again), nothing else came either, and what was not heard meanwhile must not count as silent.
@@ -44,75 +39,32 @@ class Watch:
         self.now_s = 0.0
         self._node = node
         self._clock_s = self._read_clock_s()
-        self._watched_s = 0.0
+        self._group = ReentrantCallbackGroup()
+        self._calls = CallQueue(lambda: self.now_s)
         self._watchers: list[Callable[[], None]] = []
-        self._timer: Any = node.create_timer(WATCH_PERIOD_S, self._ring, callback_group=ReentrantCallbackGroup())
-        self._set_for_s = WATCH_PERIOD_S
+        node.create_timer(WATCH_PERIOD_S, self._watch, callback_group=self._group)
 
-    def add(self, watcher: Callable[[], None]) -> None:
-        """Call ``watcher`` from now on."""
+    def watch(self, watcher: Callable[[], None]) -> None:
+        """Call ``watcher`` ten times a second of mission clock."""
         self._watchers.append(watcher)
-
-    def hear(self, tell: Callable[[Any], None], message: Any) -> None:
-        """Tell of a message, and watch where it is time to."""
-        self._pass_time()
-        tell(message)
-        if self.now_s - self._watched_s > WATCH_PERIOD_S - EARLY_S:
-            self._watch()
-        self._set(SILENT_S)
-
-    def _ring(self) -> None:
-        self._pass_time()
-        self._watch()
-        if self._set_for_s != WATCH_PERIOD_S:
-            self._set(WATCH_PERIOD_S)
-
-    def _set(self, period_s: float) -> None:
-        if period_s != self._set_for_s:
-            self._set_for_s = period_s
-            self._timer.timer_period_ns = round(period_s * 1e9)
-        self._timer.reset()
 
     def _read_clock_s(self) -> float:
         return int(self._node.get_clock().now().nanoseconds) / 1e9
 
-    def _pass_time(self) -> None:
+    def _watch(self) -> None:
         clock_s = self._read_clock_s()
         self.now_s += min(max(clock_s - self._clock_s, 0.0), LONGEST_STEP_S)
         self._clock_s = clock_s
-
-    def _watch(self) -> None:
-        self._watched_s = self.now_s
+        self._calls.tick()
         for watcher in self._watchers:
             watcher()
-
-
-class FunctionalPart:
-    """One part of the functional layer: a queue of calls, and a watch that notices when nothing is heard; parts may share it."""
-
-    def __init__(self, node: Node, watch: Watch | None = None) -> None:
-        self._node = node
-        self._watch = watch or Watch(node)
-        self._group = ReentrantCallbackGroup()
-        self._calls = CallQueue(lambda: self.now_s)
-        self._watch.add(self._calls.tick)
-
-    @property
-    def now_s(self) -> float:
-        """Mission clock without its jumps, seconds."""
-        return self._watch.now_s
-
-    def watch(self, watcher: Callable[[], None]) -> None:
-        """Call ``watcher`` about ten times a second of mission clock."""
-        self._watch.add(watcher)
 
     def _client(self, service_type: Any, name: str) -> Any:
         return self._node.create_client(service_type, name, callback_group=self._group)
 
     def _subscribe(self, message_type: Any, topic: str, callback: Callable[[Any], None], qos: QoSProfile = LAST_FEW) -> None:
-        hear = functools.partial(self._watch.hear, callback)
         # The data manager, which has most of these topics, too, gets rclpy's warnings; each is an entity that every turn gathers.
-        self._node.create_subscription(message_type, topic, hear, qos, callback_group=self._group, event_callbacks=QUIET)
+        self._node.create_subscription(message_type, topic, callback, qos, callback_group=self._group, event_callbacks=QUIET)
 
 
 class GuidanceApi(FunctionalPart):
@@ -176,8 +128,8 @@ class GuidanceApi(FunctionalPart):
 class DepthApi(FunctionalPart):
     """A sensor that looks ahead: ``node_name`` is zed_depth or lidar_obstacles."""
 
-    def __init__(self, node: Node, watch: Watch, node_name: str) -> None:
-        super().__init__(node, watch)
+    def __init__(self, node: Node, node_name: str) -> None:
+        super().__init__(node)
         self.heard_s: float | None = None
         self._enable = self._client(SetBool, f"{node_name}/enable")
         self._subscribe(Obstacle, f"{node_name}/obstacle", self._on_obstacle)

@@ -9,7 +9,7 @@ from perception_managers.hooks import AbstractLidarDepthmapSkill, AbstractZedDep
 
 from alula.runtime.hooks import SkillHooks
 from uav_skills.decisions import decide_watch
-from uav_skills.functional import DepthApi, Watch
+from uav_skills.functional import DepthApi
 from uav_skills.serve import serve
 from uav_skills.watched import WatchedSkill
 
@@ -55,10 +55,9 @@ class LidarDepthmap(_Depthmap, AbstractLidarDepthmapSkill):  # type: ignore[misc
 
 def make_hooks(node: Node) -> dict[str, SkillHooks]:
     """Make the hooks of all skills of the skillset."""
-    watch = Watch(node)
     return {
-        "zed_depthmap": ZedDepthmap("ZED", DepthApi(node, watch, "zed_depth")),
-        "lidar_depthmap": LidarDepthmap("LiDAR", DepthApi(node, watch, "lidar_obstacles")),
+        "zed_depthmap": ZedDepthmap("ZED", DepthApi(node, "zed_depth")),
+        "lidar_depthmap": LidarDepthmap("LiDAR", DepthApi(node, "lidar_obstacles")),
     }
 
 
