@@ -93,11 +93,11 @@ def test_an_expression_that_is_called_as_a_folder_is_selects_tests_and_no_part()
 
 
 PLACES = {
+    "ROS 1 world": "flight/test/test_members.py",
+    "ROS 2 world": "bridge/ros_bridge/test/test_ros_bridge_layout.py",
+    "across the rooms": "tests/test_manifests.py",
     "flights": "tests/test_endings.py",
     "library": "lib/test/model",
-    "ROS 1 world": "flight/test/test_members.py",
-    "across the rooms": "tests/test_manifests.py",
-    "ROS 2 world": "bridge/ros_bridge/test/test_ros_bridge_layout.py",
 }
 
 
