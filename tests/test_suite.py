@@ -85,6 +85,30 @@ def test_a_part_tells_its_progress_to_the_suite_and_knows_the_time_left_the_seco
     assert all(line.endswith(" s left") for line in lines())
 
 
+LEAVES = """
+import threading
+
+def test_one():
+    pass
+
+def test_two():
+    threading.Thread(target=threading.Event().wait, name="left over").start()
+
+def test_three():
+    pass
+"""
+
+
+def test_a_thread_that_is_left_over_is_named_with_its_test_and_ends_the_tests(tmp_path: Path) -> None:
+    (tmp_path / "test_part.py").write_text(LEAVES, encoding="utf-8")
+    (tmp_path / "conftest.py").write_text("import alula_testing.ending\nalula_testing.ending.HANGS_S = 0.5\n", encoding="utf-8")
+    done = subprocess.run(pytest_over(tmp_path, "alula_testing.ending"), cwd=tmp_path, capture_output=True, text=True, check=False)
+    assert done.returncode == 1, done.stdout + done.stderr
+    assert "3 passed" in done.stdout
+    told_of = [line for line in done.stderr.splitlines() if line.startswith("alula test:")]
+    assert [("left over" in line, line.rpartition(":")[2]) for line in told_of] == [(True, "test_two")]
+
+
 def test_an_expression_that_is_called_as_a_folder_is_selects_tests_and_no_part() -> None:
     command = [ALULA_ROOT / "tests/run", "tests/test_manifests.py", "-k", "lib", "--collect-only"]
     done = subprocess.run(command, capture_output=True, text=True, check=False)
