@@ -40,3 +40,10 @@ def points_of(ranges_m: NDArray[np.float64], angle_min_rad: float, angle_step_ra
     angles = angle_min_rad + angle_step_rad * np.arange(len(ranges_m))
     hit = np.isfinite(ranges_m)
     return np.column_stack((np.cos(angles[hit]), np.sin(angles[hit]))) * ranges_m[hit, None]
+
+
+def along(ends: Points, begin_m: float, step_m: float, short_m: float) -> tuple[NDArray[np.float64], NDArray[np.bool_]]:
+    """Return points along the beams to some ends, (N, K, 2), in steps; and which of them are so far before the beam's end, (N, K)."""
+    far = np.linalg.norm(ends, axis=1)
+    steps = np.arange(begin_m, far.max(initial=begin_m), step_m)
+    return ends[:, None, :] / far[:, None, None] * steps[None, :, None], steps[None, :] < far[:, None] - short_m

@@ -15,7 +15,7 @@ from numpy.typing import NDArray
 from scipy.ndimage import map_coordinates
 from scipy.optimize import least_squares
 
-from rover_navigation.geometry import Points, Pose, compose, inverse, transformed, wrapped
+from rover_navigation.geometry import Points, Pose, along, compose, inverse, transformed, wrapped
 from rover_navigation.grid_map import GridMap
 
 MATCHES_M = 0.1  # a beam matches that ends so near to something that the map has
@@ -115,11 +115,9 @@ def apart(a: Pose, b: Pose) -> bool:
 
 def beams_through(grid: GridMap, pose: Pose, points: Points) -> NDArray[np.bool_]:
     """Return (N,) which beams would have gone through something that is on the map to their ends, the points in base_link."""
-    far = np.linalg.norm(points, axis=1)
-    steps = np.arange(RIM_M, far.max(initial=RIM_M), STEP_M)
-    looks = points[:, None, :] * (steps[None, :] / far[:, None])[:, :, None]
-    there = grid.occupied[grid.cells(transformed(pose, looks.reshape(-1, 2)))].reshape(len(points), -1)
-    return np.asarray((there & (steps[None, :] < far[:, None] - SHORT_M)).any(axis=1))
+    looks, before = along(points, RIM_M, STEP_M, SHORT_M)
+    there = grid.occupied[grid.cells(transformed(pose, looks.reshape(-1, 2)))].reshape(before.shape)
+    return np.asarray((there & before).any(axis=1))
 
 
 def _searched(grid: GridMap, here: Points) -> NDArray[np.float64]:

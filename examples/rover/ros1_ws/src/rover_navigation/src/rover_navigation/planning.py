@@ -7,7 +7,7 @@ from numpy.typing import NDArray
 from scipy.ndimage import distance_transform_edt
 from skimage.graph import route_through_array
 
-from rover_navigation.geometry import Points, Pose, transformed
+from rover_navigation.geometry import Points, Pose, along, transformed
 from rover_navigation.grid_map import GridMap
 
 RADIUS_M = 0.25
@@ -57,10 +57,7 @@ class Surroundings:
         )
 
     def _clear(self, pose: Pose, ends: Points) -> None:
-        far = np.linalg.norm(ends, axis=1)
-        steps = np.arange(RADIUS_M, far.max(initial=RADIUS_M), self.grid.resolution_m)
-        rays = ends[:, None, :] / far[:, None, None] * steps[None, :, None]
-        before = steps[None, :] < far[:, None] - 2.0 * self.grid.resolution_m
+        rays, before = along(ends, RADIUS_M, self.grid.resolution_m, 2.0 * self.grid.resolution_m)
         self.seen_s[self.grid.cells(transformed(pose, rays[before]))] = -np.inf
 
 
