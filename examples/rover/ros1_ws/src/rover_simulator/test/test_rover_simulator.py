@@ -130,6 +130,31 @@ def test_time_waits_for_those_that_lag_and_not_for_the_dead():
     assert lockstep.lagging(5.45, 11.0) == ["/a"]
 
 
+def test_time_waits_for_those_who_have_the_odometry_and_not_yet_the_scans_of_that_time():
+    lockstep = Lockstep(["/health/done", "/health/scans=scans"], 10.0)
+    for topic in lockstep.topics:
+        lockstep.heard(topic, 5.0)
+    for step in range(1, 41):  # no scan comes: the laser is dead, and who takes scans has nothing to take
+        lockstep.heard("/health/done", 5.0 + 0.05 * step)
+        assert lockstep.lagging(5.0 + 0.05 * step, 0.0) == []
+    lockstep.scanned(7.05)
+    lockstep.heard("/health/scans", 7.05)
+    lockstep.scanned(7.15)
+    lockstep.heard("/health/done", 7.25)
+    assert lockstep.lagging(7.25, 0.0) == []  # the last scan may be under way
+    lockstep.scanned(7.25)
+    assert lockstep.lagging(7.25, 0.0) == ["/health/scans"]
+    lockstep.heard("/health/scans", 7.15)
+    assert lockstep.lagging(7.25, 0.0) == []
+    lockstep.scanned(7.35)
+    lockstep.heard("/health/scans", 7.35)  # one of them got lost on the way
+    assert lockstep.lagging(7.35, 0.0) == []
+    lockstep.gone("/health/scans")
+    lockstep.scanned(7.45)
+    lockstep.scanned(7.55)
+    assert lockstep.lagging(7.35, 0.0) == []
+
+
 def test_the_share_of_a_processor_is_what_steps_get_of_it_lately():
     processor = ProcessorShare()
     processor.worked(0.0, 0.0)

@@ -12,7 +12,7 @@ from geometry_msgs.msg import PoseWithCovarianceStamped, Twist
 from nav_msgs.msg import Odometry
 from node_core import Host, Input, Output
 from sensor_msgs.msg import BatteryState, LaserScan
-from std_msgs.msg import Bool, Float32, String
+from std_msgs.msg import Bool, Float32, Header, String
 
 from rover_navigation.health import OK, BumperMonitor, LaserMonitor, PoseMonitor, WheelMonitor, WheelReading
 from rover_navigation.ros import pose_of
@@ -21,7 +21,8 @@ COMMAND_TIMEOUT_S = 0.5  # the base stops by itself when no command comes any mo
 
 NAME = "health"
 VERDICTS = Output("/health", String, queue_size=5, latch=True)
-OUTPUTS = (VERDICTS,)
+SCANS = Output("~scans", Header, queue_size=20, tcp_nodelay=True)  # up to which scan it has come: a simulator may wait for it
+OUTPUTS = (VERDICTS, SCANS)
 SKILLSETS = ("base", "perception", "power")
 
 
@@ -56,6 +57,7 @@ class Health:
 
     def _on_scan(self, scan: LaserScan) -> None:
         self._laser.scan(np.asarray(scan.ranges, dtype=np.float64), scan.header.stamp.to_sec())
+        self._host.publish(SCANS.topic, Header(stamp=scan.header.stamp))
 
     def _on_bumper(self, message: Bool) -> None:
         self._pressed = message.data

@@ -12,7 +12,7 @@ from geometry_msgs.msg import PoseWithCovarianceStamped, Twist
 from nav_msgs.msg import Odometry
 from node_core import Host, Input, Output
 from sensor_msgs.msg import LaserScan
-from std_msgs.msg import Float32
+from std_msgs.msg import Float32, Header
 from tf2_msgs.msg import TFMessage
 
 from rover_navigation.geometry import Points, Pose, compose, inverse, wrapped
@@ -30,7 +30,8 @@ STD_M, STD_RAD = 0.03, 0.01  # of a pose that fits
 NAME = "localization"
 POSE, QUALITY = Output("/localization/pose", PoseWithCovarianceStamped, 5), Output("/localization/quality", Float32, 5)
 COMMAND, TF = Output("/cmd_vel", Twist, 5, shared=True), Output("/tf", TFMessage, 20, shared=True)
-OUTPUTS = (POSE, QUALITY, COMMAND, TF)
+SCANS = Output("~scans", Header, 20, tcp_nodelay=True)  # up to which scan it has come: a simulator may wait for it
+OUTPUTS = (POSE, QUALITY, COMMAND, TF, SCANS)
 SearchEnd = Callable[[bool, str], None]
 """Told whether a search has found the pose, and in words how well it fits."""
 
@@ -103,6 +104,7 @@ class Localization:
             if not self._laser.repeats:
                 self._waiting[scan.header.stamp.to_nsec()] = points_of_scan(scan)
                 self._match()
+        self._host.publish(SCANS.topic, Header(stamp=scan.header.stamp))
 
     def _on_odometry(self, message: Odometry) -> None:
         stamp = message.header.stamp

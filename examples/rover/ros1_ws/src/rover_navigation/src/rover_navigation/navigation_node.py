@@ -61,6 +61,9 @@ class NavigationNode:
         rospy.Subscriber("/scan", LaserScan, self._on_scan, queue_size=2, tcp_nodelay=True)
         rospy.Subscriber("/bumper", Bool, self._on_bumper, queue_size=5)
         rospy.Subscriber("/battery_state", BatteryState, self._on_battery, queue_size=5)
+        self._scans = rospy.Publisher(
+            "~scans", Header, queue_size=20, tcp_nodelay=True
+        )  # up to which scan it has come, as ~done of all else
         self._done = DoneReporter()
         rospy.Subscriber("/odom", Odometry, self._on_odometry, queue_size=20, tcp_nodelay=True)
         for server in self._servers.values():
@@ -109,6 +112,10 @@ class NavigationNode:
                 self._around.forget()
 
     def _on_scan(self, scan: LaserScan) -> None:
+        self._take(scan)
+        self._scans.publish(Header(stamp=scan.header.stamp))
+
+    def _take(self, scan: LaserScan) -> None:
         with self._lock:
             self._laser.scan(np.asarray(scan.ranges, dtype=np.float64), scan.header.stamp.to_sec())
             if self._laser.repeats:

@@ -1,4 +1,8 @@
-"""Lockstep: whether simulated time may go on, given how far the nodes that it waits for have come. No ROS, no clock of its own."""
+"""Lockstep: whether simulated time may go on, given how far the nodes that it waits for have come. No ROS, no clock of its own.
+
+A node that has taken all odometry may not have taken the scans of that time: they come over another connection, and on a busy machine
+later. Who judges by the clock whether scans still come is therefore also held against the scans that were published.
+"""
 
 from __future__ import annotations
 
@@ -9,12 +13,14 @@ from dataclasses import dataclass
 
 ROUNDING_S = 1e-6
 LIMIT_S = 0.1  # a node may be behind the clock by two steps
+SCANS = "scans"
 LEAST_SHARE, SHARE_STEPS = 0.02, 20.0  # steps over which a share is averaged
 
 
 @dataclass
 class _Follower:
     limit_s: float
+    scans: bool  # held against the scans: it has taken all but the last
     stamp_s: float | None = None  # of the last message; None: time does not wait for it
     lagging_since_s: float | None = None  # of what is waited by
 
@@ -23,9 +29,13 @@ class Lockstep:
     """Each topic carries a std_msgs/Header; heard from other threads than the one that asks."""
 
     def __init__(self, topics: Iterable[str], timeout_s: float) -> None:
-        """``topics``: each alone, or with the seconds that it may lag, as in ``/mission/heartbeat=0.3``."""
+        """``topics``: each alone, with the seconds that it may lag, as in ``/mission/heartbeat=0.3``, or ``/health/scans=scans``."""
         words = [topic.partition("=") for topic in topics]
-        self._followers = {topic: _Follower(float(limit) if limit else LIMIT_S) for topic, _, limit in words}
+        said = {topic: against for topic, _, against in words}
+        self._followers = {
+            topic: _Follower(float(against) if against not in {"", SCANS} else LIMIT_S, against == SCANS) for topic, against in said.items()
+        }
+        self._scans_s: tuple[float, float] | None = None  # stamps of the last scan but one, and of the last
         self._timeout_s = timeout_s
         self._lock = threading.Lock()
 
@@ -46,6 +56,11 @@ class Lockstep:
             follower = self._followers[topic]
             follower.stamp_s, follower.lagging_since_s = stamp_s, None
 
+    def scanned(self, stamp_s: float) -> None:
+        """Note that a scan is published."""
+        with self._lock:
+            self._scans_s = (stamp_s if self._scans_s is None else self._scans_s[1], stamp_s)
+
     def gone(self, topic: str) -> None:
         """Note that nothing publishes a topic any more: time goes on without it until it is heard again."""
         with self._lock:
@@ -57,13 +72,18 @@ class Lockstep:
             return [topic for topic, follower in self._followers.items() if self._lags(follower, now_s, waited_s)]
 
     def _lags(self, follower: _Follower, now_s: float, waited_s: float) -> bool:
-        if follower.stamp_s is None or now_s - follower.stamp_s <= follower.limit_s + ROUNDING_S:
+        if follower.stamp_s is None or self._behind_s(follower.stamp_s, follower, now_s) <= ROUNDING_S:
             return False
         follower.lagging_since_s = waited_s if follower.lagging_since_s is None else follower.lagging_since_s
         if waited_s - follower.lagging_since_s >= self._timeout_s:
             follower.stamp_s = None
             return False
         return True
+
+    def _behind_s(self, stamp_s: float, follower: _Follower, now_s: float) -> float:
+        if not follower.scans:
+            return now_s - stamp_s - follower.limit_s
+        return 0.0 if self._scans_s is None else self._scans_s[0] - stamp_s
 
 
 class ProcessorShare:

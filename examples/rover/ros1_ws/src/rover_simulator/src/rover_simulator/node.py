@@ -161,6 +161,7 @@ class SimulatorNode:
         simulation, now_ns = self._simulation, self._simulation.now_ns
         self._clock.publish(Clock(clock=messages.ros_time(now_ns)))
         if self._steps % SCAN_STEPS == 0 and (sweep := simulation.sweep()) is not None:
+            self._lockstep.scanned(simulation.now_s)
             self._scan.publish(messages.scan(sweep, now_ns))
         self._bumper.publish(Bool(simulation.bumper))
         wheels = simulation.wheels
