@@ -8,7 +8,7 @@ from alula.model.execution_state import ExecutionState
 from alula.model.json_form import to_json
 from alula.runtime.client import Client
 from alula.runtime.client.connection import DESCRIBE_S, DOUBT_S, RIVALS_NS
-from alula.runtime.client.goal import ACKNOWLEDGE_LIMIT, ACKNOWLEDGE_S, GRACE_S, SILENCE_S
+from alula.runtime.client.goal import ACKNOWLEDGE_LIMIT, ACKNOWLEDGE_S, GRACE_S, LOST_S, SILENCE_S
 from alula.runtime.core.events import ExecutionEvent, TransitionEvent
 from alula.runtime.local import VirtualClock
 from alula.runtime.middleware import EVENTS, RESOURCE_STATES, GoalResult, PublishedEvent, ResourceStates, ResourceStatus
@@ -162,6 +162,50 @@ def test_a_gap_in_the_events_has_the_endings_asked_for(graph, client):
     assert graph.link.asked == [handle.id]
     client._news.on_result(handle.id, GoalResult(S.TERMINATED, "DONE", "there", {}))
     assert not handle.done  # its event may still come, and say when it was
+    graph.run_for(LOST_S)
+    assert (handle.state, handle.result) == (S.TERMINATED, "DONE")
+
+
+def test_a_result_that_comes_long_before_its_event_waits_for_what_has_led_to_it(graph, client):
+    handle = running(graph, client)
+    seen = []
+    handle.add_done_callback(lambda _: seen.append((graph.clock.now_ns, client.resources)))
+    client._news.on_result(handle.id, GoalResult(S.RESOURCE_INVARIANT_VIOLATED, "has_sdk", "", {}))
+    graph.run_for(GRACE_S - 1.0)
+    graph.heard[EVENTS.name](PublishedEvent("one", TransitionEvent(3, 0, "sdk", "AVAILABLE", "UNAVAILABLE", "extern")))
+    graph.tell("one", handle, S.RESOURCE_INVARIANT_VIOLATED, sequence=4)
+    graph.run_for(GRACE_S - 1.0)
+    assert seen == []
+    graph.states("one", after=3, sdk="UNAVAILABLE")
+    assert seen == [(round(2e9 * (GRACE_S - 1.0)), {"sdk": "UNAVAILABLE"})]
+
+
+def test_a_state_is_shown_when_the_event_that_has_led_to_it_was_told(graph, client):
+    seen = []
+    client.on_event(lambda event: seen.append(event.sequence))
+    client.on_change(lambda states: seen.append(states["sdk"]))
+    graph.states("one", after=1, sdk="UNAVAILABLE")
+    graph.states("one", after=2, sdk="AVAILABLE")
+    assert (seen, client.resources) == ([], {"sdk": "AVAILABLE"})
+    for sequence, before, after in ((1, "AVAILABLE", "UNAVAILABLE"), (2, "UNAVAILABLE", "AVAILABLE")):
+        graph.heard[EVENTS.name](PublishedEvent("one", TransitionEvent(sequence, 0, "sdk", before, after, "extern")))
+    assert seen == [1, "UNAVAILABLE", 2, "AVAILABLE"]
+
+
+def test_a_state_whose_event_got_lost_is_shown_all_the_same_and_none_of_managers_that_are_no_more(graph, client):
+    graph.states("one", after=1, sdk="UNAVAILABLE")
+    graph.run_for(GRACE_S)
+    assert client.resources == {"sdk": "UNAVAILABLE"}
+    graph.states("one", after=2, sdk="AVAILABLE")
+    graph.heartbeat("two")
+    graph.states("two", sdk="UNAVAILABLE")
+    graph.run_for(GRACE_S)
+    assert client.resources == {"sdk": "UNAVAILABLE"}
+
+
+def test_an_end_whose_event_never_comes_is_told_all_the_same(graph, client):
+    handle = running(graph, client)
+    client._news.on_result(handle.id, GoalResult(S.TERMINATED, "DONE", "there", {}))
     graph.run_for(GRACE_S)
     assert (handle.state, handle.result) == (S.TERMINATED, "DONE")
 

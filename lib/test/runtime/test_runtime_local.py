@@ -85,7 +85,7 @@ def test_validate_refuses_in_its_own_words():
     assert (handle.outcome, handle.message) == ("NOT_VALIDATED", "300 m is too high")
 
 
-def test_changes_come_before_events_before_results():
+def test_events_come_before_the_changes_that_they_tell_of_before_results():
     world, client = make()
     world.run_for(0.0)
     order: list[str] = []
@@ -94,7 +94,7 @@ def test_changes_come_before_events_before_results():
     handle = client.start("takeoff", height=3.0)
     handle.add_done_callback(lambda _: order.append("result"))
     handle.wait(2.0)
-    assert order == ["REQUESTED", "USED", "axes", "RUNNING", "AVAILABLE", "axes", "TERMINATED", "result"]
+    assert order == ["REQUESTED", "axes", "USED", "RUNNING", "axes", "AVAILABLE", "TERMINATED", "result"]
 
 
 def test_progress_comes_every_period_of_the_model_and_ends_with_the_execution():

@@ -19,8 +19,11 @@ ACKNOWLEDGE_LIMIT = 12
 """So many times as long while the managers send messages about other goals."""
 SILENCE_S = 10.0
 """After so long without a message about an accepted goal, its result is asked for."""
-GRACE_S = 0.5
-"""An end waits so long for the resources after its step, and a result for its event."""
+GRACE_S = 5.0
+"""An end waits so long (wall clock) for the resources after its step, and a result for its event: on a busy machine they come seconds
+apart, and who is told of an end before its cause takes the wrong way on. Managers that have gone are not waited for."""
+LOST_S = 0.5
+"""A result waits so long for its event where events got lost, which its own may be one of."""
 
 
 class News(Protocol):
@@ -69,6 +72,7 @@ class GoalTracker:
         self._acknowledged = False
         self._interrupt_wanted = False
         self._end: tuple[int, GoalResult] | None = None
+        self._grace_s = GRACE_S
         self._looks = 0
         self._heard = news.heard
         self._timer: Timer | None = None
@@ -111,7 +115,12 @@ class GoalTracker:
             self._acknowledge()
             self._end = (2**63, ending)
             self._cancel_timer()
-            self._timer = self._middleware.later(GRACE_S, self._finish)
+            self._timer = self._middleware.later(self._grace_s, self._finish)
+
+    def ask(self) -> None:
+        """Ask for the result, because events got lost."""
+        self._grace_s = LOST_S
+        self.link.request_result(self.handle.id)
 
     def settle(self) -> None:
         """End if the end is known, and the resources as they were after it."""

@@ -1,19 +1,21 @@
 """The messages of one skillset's managers as a client receives them, put into one order on the middleware's loop.
 
 The messages of different topics arrive in any order. Events are numbered, and resource states carry the number of the last event that
-they include; so a caller that learns of an execution's end sees the resources as they are after it.
+they include. So a caller that learns of an execution's end sees the resources as they are after it, and one that sees a resource's state
+has been told of the event that has led to it: a record of the events has all that a decision was made of.
 """
 
 from __future__ import annotations
 
 import threading
+from collections import deque
 from collections.abc import Callable, Mapping
 from typing import Any
 from weakref import WeakSet
 
 from alula.runtime.callbacks import Callbacks
 from alula.runtime.client.connection import Connection
-from alula.runtime.client.goal import GoalTracker
+from alula.runtime.client.goal import GRACE_S, GoalTracker
 from alula.runtime.core.events import EngineEvent, ExecutionEvent, TransitionEvent
 from alula.runtime.core.records import ExecutionRecord, SkillRecord
 from alula.runtime.middleware import (
@@ -57,9 +59,11 @@ class ClientNews:
         self._orphans: dict[str, GoalTracker] = {}
         self._pending: WeakSet[Pending[Any]] = WeakSet()
         self._last_event = self._last_transition = 0
+        self._early: deque[ResourceStates] = deque()
+        """Resource states that include events which have not come."""
         self.connection.subscriptions = [
+            middleware.subscribe(EVENTS, self._on_told),  # first: where both have come, the event is taken first
             middleware.subscribe(RESOURCE_STATES, self._on_states),
-            middleware.subscribe(EVENTS, self._on_told),
             middleware.subscribe(SKILL_STATES, self._on_skills),
         ]
         middleware.watch(self.connection.on_heartbeat, self.connection.on_doubt)
@@ -111,9 +115,28 @@ class ClientNews:
     # --- messages of topics --------------------------------------------------------------------------------------------
 
     def _on_states(self, states: ResourceStates) -> None:
-        if self.closed or not self.connection.heard(states.instance_id, states.stamp_ns) or self._is_old(states):
+        if self.closed or not self.connection.heard(states.instance_id, states.stamp_ns):
             return
         self.heard += 1
+        if self.states_after >= 0 and (self._early or states.after > self._last_event):
+            self._early.append(states)
+            self._middleware.later(GRACE_S, lambda: self._give_up_waiting(states))
+        else:
+            self._show(states)
+
+    def _give_up_waiting(self, states: ResourceStates) -> None:
+        """Show states whose event must have got lost."""
+        if any(one is states for one in self._early):
+            self._show_early(states.after)
+
+    def _show_early(self, after: int) -> None:
+        """Show the states that include no event beyond ``after``."""
+        while self._early and self._early[0].after <= after:
+            self._show(self._early.popleft())
+
+    def _show(self, states: ResourceStates) -> None:
+        if self.closed or self._is_old(states):
+            return
         self.states_after = states.after
         self.resources = {name: value.state for name, value in states.resources.items()}
         self.reasons = {name: value.reason for name, value in states.resources.items()}
@@ -149,6 +172,7 @@ class ClientNews:
             # Also after a callback has raised: the handle of a goal that has ended must end.
             if isinstance(event, ExecutionEvent):
                 self._follow_event(event, told.instance_id)
+            self._show_early(self._last_event)
 
     def _follow_event(self, event: ExecutionEvent, instance_id: str) -> None:
         if event.state.terminal:
@@ -181,6 +205,7 @@ class ClientNews:
     def _on_restart(self) -> None:
         """Drop what was known of earlier managers: these are others."""
         self._last_event, self._last_transition, self.states_after = 0, 0, -1
+        self._early.clear()
         self.last.clear()
         # A goal without an acknowledgement may still be on its way, also to restarted managers.
         ended = [tracker for tracker in self._orphans.values() if tracker.instance_id]
@@ -201,7 +226,7 @@ class ClientNews:
     def _request_results(self) -> None:
         """Ask for the results of all goals, because events got lost."""
         for tracker in self._trackers():
-            tracker.link.request_result(tracker.handle.id)
+            tracker.ask()
 
     def _abandon(self, reason: str, *, orphans: bool) -> None:
         for tracker in self._trackers():

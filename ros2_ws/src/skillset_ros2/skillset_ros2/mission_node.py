@@ -22,7 +22,6 @@ from rclpy.node import Node
 from rclpy.publisher import Publisher
 from rclpy.qos import DurabilityPolicy, QoSProfile, ReliabilityPolicy
 from rclpy.signals import SignalHandlerOptions
-from skillset_interfaces.msg import Event
 from std_msgs.msg import Header, String
 from std_srvs.srv import SetBool, Trigger
 
@@ -33,19 +32,16 @@ from alula.missions.pausing import PauseRefusedError
 from alula.missions.plan import InputError, MissionPlan
 from alula.missions.record import MissionRecord
 from alula.missions.skillset import MissionClient
-from alula.runtime.codecs import event_of
+from alula.runtime.core.events import EngineEvent
 from alula.trees.groot.address import ServerError
 from alula.trees.view import NodeView
 from skillset_ros2 import NodeExecutor, SkillsetClient
-from skillset_ros2.base import QUIET, QUIET_PUBLISHER
+from skillset_ros2.base import QUIET_PUBLISHER
 from skillset_ros2.fleet_clock import FleetClock
 from skillset_ros2.simulated_time import SimulatedTime
 
 TURN_S = 0.1  # wall clock; how soon a signal is seen when nothing else happens
 LATCHED = QoSProfile(depth=1, reliability=ReliabilityPolicy.RELIABLE, durability=DurabilityPolicy.TRANSIENT_LOCAL)
-ALL_EVENTS = QoSProfile(depth=1000, reliability=ReliabilityPolicy.RELIABLE, durability=DurabilityPolicy.TRANSIENT_LOCAL)
-
-
 BEAT_S = 1.0  # wall clock; heartbeats of a fleet's mission are repeated so often while its clock stands still
 LAST_EVENTS_S = 2.0  # wall clock to wait for the events of what has ended
 
@@ -78,10 +74,6 @@ class MissionNode(Node):  # type: ignore[misc]  # rclpy is not typed
         robots = sorted(filter(None, self._robots))
         self._fleet_clock = FleetClock(self, robots) if robots and self.get_parameter("use_sim_time").value else None
         self._tree = self.create_publisher(String, "mission/tree", LATCHED, event_callbacks=QUIET_PUBLISHER)
-        for name in plan.skillsets:
-            space, skillset = plan.place(name)
-            topic = f"{space}/{skillset}/events" if space else f"{skillset}/events"
-            self.create_subscription(Event, topic, partial(self._hear, name), ALL_EVENTS, event_callbacks=QUIET)
         self.create_service(Trigger, "mission/abort", self._on_abort)
         self.create_service(SetBool, "mission/pause", self._on_pause)
         self.create_timer(TICK_PERIOD_S, self.driver.wake)
@@ -118,18 +110,20 @@ class MissionNode(Node):  # type: ignore[misc]  # rclpy is not typed
         self._simulated_time.close()
         super().destroy_node()
 
-    def _hear(self, skillset: str, event: Event) -> None:
+    def _hear(self, skillset: str, event: EngineEvent) -> None:
         """Take an event under the mission's name of its skillset; robots of a fleet have other clocks, so their events are of now."""
-        told = event_of(event)
         if self._plan.place(skillset)[0]:
-            told = replace(told, skillset=skillset, stamp_ns=self._clock_ns())
-        self.driver.event(told)
+            event = replace(event, skillset=skillset, stamp_ns=self._clock_ns())
+        self.driver.event(event)
 
     def _make_client(self, name: str, wake: Callable[[], None]) -> MissionClient:
         space, skillset = self._plan.place(name)
-        client = MissionClient(SkillsetClient(self, skillset, namespace=space), wake, self._record, name)
-        self._robots.setdefault(space, []).append(client)
-        return client
+        client = SkillsetClient(self, skillset, namespace=space)
+        # The client's events, not the topic's: so the record has them in the order in which the tree comes to know.
+        client.on_event(partial(self._hear, name))
+        made = MissionClient(client, wake, self._record, name)
+        self._robots.setdefault(space, []).append(made)
+        return made
 
     def _meet(self) -> None:
         """Advertise the heartbeats of a robot once all its skillsets can be called: its simulated time begins with them."""
