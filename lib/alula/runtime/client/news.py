@@ -28,6 +28,7 @@ from alula.runtime.middleware import (
     ResourceStates,
     SkillStates,
 )
+from alula.runtime.timers import Timer
 from alula.runtime.waiting import Pending
 
 OnChange = Callable[[dict[str, str]], None]
@@ -59,8 +60,8 @@ class ClientNews:
         self._orphans: dict[str, GoalTracker] = {}
         self._pending: WeakSet[Pending[Any]] = WeakSet()
         self._last_event = self._last_transition = 0
-        self._early: deque[ResourceStates] = deque()
-        """Resource states that include events which have not come."""
+        self._early: deque[tuple[ResourceStates, Timer]] = deque()
+        """Resource states that include events which have not come, each with the timer that ends the waiting."""
         self.connection.subscriptions = [
             middleware.subscribe(EVENTS, self._on_told),  # first: where both have come, the event is taken first
             middleware.subscribe(RESOURCE_STATES, self._on_states),
@@ -95,6 +96,7 @@ class ClientNews:
     def close(self, reason: str) -> None:
         """End every wait for this reason; what runs goes on running."""
         self.closed = self.closed or reason
+        self._forget_early()
         self.connection.close()
         self._abandon(reason, orphans=False)
 
@@ -119,20 +121,21 @@ class ClientNews:
             return
         self.heard += 1
         if self.states_after >= 0 and (self._early or states.after > self._last_event):
-            self._early.append(states)
-            self._middleware.later(GRACE_S, lambda: self._give_up_waiting(states))
+            # Its event may have got lost.
+            self._early.append((states, self._middleware.later(GRACE_S, lambda: self._show_early(states.after))))
         else:
             self._show(states)
 
-    def _give_up_waiting(self, states: ResourceStates) -> None:
-        """Show states whose event must have got lost."""
-        if any(one is states for one in self._early):
-            self._show_early(states.after)
-
     def _show_early(self, after: int) -> None:
         """Show the states that include no event beyond ``after``."""
-        while self._early and self._early[0].after <= after:
-            self._show(self._early.popleft())
+        while self._early and self._early[0][0].after <= after:
+            states, timer = self._early.popleft()
+            timer.cancel()
+            self._show(states)
+
+    def _forget_early(self) -> None:
+        while self._early:
+            self._early.popleft()[1].cancel()
 
     def _show(self, states: ResourceStates) -> None:
         if self.closed or self._is_old(states):
@@ -205,7 +208,7 @@ class ClientNews:
     def _on_restart(self) -> None:
         """Drop what was known of earlier managers: these are others."""
         self._last_event, self._last_transition, self.states_after = 0, 0, -1
-        self._early.clear()
+        self._forget_early()
         self.last.clear()
         # A goal without an acknowledgement may still be on its way, also to restarted managers.
         ended = [tracker for tracker in self._orphans.values() if tracker.instance_id]
