@@ -260,11 +260,14 @@ class Soak:
         self._dice = random.Random(options.seed)  # noqa: S311 - repeatable, not secret
         self._ends = Ends(self.figures, self._dice, options.back_within, ros1)
         self._stop = threading.Event()
+        # A process dies with the thread that has started it (Linux, PR_SET_PDEATHSIG): the master would go while a call still needs it.
+        self._all_done = threading.Barrier(3)
 
     def _repeat(self, period_s: float, action: Callable[[], None]) -> threading.Thread:
         def run() -> None:
             while not self._stop.wait(period_s * self._dice.uniform(0.5, 1.5)):
                 action()
+            self._all_done.wait()
 
         thread = threading.Thread(target=run, daemon=True)
         thread.start()
