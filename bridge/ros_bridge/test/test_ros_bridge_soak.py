@@ -5,12 +5,10 @@ import os
 import subprocess
 import sys
 
-from alula_testing.waits import HANGS_S
-
 
 def test_short_soak_loses_nothing_and_grows_nothing(ros2_domain):
-    command = [sys.executable, "-m", "bridge_tools.soak", "--minutes", "0.15", "--back-within", str(HANGS_S)]
-    done = subprocess.run(command, env=os.environ, capture_output=True, text=True, timeout=3 * HANGS_S, check=False)
+    command = [sys.executable, "-m", "bridge_tools.soak", "--minutes", "0.15"]
+    done = subprocess.run(command, env=os.environ, capture_output=True, text=True, timeout=200, check=False)
     assert done.returncode == 0, done.stdout + done.stderr
     figures = json.loads(done.stdout.splitlines()[-1])
     assert figures["up"]["lost"] == figures["down"]["lost"] == 0
