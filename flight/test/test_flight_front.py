@@ -13,7 +13,7 @@ from dataclasses import asdict, replace
 import psutil
 import pytest
 
-from alula.common.network import DomainClaim, NoFreeDomainError, claim_domain, free_port, is_claimed
+from alula.common.network import DomainClaim, NoFreeDomainError, claim_domain, is_claimed
 from alula.common.processes import RUN_ID_VARIABLE, end_run, ends_within, processes_of_run
 from alula.common.record import EVENTS, RecordWriter
 from alula.common.record import FILE as RECORD
@@ -158,10 +158,6 @@ def test_domain_and_namespace_are_part_of_the_request(tmp_path):
         parse([*words, "--domain", "233"], RunPart())
     with pytest.raises(RequestError, match="--namespace ro-ver: write a name such as rover"):
         parse([*words, "--namespace", "ro-ver"], RunPart())
-
-
-def test_free_port_can_be_bound():
-    assert 1024 <= free_port() < 65536
 
 
 # A child that ignores polite requests and a grandchild in a session of its own: what a crash leaves behind.

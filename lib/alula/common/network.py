@@ -5,6 +5,7 @@ from __future__ import annotations
 import re
 import secrets
 import socket
+from collections import deque
 from collections.abc import Iterable
 from dataclasses import dataclass
 
@@ -29,19 +30,30 @@ class NoFreePortError(Exception):
 
 
 def free_port() -> int:
-    """Return a TCP port on loopback that is free at this moment.
+    """Return a TCP port on loopback that is free at this moment, and that no other process of Alula is given while this one lives.
 
     Below the range that the system takes ports of outgoing connections from: any process could be given a port of that range
-    between this look and the moment when our own process listens.
+    between this look and the moment when our own process listens. The claim is the name of a socket; of those of a process the last
+    ``LATEST`` count.
     """
     while True:
         port = secrets.choice(PORTS)
+        claim = socket.socket(socket.AF_UNIX, socket.SOCK_STREAM)
         with socket.socket(socket.AF_INET, socket.SOCK_STREAM) as probe:
             try:
+                claim.bind(f"\0alula/port/{port}")
                 probe.bind(("127.0.0.1", port))
             except OSError:
+                claim.close()
                 continue
+        _claims.append(claim)
+        if len(_claims) > LATEST:
+            _claims.popleft().close()
         return port
+
+
+LATEST = 64
+_claims: deque[socket.socket] = deque()
 
 
 def udp_port_is_free(port: int, address: str = "127.0.0.1") -> bool:

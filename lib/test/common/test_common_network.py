@@ -1,0 +1,27 @@
+"""Ports that processes of one machine don't take from each other."""
+
+from __future__ import annotations
+
+import subprocess
+import sys
+
+from alula.common import network
+
+CHILD = "import sys; from alula.common import network; network.PORTS = [int(w) for w in sys.argv[1:]]; print(network.free_port())"
+
+
+def test_a_port_that_was_given_is_given_to_no_other_process(monkeypatch):
+    ports = [network.free_port(), network.free_port()]
+    other = network.free_port()  # free, and claimed by this process only until the next line
+    network._claims.pop().close()
+    monkeypatch.setattr(network, "PORTS", [*ports, other])
+    assert network.free_port() == other
+    network._claims.pop().close()
+    words = [sys.executable, "-c", CHILD, *map(str, [*ports, other])]
+    assert {int(subprocess.run(words, capture_output=True, check=True).stdout) for _ in range(8)} == {other}
+
+
+def test_only_the_latest_claims_of_a_process_are_kept():
+    for _ in range(network.LATEST + 1):
+        network.free_port()
+    assert len(network._claims) == network.LATEST
