@@ -120,7 +120,8 @@ PLACES = {
     "ROS 1 world": "flight/test/test_members.py",
     "ROS 2 world": "bridge/ros_bridge/test/test_ros_bridge_layout.py",
     "across the rooms": "tests/test_manifests.py",
-    "flights": "tests/test_endings.py",
+    "flights": "tests/test_flights.py",
+    "early ends": "tests/test_endings.py",
     "library": "lib/test/model",
 }
 
