@@ -121,7 +121,7 @@ PLACES = {
     "ROS 2 world": "bridge/ros_bridge/test/test_ros_bridge_layout.py",
     "across the rooms": "tests/test_manifests.py",
     "flights": "tests/test_flights.py",
-    "early ends": "tests/test_endings.py",
+    "early ends and the rover": "tests/test_endings.py",
     "library": "lib/test/model",
 }
 

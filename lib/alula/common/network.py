@@ -16,6 +16,8 @@ RTPS_PORT, RTPS_PORTS_PER_DOMAIN = 7400, 250
 # Linux takes outgoing connections' ports from 32768 up; the claims of domains lie among these.
 EPHEMERAL_PORT = 32_768
 PORTS = [port for port in range(20_000, 32_700) if (port - RTPS_PORT) % RTPS_PORTS_PER_DOMAIN]
+CLAIMED_PORTS = 64
+_claims: deque[socket.socket] = deque()
 
 
 NAMESPACE = re.compile(r"(/[A-Za-z][A-Za-z0-9_]*)+")
@@ -33,8 +35,8 @@ def free_port() -> int:
     """Return a TCP port on loopback that is free at this moment, and that no other process of Alula is given while this one lives.
 
     Below the range that the system takes ports of outgoing connections from: any process could be given a port of that range
-    between this look and the moment when our own process listens. The claim is the name of a socket; of those of a process the last
-    ``LATEST`` count.
+    between this look and the moment when our own process listens. The claim is the name of a socket; a process holds its latest
+    ``CLAIMED_PORTS``.
     """
     while True:
         port = secrets.choice(PORTS)
@@ -47,13 +49,9 @@ def free_port() -> int:
                 claim.close()
                 continue
         _claims.append(claim)
-        if len(_claims) > LATEST:
+        if len(_claims) > CLAIMED_PORTS:
             _claims.popleft().close()
         return port
-
-
-LATEST = 64
-_claims: deque[socket.socket] = deque()
 
 
 def udp_port_is_free(port: int, address: str = "127.0.0.1") -> bool:

@@ -11,9 +11,8 @@ CHILD = "import sys; from alula.common import network; network.PORTS = [int(w) f
 
 
 def test_a_port_that_was_given_is_given_to_no_other_process(monkeypatch):
-    ports = [network.free_port(), network.free_port()]
-    other = network.free_port()  # free, and claimed by this process only until the next line
-    network._claims.pop().close()
+    *ports, other = (network.free_port() for _ in range(3))
+    network._claims.pop().close()  # that of the other one
     monkeypatch.setattr(network, "PORTS", [*ports, other])
     assert network.free_port() == other
     network._claims.pop().close()
@@ -22,6 +21,6 @@ def test_a_port_that_was_given_is_given_to_no_other_process(monkeypatch):
 
 
 def test_only_the_latest_claims_of_a_process_are_kept():
-    for _ in range(network.LATEST + 1):
+    for _ in range(network.CLAIMED_PORTS + 1):
         network.free_port()
-    assert len(network._claims) == network.LATEST
+    assert len(network._claims) == network.CLAIMED_PORTS
