@@ -120,8 +120,9 @@ PLACES = {
     "ROS 1 world": "flight/test/test_members.py",
     "ROS 2 world": "bridge/ros_bridge/test/test_ros_bridge_layout.py",
     "across the rooms": "tests/test_manifests.py",
-    "flights": "tests/test_flights.py",
     "early ends and the rover": "tests/test_endings.py",
+    "flights": "tests/test_flights.py",
+    "missions": "lib/test/trees",
     "library": "lib/test/model",
 }
 
