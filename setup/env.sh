@@ -5,6 +5,8 @@ unset PYTHONHOME AMENT_PREFIX_PATH COLCON_PREFIX_PATH CMAKE_PREFIX_PATH PYTHONPA
 unset ${!ALULA_UNDERLAY@} ROS_ETC_DIR
 . "$ALULA_ROOT/setup/places.sh"
 export PYTHONUNBUFFERED=1 PYTHONNOUSERSITE=1
+# Container images often set it: then each of a run's many processes would compile all that it imports.
+unset PYTHONDONTWRITEBYTECODE
 # Numeric libraries: many small processes share few cores, a pool of threads in each only makes them wait for one another.
 export OMP_NUM_THREADS="${OMP_NUM_THREADS:-1}" OPENBLAS_NUM_THREADS="${OPENBLAS_NUM_THREADS:-1}"
 export MPLBACKEND=Agg

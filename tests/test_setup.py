@@ -56,6 +56,13 @@ def test_every_version_of_python_gets_the_same_packages(world: str) -> None:
     assert pins[0].keys() == pins[1].keys() == pins[2].keys()
 
 
+@pytest.mark.parametrize("world", [1, 2])
+def test_compiled_modules_are_kept_although_a_container_image_says_otherwise(world: int) -> None:
+    command = [f"{ALULA_ROOT}/setup/in_ros{world}", "python", "-c", "import sys; print(sys.dont_write_bytecode)"]
+    environment = {**os.environ, "PYTHONDONTWRITEBYTECODE": "1"}
+    assert subprocess.run(command, env=environment, capture_output=True, text=True, check=True).stdout.strip() == "False"
+
+
 @pytest.mark.parametrize(
     ("world", "flies", "builds"),
     [("ros1", "open3d-cpu", "pytest"), ("ros2", "rosbags", "colcon-core"), ("jazzy", "ros-jazzy-rclpy", "ros-ament-cmake-core")],
