@@ -6,6 +6,8 @@ by what the surface is: ground, facade with windows, vegetation, metal.
 
 from __future__ import annotations
 
+from collections.abc import Sequence
+
 import cv2
 import numpy as np
 from numpy.typing import NDArray
@@ -14,7 +16,7 @@ from uav_simulator.sensors.mounts import CAMERA, rotation_matrix
 from uav_simulator.sensors.pose_track import Pose
 from uav_simulator.sensors.stereo import Pinhole
 from uav_simulator.sensors.texture import Floats32, Grain, layer, noise_tiles, surface_table
-from uav_simulator.world.scene import NO_HIT, Scene
+from uav_simulator.world.scene import Scene
 
 Floats = NDArray[np.float64]
 Image = NDArray[np.uint8]
@@ -45,57 +47,64 @@ class ColourCamera:
         self._windowed = _windowed(world)
         rng = np.random.default_rng([seed, 7])
         shape = (camera.height, camera.width)
-        self._noise = [rng.normal(0.0, NOISE, shape).astype(np.float32)[..., None] for _ in range(NOISE_FRAMES)]
+        self._noise = [rng.normal(0.0, NOISE, shape).astype(np.float32) for _ in range(NOISE_FRAMES)]
         self._count = 0
         cx, cy = camera.centre_px
-        x, y = np.meshgrid(
-            (np.arange(0, camera.width, 2) + 0.5 - cx) / camera.focal_px, (np.arange(0, camera.height, 2) + 0.5 - cy) / camera.focal_px
-        )
-        self._directions = np.stack([x, y, np.ones_like(x)], axis=-1)
+        x, y = (np.arange(0, camera.width, 2) + 0.5 - cx) / camera.focal_px, (np.arange(0, camera.height, 2) + 0.5 - cy) / camera.focal_px
+        self._x, self._y = x.astype(np.float32)[None, :], y.astype(np.float32)[:, None]
 
     def render(self, pose: Pose) -> Image:
         """Return the picture, (height, width, 3) uint8 RGB."""
         r_map_body = rotation_matrix(pose.attitude)
-        eye = (np.asarray(pose.position) + r_map_body @ np.asarray(CAMERA.translation)).astype(np.float32)
-        directions = (self._directions @ (r_map_body @ CAMERA.matrix).T).astype(np.float32)
-        rays = np.concatenate([np.broadcast_to(eye, directions.shape), directions], axis=-1)
-        hits = self._world.cast(np.ascontiguousarray(rays))
-        surface = np.where(hits.triangle == NO_HIT, len(self._table.grey), hits.triangle).astype(np.intp)
-        depth = np.minimum(hits.range_m, FAR_M)
-        return self._draw(surface, depth, eye[None, None] + depth[..., None] * directions)
+        r_map_camera = r_map_body @ CAMERA.matrix
+        eye = np.asarray(pose.position) + r_map_body @ np.asarray(CAMERA.translation)
+        rays = np.empty((self._y.size, self._x.size, 6), dtype=np.float32)
+        for axis in range(3):  # numpy is several times as slow along rows of three
+            rays[..., axis] = eye[axis]
+            rays[..., 3 + axis] = self._along(r_map_camera[axis].astype(np.float32))
+        hits = self._world.cast(rays)
+        # The number of no hit, the greatest, becomes the sky's.
+        surface = np.minimum(hits.triangle, np.uint32(len(self._table.grey))).astype(np.intp)
+        depth = np.minimum(hits.range_m, np.float32(FAR_M))
+        return self._draw(surface, depth, *self._texture(surface, depth, r_map_camera, eye))
 
-    def _draw(self, surface: NDArray[np.intp], depth: Floats32, points: Floats32) -> Image:
-        """Colour the points that the rays met, (h, w, 3) in map, at twice their resolution."""
-        u, v = self._texture(surface, points)
+    def _along(self, a: Floats32 | Sequence[Floats32]) -> Floats32:
+        """Return the product of a vector in the camera's frame, one or one for each ray, with the rays' directions, (h, w)."""
+        return a[0] * self._x + a[1] * self._y + a[2]
+
+    def _draw(self, surface: NDArray[np.intp], depth: Floats32, u: Floats32, v: Floats32) -> Image:
+        """Colour what the rays met, (h, w), at twice their resolution."""
         size = (self.camera.width, self.camera.height)
-        colours = self._colours[surface]
-        colours[self._windowed[surface] & _in_window(u, v)] = WINDOW_RGB
-        colour = cv2.resize(colours, size, interpolation=cv2.INTER_NEAREST)
+        window = np.take(self._windowed, surface) & _in_window(u, v)
+        colour = np.where(window, len(self._colours[0]) - 1, surface)
         wide_u, wide_v, far = (cv2.resize(each, size, interpolation=cv2.INTER_LINEAR) for each in (u, v, depth))
-        shade = np.zeros((size[1], size[0]), dtype=np.float32)
-        for grain, tile in zip((FINE, COARSE), self._tiles, strict=False):
-            shade += layer(tile, wide_u, wide_v, grain, far / self.camera.focal_px)
         self._count += 1
-        picture = colour + shade[..., None] + self._noise[self._count % NOISE_FRAMES]
-        return np.asarray(np.clip(picture, 0.0, 255.0), dtype=np.uint8)
+        shade = self._noise[self._count % NOISE_FRAMES].copy()
+        far *= np.float32(1.0 / self.camera.focal_px)
+        for grain, tile in zip((FINE, COARSE), self._tiles, strict=False):
+            shade += layer(tile, wide_u, wide_v, grain, far)
+        channels = [cv2.resize(np.take(each, colour), size, interpolation=cv2.INTER_NEAREST) for each in self._colours]
+        return np.asarray(cv2.merge([np.clip(each + shade, 0.0, 255.0).astype(np.uint8) for each in channels]))
 
-    def _texture(self, surface: NDArray[np.intp], points: Floats32) -> tuple[Floats32, Floats32]:
-        """Return the texture coordinates of the points in metres; the sky has none."""
-        table, known = self._table, np.minimum(surface, len(self._table.grey) - 1)
-        u = np.einsum("hwk,hwk->hw", table.axis_u.astype(np.float32)[known], points) + table.offset_u.astype(np.float32)[known]
-        v = np.einsum("hwk,hwk->hw", table.axis_v.astype(np.float32)[known], points) + table.offset_v.astype(np.float32)[known]
-        sky = surface == len(table.grey)
-        return np.where(sky, np.float32(0.0), u), np.where(sky, np.float32(0.0), v)
+    def _texture(self, surface: NDArray[np.intp], depth: Floats32, r_map_camera: Floats, eye: Floats) -> tuple[Floats32, Floats32]:
+        """Return the texture coordinates of what the rays met, in metres: the eye's, and by how much they grow along the ray."""
+        t, sky = self._table, np.zeros((1, 4))  # the sky has none
+        found = []
+        for axis, offset in ((t.axis_u, t.offset_u), (t.axis_v, t.offset_v)):
+            table = np.concatenate([np.column_stack([axis @ r_map_camera, axis @ eye + offset]), sky]).astype(np.float32)
+            *direction, at_eye = (np.take(column, surface) for column in np.ascontiguousarray(table.T))
+            found.append(at_eye + depth * self._along(direction))
+        return found[0], found[1]
 
 
 def _colours(world: Scene, grey: Floats, seed: int) -> Floats32:
-    """Return the mean colour of each triangle and, last, of the sky, (M + 1, 3): one tint for a plane and all that is parallel to it."""
+    """Return the mean colour of each triangle and, last, of sky and window, (3, M + 2): one tint for all planes that are parallel."""
     rng = np.random.default_rng([seed, 8])
     tints = TINTS_RGB[rng.permutation(len(TINTS_RGB))]
     which = np.abs(np.round(world.brightness * 97.0)).astype(np.intp) % len(tints)
     ground = (world.normals[:, 2] > 0.99) & (np.abs(world.plane_offsets) < 0.01)
     tinted = np.where(ground[:, None], np.array(GROUND_RGB), tints[which]) * grey[:, None]
-    return np.concatenate([tinted, [SKY_RGB]]).astype(np.float32)
+    return np.concatenate([tinted, [SKY_RGB, WINDOW_RGB]]).T.astype(np.float32)
 
 
 def _windowed(world: Scene) -> NDArray[np.bool_]:
@@ -107,4 +116,8 @@ def _windowed(world: Scene) -> NDArray[np.bool_]:
 
 
 def _in_window(u: Floats32, v: Floats32) -> NDArray[np.bool_]:
-    return np.asarray((np.mod(u, WINDOW_EVERY_M[0]) < WINDOW_M[0]) & (np.mod(v, WINDOW_EVERY_M[1]) < WINDOW_M[1]))
+    within = [
+        each - np.floor(each * np.float32(1.0 / every)) * np.float32(every) < size
+        for each, every, size in zip((u, v), WINDOW_EVERY_M, WINDOW_M, strict=True)
+    ]
+    return np.asarray(within[0] & within[1])
