@@ -67,8 +67,8 @@ def passed(output: str) -> int:
 
 @pytest.fixture
 def drone(tmp_path: Path) -> Iterator[Flight]:
-    """A flight of the checkout's robot, which is in the air."""
-    flight = start_flight(tmp_path / "flight", "--rate", "0", "--namespace", "drone")
+    """A flight of the checkout's robot, which is in the air; as fast as the live run beside it, for it needs to last no longer."""
+    flight = start_flight(tmp_path / "flight", "--rate", "1", "--namespace", "drone")
     try:
         flight.wait_in_air()
         yield flight
