@@ -25,7 +25,7 @@ def alula(tmp_path_factory: pytest.TempPathFactory) -> Alula:
     source = shutil.copytree(ALULA_ROOT / "lib", place / "lib", ignore=shutil.ignore_patterns("__pycache__", "*.egg-info", "build", "test"))
     python = os.environ.get("ALULA_PYTHON", "/usr/bin/python3")
     subprocess.run([python, "-m", "venv", str(place / "venv")], check=True, env={**os.environ, **ALLOWED})
-    pip = [str(place / "venv/bin/pip"), "--disable-pip-version-check", "install", "--quiet", f"{source}[all]"]
+    pip = [str(place / "venv/bin/pip"), "--disable-pip-version-check", "install", "--quiet", "--no-compile", f"{source}[all]"]
     inherited = {name: value for name, value in os.environ.items() if not name.startswith(("PYTHON", "ROS", "AMENT", "ALULA", "LD_"))}
     done = subprocess.run(pip, env={**inherited, **ALLOWED}, capture_output=True, text=True, check=False)
     assert done.returncode == 0, done.stderr[-3000:]
