@@ -19,9 +19,11 @@ from workspace import ROOT, WORKSPACES, Built, Package, Workspace, build_files, 
 TOOLS = re.compile(r"(ros-|colcon-|empy|catkin-pkg|numpy)", re.IGNORECASE)
 CMAKE_ARGUMENTS = (
     "-DCMAKE_BUILD_TYPE=None",
-    # The bridge's data plane sets flags of its own; everything else in C++ is type support, compiled quickly rather than well.
+    # The bridge's data plane sets flags of its own; everything else is messages and their type support, compiled quickly rather than
+    # well: a skill's messages take Python as long to convert and to serialise as with -O1.
     "-DCMAKE_CXX_FLAGS=-O0",
-    "-DCMAKE_C_FLAGS=-O1",
+    "-DCMAKE_C_FLAGS=-O0",
+    "-DCMAKE_RULE_MESSAGES=OFF",  # each line of progress is a process
     f"-DPython3_EXECUTABLE={sys.executable}",
     f"-DPYTHON_EXECUTABLE={sys.executable}",
     "-DBUILD_TESTING=OFF",

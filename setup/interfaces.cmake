@@ -22,9 +22,18 @@ variable_watch(AMENT_EXTENSIONS_rosidl_generate_idl_interfaces keep_wanted_gener
 function(compile_libraries_as_one_file)
   get_property(targets DIRECTORY PROPERTY BUILDSYSTEM_TARGETS)
   foreach(target IN LISTS targets)
-    if(target MATCHES "__rosidl_(typesupport_c|typesupport_fastrtps_c|generator_py)$")
+    if(target MATCHES "__rosidl_(typesupport_c|typesupport_introspection_c|typesupport_fastrtps_c|generator_c|generator_py)$")
       set_target_properties(${target} PROPERTIES UNITY_BUILD ON UNITY_BUILD_BATCH_SIZE 0)
+      # Descriptions of two types that hold a third one each define its hash.
+      get_target_property(sources ${target} SOURCES)
+      list(FILTER sources INCLUDE REGEX "__description\\.c$")
+      set_source_files_properties(${sources} PROPERTIES SKIP_UNITY_BUILD_INCLUSION ON)
     endif()
   endforeach()
 endfunction()
 cmake_language(DEFER CALL compile_libraries_as_one_file)
+
+# Nobody edits what was generated; and each link that ament makes is a process.
+if(EXISTS "${CMAKE_CURRENT_SOURCE_DIR}/msg" OR EXISTS "${CMAKE_CURRENT_SOURCE_DIR}/srv" OR EXISTS "${CMAKE_CURRENT_SOURCE_DIR}/action")
+  set(AMENT_CMAKE_SYMLINK_INSTALL OFF)
+endif()

@@ -77,9 +77,12 @@ def test_one_more_message_of_ros_1_configures_and_builds_its_package_and_those_t
     in_robot = ["env", f"ALULA_ROBOT={tmp_path}", f"{ALULA_ROOT}/setup/in_ros1"]
     devel = state / "ros1/devel"
 
-    def build() -> str:
+    def try_to_build() -> subprocess.CompletedProcess[str]:
         command = [*in_robot, "python3", f"{ALULA_ROOT}/setup/build_ros1.py", "robot"]
-        done = subprocess.run(command, capture_output=True, text=True, check=False)
+        return subprocess.run(command, capture_output=True, text=True, check=False)
+
+    def build() -> str:
+        done = try_to_build()
         assert done.returncode == 0, done.stdout[-3000:] + done.stderr[-3000:]
         return done.stdout.splitlines()[0]
 
@@ -108,6 +111,9 @@ def test_one_more_message_of_ros_1_configures_and_builds_its_package_and_those_t
     assert fields("below") == "number more int32 string"
     assert fields("above") == "below more below/M string"
     assert configured_ns()["beside"] == first["beside"]
+    (sources / "beside/msg/M.msg").write_text("int32 number\nint32 number\n")
+    assert try_to_build().returncode != 0
+    assert try_to_build().stdout.splitlines()[0] == "to build: beside", "it was not built"
 
 
 def test_a_robot_whose_models_have_errors_can_be_checked_and_keeps_no_other_from_working(tmp_path):

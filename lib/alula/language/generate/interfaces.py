@@ -62,8 +62,13 @@ if("$$ENV{ROS_VERSION}" STREQUAL "1")
   add_action_files(DIRECTORY action FILES
 $ros1_actions
   )
-  # Managers and clients are Python; the headers of other languages would take most of the time.
-  generate_messages(LANGS genpy DEPENDENCIES actionlib_msgs$ros1_names)
+  # Managers and clients are Python; the headers of other languages would take most of the time. Alula's set-up, which leaves genpy out,
+  # makes all of its modules in one process.
+  set(languages)
+  if(genpy IN_LIST CATKIN_MESSAGE_GENERATORS)
+    set(languages genpy)
+  endif()
+  generate_messages(LANGS $${languages} DEPENDENCIES actionlib_msgs$ros1_names)
   catkin_package(CATKIN_DEPENDS message_runtime actionlib_msgs$ros1_names)
 else()
   find_package(ament_cmake REQUIRED)
