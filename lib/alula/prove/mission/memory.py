@@ -4,6 +4,8 @@ from __future__ import annotations
 
 from collections.abc import Hashable, Mapping
 from dataclasses import dataclass
+from itertools import compress
+from operator import ne
 from typing import NamedTuple
 
 from alula.missions.director import Director, DirectorMemory, End, Outcome
@@ -26,12 +28,23 @@ SEEN = "_seen"
 LEFT = "_left"
 COUNTS = {LEFT: "the attempts left", "_count": "the rounds", "_retries": "the retries"}
 """Attributes of nodes that count: what is left of a number of attempts, or what there was."""
+NOT_AS_THEY_ARE = frozenset({SEEN, *COUNTS})
+"""Attributes of which another value is kept than theirs."""
 FEW = 2
 STATUS_OF = {one.value: one for one in Status}
 TAKE_TEXT = (STRING, ANY)
 """Types of entries that any text can be written into."""
 PLAIN = frozenset({type(None), bool, int, float, str, Status, Skipped, Unknown})
 """Types whose values are kept as they are."""
+
+
+class _Value(NamedTuple):
+    """Which value of a memory is which: a node's status, at ``start``, or an attribute, which counts only while it runs or at any time."""
+
+    node: Node
+    name: str
+    start: int
+    while_running: bool
 
 
 class TreeMemory(NamedTuple):
@@ -77,16 +90,20 @@ class Keeper:
 
     def __init__(self, body: Body) -> None:
         self._body = body
-        self._nodes = [(node, node.remembers, node.remembers_running) for node in body.nodes()]
+        self._nodes = [(node, node.remembers, (*node.remembers, *node.remembers_running)) for node in body.nodes()]
         self.leaves = [node for node in body.nodes() if isinstance(node, SkillNode)]
         self._boards = list(dict.fromkeys(subtree.blackboard for tree in body.trees for subtree in tree.subtrees))
         self._looking = Looking(body.trees, body.read)
         self._living = Liveness(body.trees, self._looking)
         self._known: dict[tuple[str, bool, tuple[Hashable, ...]], tuple[tuple[Hashable, ...], Ahead, Live | None]] = {}
         self._places: list[tuple[tuple[str, ...], int, int]] = []
-        for _, names, while_running in self._nodes:
-            start = self._places[-1][2] if self._places else 0
-            self._places.append((("status", *names, *while_running), start, start + 1 + len(names) + len(while_running)))
+        self._values_of: list[_Value] = []
+        for node, names, all_names in self._nodes:
+            start = len(self._values_of)
+            self._values_of.append(_Value(node, "status", start, while_running=False))
+            self._values_of += [_Value(node, name, start, while_running=name not in names) for name in all_names]
+            self._places.append((("status", *all_names), start, len(self._values_of)))
+        self._always = [at for at, one in enumerate(self._values_of) if one.name == SEEN or one.while_running]
         self._thawing = Thawing(body.robot.oracle)
         self._first = self._left = self._values()[0]
 
@@ -142,14 +159,19 @@ class Keeper:
         """Return the values of the nodes, and by their places what was a moment, with its name."""
         values: list[Hashable] = []
         moments: dict[int, tuple[str, Moment | Later]] = {}
-        for node, names, while_running in self._nodes:
-            values.append(node.status._value_)  # the hash of an Enum takes long, and each memory has hundreds
-            for name in names if node.status is IDLE else (*names, *while_running):
-                if isinstance(value := getattr(node, name), Moment | Later):
+        for node, names, all_names in self._nodes:
+            status = node.status
+            values.append(status._value_)  # the hash of an Enum takes long, and each memory has hundreds
+            for name in names if status is IDLE else all_names:
+                value = getattr(node, name)
+                if type(value) in PLAIN and name not in NOT_AS_THEY_ARE:  # nearly all
+                    values.append(value)
+                    continue
+                if isinstance(value, Moment | Later):
                     moments[len(values)] = name, value
                 values.append(self._seen(node) if name == SEEN else self._kept(node, name))
-            if node.status is IDLE:
-                values += [None] * len(while_running)
+            if status is IDLE and names is not all_names:
+                values += [None] * (len(all_names) - len(names))
         return tuple(values), moments
 
     def _kept(self, node: Node, name: str) -> Hashable:
@@ -232,20 +254,19 @@ class Keeper:
 
     def _put_nodes(self, memory: TreeMemory) -> None:
         """Put back what is not as the last tick has left it; values that ticks change inside are always put back."""
-        at = 0
-        for node, names, of_run in self._nodes:
-            status = memory.nodes[at]
-            if status != self._left[at]:
-                node.status = STATUS_OF[status]  # type: ignore[index]
-            for name in (*names, *of_run):
-                at += 1
-                value = memory.nodes[at]
-                if name == SEEN:
-                    entry = node.entry("entry")
-                    setattr(node, SEEN, (0 if entry is None else entry.sequence) if value else -1)
-                elif (value != self._left[at] or type(value) is tuple or name in of_run) and (status != IDLE.value or name in names):
-                    setattr(node, name, self._thawed(value))
-            at += 1
+        values, left = memory.nodes, self._left
+        changed = compress(range(len(values)), map(ne, values, left))
+        inside = (at for at, kind in enumerate(map(type, values)) if kind is tuple)
+        for at in {*changed, *inside, *self._always}:
+            node, name, start, while_running = self._values_of[at]
+            value = values[at]
+            if at == start:
+                node.status = STATUS_OF[value]  # type: ignore[index]
+            elif name == SEEN:
+                entry = node.entry("entry")
+                setattr(node, SEEN, (0 if entry is None else entry.sequence) if value else -1)
+            elif not while_running or values[start] != IDLE.value:
+                setattr(node, name, self._thawed(value))
 
     def _handle(self, leaf: int) -> Handle:
         node = self.leaves[leaf]
