@@ -131,8 +131,6 @@ def test_what_was_halted_costs_a_sum_and_no_product(tmp_path: Path) -> None:
     assert memories(tmp_path, inside) <= memories(tmp_path, one) + 2
 
 
-@pytest.mark.long
-@pytest.mark.timeout(0)  # 40 s of processor time: as long as the machine needs
 def test_all_runs_of_a_mission_of_two_robots_are_looked_at() -> None:
     path = ROOT / "examples" / "two_robots" / "missions" / "meet.xml"
     robot = find_robot(path.parent)

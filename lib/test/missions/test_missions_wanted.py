@@ -22,6 +22,7 @@ from alula.missions.filed.part import NO_PART
 from alula.model.model import Property, Skillset
 from alula.prove.limits import Deadline, OutOfTimeError
 from alula.prove.mission.conditions import Faults, faults_shown, true_in
+from alula.prove.mission.ending import Ending
 from alula.prove.mission.holding import held
 from alula.prove.mission.managers import Failures
 from alula.prove.mission.page import ROBOT
@@ -307,6 +308,20 @@ def test_what_is_the_case_at_each_end_comes_where_each_run_ends(tree: str, comes
     by_steps, by_ends = (held(regions, wanted, FAULTS, Deadline.after(100.0), always_ends=one) for one in (False, looked.always_ends))
     assert by_steps.complete
     assert (by_ends.finding is None) == (by_steps.finding is None)
+
+
+@pytest.mark.parametrize("tree", [*TREES, *ENDING, *(tree for tree, _ in ROUNDS)])
+def test_groups_after_which_a_mission_surely_ends_hide_no_wait(tree: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    regions = Regions(System.read(written(tmp_path, "", tree), skillsets(), NO_PART, LOOKED_AT), Deadline.after(100.0))
+    regions.explore()
+
+    def found() -> tuple[list[object], bool]:
+        looked = Waits(regions)
+        return list(looked.found(Deadline.after(100.0))), looked.always_ends
+
+    by_groups = found()
+    monkeypatch.setattr(Ending, "doubtful", lambda ending, _values, _deadline: ending.groups)
+    assert found() == by_groups
 
 
 def test_what_every_end_brings_needs_no_search(tmp_path: Path) -> None:

@@ -70,6 +70,14 @@ class Ticked:
         return next(one for one, sets in self.ways if all(number in known for number, known in zip(managers, sets, strict=True)))
 
 
+@dataclass(frozen=True)
+class Fork:
+    """A question in a tick: each answer with the managers that give it. ``free``: nobody knows, and any may give each."""
+
+    ways: tuple[tuple[Answer, Sets], ...]
+    free: bool
+
+
 @dataclass
 class Region:
     """A memory and what the managers can be.
@@ -183,13 +191,20 @@ class Regions:
         todo: list[tuple[tuple[Answer, ...], Sets]] = [((), sets)]
         while todo:
             answers, left = todo.pop()
-            known = self.system.ticker.known(memory, act, self._view(left), answers)
-            if isinstance(known, Outcome):
-                yield known, left
-            elif known.options:
-                todo += [((*answers, option), left) for option in known.options]
+            found = self.follow(memory, act, answers, left)
+            if isinstance(found, Outcome):
+                yield found, left
             else:
-                todo += [((*answers, answer), divided) for answer, divided in self._divided(known, left)]
+                todo += [((*answers, answer), divided) for answer, divided in found.ways]
+
+    def follow(self, memory: int, act: str, answers: Sequence[Answer], sets: Sets) -> Outcome | Fork:
+        """Return what a tick comes to after its first answers, or what is asked next, of managers that have answered so."""
+        known = self.system.ticker.known(memory, act, self._view(sets), answers)
+        if isinstance(known, Outcome):
+            return known
+        if known.options:
+            return Fork(tuple((option, sets) for option in known.options), free=True)
+        return Fork(tuple(self._divided(known, sets)), free=False)
 
     def _divided(self, known: Decision, sets: Sets) -> Iterator[tuple[Answer, Sets]]:
         place = self.system.place_of(known.question)

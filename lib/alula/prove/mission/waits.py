@@ -7,13 +7,14 @@ at situations at rest, from one tick to the next: the mission never ends after o
 from __future__ import annotations
 
 from collections import deque
-from collections.abc import Iterator, Mapping
+from collections.abc import Iterable, Iterator, Mapping
 from dataclasses import dataclass
 from functools import partial
 from itertools import product
 
 from alula.prove.limits import Deadline, OutOfTimeError
 from alula.prove.mission.calm import calm_of, reaching
+from alula.prove.mission.ending import Ending, Group
 from alula.prove.mission.fitting import Values, agree, all_values, answers
 from alula.prove.mission.measured import DATA
 from alula.prove.mission.oracle import Answer, Asked, Question
@@ -58,19 +59,16 @@ class Waits:
 
         When the time is over, it yields those of what was looked at by then, and raises OutOfTimeError.
         """
-        first: dict[State, int] = {}
         told: set[tuple[int, bool]] = set()
         questions = tuple(self._system.ticker.about_data)
         over: OutOfTimeError | None = None
         ends = self._regions.complete
-        try:
-            self._situations(first, deadline)
-        except OutOfTimeError as error:
-            over = error
+        ending = Ending(self._regions, self._groups(), self._at_rest_after)
         for values in all_values(questions):
-            if over is not None:
-                break
+            first: dict[State, int] = {}
+            self._before, self._after, self._ends, self._open, self._asking = {}, {}, set(), set(), set()
             try:
+                self._situations(ending.doubtful(values, deadline), first, deadline)
                 self._explore(list(first), deadline, values)
             except OutOfTimeError as error:
                 over = error
@@ -80,8 +78,8 @@ class Waits:
             data = ", ".join(words for one in answers(values, questions) if (words := choice(one)))
             for found in self._never_over(first, never, told):
                 yield (*found, data)
-        if over is not None:
-            raise over
+            if over is not None:
+                raise over
         self.always_ends = ends
 
     def _never_over(
@@ -112,8 +110,8 @@ class Waits:
                 return after
             state = min(left)
 
-    def _situations(self, found: dict[State, int], deadline: Deadline) -> None:
-        """Add those of all regions, each with the first region that has it."""
+    def _groups(self) -> Iterator[Group]:
+        """Yield all situations at rest, with the managers of one skillset dead at most: with those of several there are too many."""
         for number, region in enumerate(self._regions.regions):
             if not self._system.ticker.memories[region.memory].started or self._over(region.memory):
                 continue
@@ -121,15 +119,20 @@ class Waits:
                 sorted((one for one in closure.all if self._rests(place, one)), key=closure.depth.__getitem__)
                 for place, closure in enumerate(region.closures)
             ]
-            deadline.check()
             for choices in self._one_dead(resting):
-                for managers in product(*choices):
-                    if (region.memory, managers) not in found:
-                        found[State(region.memory, managers)] = number
-                        deadline.check()
+                yield Group(number, region.memory, tuple(map(tuple, choices)))
+
+    def _situations(self, groups: Iterable[Group], found: dict[State, int], deadline: Deadline) -> None:
+        """Add those of groups, each with the first region that has it."""
+        for group in groups:
+            deadline.check()
+            for managers in product(*group.managers):
+                if (group.memory, managers) not in found:
+                    found[State(group.memory, managers)] = group.region
+                    deadline.check()
 
     def _one_dead(self, resting: list[list[int]]) -> Iterator[list[list[int]]]:
-        """Yield choices with the managers of one skillset dead at most: with those of several there are too many."""
+        """Yield the managers that live, and with those of one skillset dead."""
         alive = [[one for one in several if self._system.managers_of(one).states is not None] for several in resting]
         yield alive
         for place, several in enumerate(resting):
@@ -139,7 +142,6 @@ class Waits:
 
     def _explore(self, todo: list[State], deadline: Deadline, values: Values) -> None:
         """Look at what comes after situations while data have these values."""
-        self._before, self._after, self._ends, self._asking = {}, {}, set(), set()
         seen, waiting = set(todo), deque(todo)
         self._open = seen.copy()
         while waiting:
@@ -190,9 +192,12 @@ class Waits:
         return self._after_ticks.setdefault(id(ticked), _AfterTick(ticked, about_data, tuple({} for _ in self._system.skillsets)))
 
     def _come(self, place: int, number: int, known: _AfterTick) -> tuple[int, ...]:
-        """Return managers at rest after what a tick has asked for."""
-        come = known.come[place][number] = self._resting(place, self._regions.after(place, number, known.ticked))
+        come = known.come[place][number] = self._at_rest_after(place, number, known.ticked)
         return come
+
+    def _at_rest_after(self, place: int, number: int, ticked: Outcome) -> tuple[int, ...]:
+        """Return managers at rest after what a tick has asked for."""
+        return self._resting(place, self._regions.after(place, number, ticked))
 
     def _over(self, memory: int) -> bool:
         return self._system.ticker.memories[memory].end is not None
