@@ -1,6 +1,7 @@
 """The mapping mission through the whole stack: nominal, and with sensors that fail. Two flights at a time share the machine.
 
-The nominal flight maps the whole yard; those with a failure fly no further than its first corners: what follows from it has happened.
+The nominal flight goes around both kinds of corners of the yard, and those with a failure no further than the first: what follows
+from it has happened.
 """
 
 from __future__ import annotations
@@ -31,23 +32,27 @@ MAX_START_S = 2.0  # mission clock, until GUIDED; the start of the nodes takes t
 MAX_CHECKS_S = 2.3  # from GUIDED until the mission begins: 1.5 s of the autopilot's checks in GUIDED, SYS_STATUS twice a second
 
 
-@pytest.fixture(scope="module")
-def first_legs(tmp_path_factory: pytest.TempPathFactory) -> str:
-    """Write the yard with the first two of its four legs; return the file."""
+def yard_of(legs: int, folder: Path) -> str:
+    """Write the yard with the first of its four legs; return the file."""
     yaml = ruamel.yaml.YAML()
     world = yaml.load(YARD.read_text(encoding="utf-8"))
-    del world["route"][3:]
-    path = tmp_path_factory.mktemp("world") / "first_legs.yaml"
+    del world["route"][legs + 1 :]
+    path = folder / f"{legs}_legs.yaml"
     with path.open("w", encoding="utf-8") as file:
         yaml.dump(world, file)
     return str(path)
 
 
 @pytest.fixture(scope="module")
+def first_legs(tmp_path_factory: pytest.TempPathFactory) -> str:
+    return yard_of(2, tmp_path_factory.mktemp("world"))
+
+
+@pytest.fixture(scope="module")
 def pair(tmp_path_factory: pytest.TempPathFactory, first_legs: str) -> Iterator[tuple[Flight, Flight]]:
     """Fly the nominal mission and the one that loses its ZED at the same time: parallel runs must not disturb each other."""
     base = tmp_path_factory.mktemp("flights")
-    nominal = start_flight(base / "nominal", "--rate", "0")
+    nominal = start_flight(base / "nominal", "--rate", "0", "--world", yard_of(3, base))
     failing = start_flight(base / "failing", "--rate", "0", "--fail", f"zed@{FAILING_S:g}", "--world", first_legs)
     yield nominal, failing
     nominal.give_up()

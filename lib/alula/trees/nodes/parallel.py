@@ -26,9 +26,9 @@ class _AtOnce(Control):
         self._done.clear()
         self._failed = 0
 
-    def _threshold(self, port: str, never: str) -> int:
+    def _threshold(self, port: str, given: int, never: str) -> int:
         """Return a number of children; one below zero counts from all of them, -1 for all."""
-        given, count = self.number(port), len(self.children)
+        count = len(self.children)
         threshold = max(count + given + 1, 0) if given < 0 else given
         if threshold > count:
             raise TickError(f"{self.place()}: {port} is {given} and it has {count} children: it can never {never}")
@@ -45,8 +45,9 @@ class Parallel(_AtOnce):
 
     def update(self) -> Answer:
         """Tick those that have not ended."""
-        enough, too_many = self._threshold("success_count", "succeed"), self._threshold("failure_count", "fail")
-        lenient, count = self.number("success_count") < 0, len(self.children)
+        successes, failures = self.number("success_count"), self.number("failure_count")
+        enough, too_many = self._threshold("success_count", successes, "succeed"), self._threshold("failure_count", failures, "fail")
+        lenient, count = successes < 0, len(self.children)
         self.become(RUNNING)
         skipped = 0
         for index, child in enumerate(self.children):
@@ -77,7 +78,7 @@ class ParallelAll(_AtOnce):
 
     def update(self) -> Answer:
         """Tick those that have not ended."""
-        too_many, count = self._threshold("max_failures", "fail"), len(self.children)
+        too_many, count = self._threshold("max_failures", self.number("max_failures"), "fail"), len(self.children)
         self.become(RUNNING)
         skipped = 0
         for index, child in enumerate(self.children):
