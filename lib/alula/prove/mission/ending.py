@@ -8,7 +8,7 @@ ends. Where one target has to do for all that answer alike, groups can be in dou
 from __future__ import annotations
 
 from collections import defaultdict
-from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
+from collections.abc import Callable, Iterable, Iterator, Sequence
 from typing import NamedTuple
 
 from alula.prove.limits import Deadline
@@ -30,15 +30,17 @@ class Group(NamedTuple):
 
 
 class _Way(NamedTuple):
-    """What a tick can come to: its outcome with all sets of managers that must meet the target's, or what follows from answers.
+    """What a tick can come to: an outcome, or what follows from answers.
 
-    Of observations all that follow count (``parts``), of what nobody knows any one.
+    Of observations all that follow count (``parts``), of what nobody knows any one. Into a target come the managers that each skillset's
+    ``must`` holds, and of each of ``either`` one.
     """
 
-    outcome: Outcome | None
-    come: tuple[frozenset[tuple[int, ...]], ...]
-    parts: tuple[_Way, ...]
-    any_part: bool
+    outcome: Outcome | None = None
+    must: Sets = ()
+    either: tuple[frozenset[tuple[int, ...]], ...] = ()
+    parts: tuple[_Way, ...] = ()
+    any_part: bool = False
 
     def outcomes(self) -> Iterator[Outcome]:
         """Yield all that it can come to."""
@@ -46,6 +48,12 @@ class _Way(NamedTuple):
             yield self.outcome
         for part in self.parts:
             yield from part.outcomes()
+
+    def leads_into(self, sets: Sets) -> bool:
+        """Tell whether all managers can come into a target."""
+        return all(must <= target for must, target in zip(self.must, sets, strict=True)) and not any(
+            target.isdisjoint(one) for several, target in zip(self.either, sets, strict=True) for one in several
+        )
 
 
 class Ending:
@@ -60,11 +68,15 @@ class Ending:
         self._ways: list[_Way] = []
         self._leading: defaultdict[int, list[int]] = defaultdict(list)
         """By memories the numbers of the groups from which a tick can come to them."""
+        self._sure: defaultdict[int, list[Sets]] = defaultdict(list)
+        self._tried: dict[int, int | None] = {}
+        """By the identity of ways how many of the groups that are sure were tried as targets; None: one is."""
 
     def doubtful(self, values: Values, deadline: Deadline) -> list[Group]:
         """Return those in doubt while data have these values, in their order; raises OutOfTimeError."""
         self._look_ahead(deadline)
-        sure: defaultdict[int, list[Sets]] = defaultdict(list)
+        self._sure = defaultdict(list)
+        self._tried = {}
         doubtful = set(range(len(self.groups)))
         # What leads to these memories may have become sure: first, what leads to the end.
         todo = dict.fromkeys(memory for memory in self._leading if self._memories[memory].end is not None)
@@ -73,10 +85,10 @@ class Ending:
             reached = next(iter(todo))
             del todo[reached]
             for number in self._leading[reached]:
-                if number in doubtful and self._ends(self._ways[number], sure, values):
+                if number in doubtful and self._ends(self._ways[number], values):
                     doubtful.discard(number)
                     memory = self.groups[number].memory
-                    sure[memory].append(self._sets[number])
+                    self._sure[memory].append(self._sets[number])
                     todo[memory] = None
         return [self.groups[number] for number in sorted(doubtful)]
 
@@ -91,20 +103,23 @@ class Ending:
     def _following(self, memory: int, answers: tuple[Answer, ...], sets: Sets) -> _Way:
         found = self._regions.follow(memory, TICK, answers, sets)
         if isinstance(found, Outcome):
-            come = (frozenset(self._come(place, number, found) for number in numbers) for place, numbers in enumerate(sets))
-            return _Way(found, tuple(come), (), any_part=False)
+            come = [{self._come(place, number, found) for number in numbers} for place, numbers in enumerate(sets)]
+            must = (frozenset(one[0] for one in several if len(one) == 1) for several in come)
+            return _Way(found, tuple(must), tuple(frozenset(one for one in several if len(one) != 1) for several in come))
         parts = tuple(self._following(memory, (*answers, answer), left) for answer, left in found.ways)
-        return _Way(None, (), parts, found.free)
+        return _Way(parts=parts, any_part=found.free)
 
-    def _ends(self, way: _Way, sure: Mapping[int, Sequence[Sets]], values: Values) -> bool:
+    def _ends(self, way: _Way, values: Values) -> bool:
         if way.outcome is None:
-            ends = (self._ends(part, sure, values) for part in way.parts)
+            ends = (self._ends(part, values) for part in way.parts)
             return any(ends) if way.any_part else all(ends)
         if not agree(values, way.outcome.choices):
             return False
         if self._memories[way.outcome.memory].end is not None:
-            return all(after for several in way.come for after in several)
-        return any(
-            all(not target.isdisjoint(after) for target, several in zip(sets, way.come, strict=True) for after in several)
-            for sets in sure[way.outcome.memory]
-        )
+            return all(one for several in way.either for one in several)
+        tried, sure = self._tried.get(id(way), 0), self._sure[way.outcome.memory]
+        if tried is None or any(way.leads_into(sets) for sets in sure[tried:]):
+            self._tried[id(way)] = None
+            return True
+        self._tried[id(way)] = len(sure)
+        return False
