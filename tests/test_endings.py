@@ -75,8 +75,7 @@ def test_killed_front_leaves_nothing_and_the_vehicle_lands(fly: StartFlight) -> 
     assert "front" in died(flight)
 
 
-# Each flight loses some nodes, one after the other: each has its own part in a flight, and is started again without the others' help.
-# The recorder is the last: it stays away, and what follows is on no record. Without any of the second four, no skill lands it.
+# Each flight loses some nodes, one after the other. The recorder is the last of the first flight's: it stays away, and what follows is on no record.
 LOST_NODES = {"functional": ("zed_depth", "record"), "skills": ("perception", "navigation", "uav_guidance", "ros_bridge")}
 
 

@@ -81,6 +81,7 @@ class Ending:
         # What leads to these memories may have become sure: first, what leads to the end.
         todo = dict.fromkeys(memory for memory in self._leading if self._memories[memory].end is not None)
         while todo:
+            deadline.doing = f"waits: {len(doubtful)} groups to look at"
             deadline.check()
             reached = next(iter(todo))
             del todo[reached]
@@ -94,6 +95,7 @@ class Ending:
 
     def _look_ahead(self, deadline: Deadline) -> None:
         for number in range(len(self._ways), len(self.groups)):
+            deadline.doing = f"waits: what follows after {number} of {len(self.groups)} groups"
             deadline.check()
             way = self._following(self.groups[number].memory, (), self._sets[number])
             self._ways.append(way)

@@ -63,7 +63,7 @@ class Waits:
         questions = tuple(self._system.ticker.about_data)
         over: OutOfTimeError | None = None
         ends = self._regions.complete
-        ending = Ending(self._regions, self._groups(), self._at_rest_after)
+        ending = Ending(self._regions, self._groups(deadline), self._at_rest_after)
         for values in all_values(questions):
             first: dict[State, int] = {}
             self._before, self._after, self._ends, self._open, self._asking = {}, {}, set(), set(), set()
@@ -110,9 +110,11 @@ class Waits:
                 return after
             state = min(left)
 
-    def _groups(self) -> Iterator[Group]:
+    def _groups(self, deadline: Deadline) -> Iterator[Group]:
         """Yield all situations at rest, with the managers of one skillset dead at most: with those of several there are too many."""
         for number, region in enumerate(self._regions.regions):
+            deadline.doing = f"waits: {number} of {len(self._regions.regions)} regions at rest"
+            deadline.check()
             if not self._system.ticker.memories[region.memory].started or self._over(region.memory):
                 continue
             resting = [
