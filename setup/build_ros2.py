@@ -20,7 +20,7 @@ TOOLS = re.compile(r"(ros-|colcon-|empy|catkin-pkg|numpy)", re.IGNORECASE)
 CMAKE_ARGUMENTS = (
     "-DCMAKE_BUILD_TYPE=None",
     # The bridge's data plane sets flags of its own; everything else is messages and their type support, compiled quickly rather than
-    # well: a skill's messages take Python as long to convert and to serialise as with -O1.
+    # well: Python takes as long to serialise a skill's goal as with -O1.
     "-DCMAKE_CXX_FLAGS=-O0",
     "-DCMAKE_C_FLAGS=-O0",
     "-DCMAKE_RULE_MESSAGES=OFF",  # each line of progress is a process
