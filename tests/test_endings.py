@@ -75,7 +75,7 @@ def test_killed_front_leaves_nothing_and_the_vehicle_lands(fly: StartFlight) -> 
     assert "front" in died(flight)
 
 
-# Each flight loses some nodes, one after the other. The recorder is the last of its flight: it stays away, and nothing is on record after it.
+# Each flight loses some nodes, one after the other. The recorder is the last of its flight: it stays away, nothing is on record after it.
 LOST_NODES = {"functional": ("zed_depth", "record"), "skills": ("perception", "navigation", "uav_guidance", "ros_bridge")}
 
 
