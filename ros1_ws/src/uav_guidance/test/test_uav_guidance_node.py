@@ -54,12 +54,13 @@ class Bench:
         self.reasons: dict[str, str] = {}
         self.transitions: list[tuple[str, str]] = []
         self.sees: Callable[[], float | None] | None = None
-        """What a sensor tells with each state of the guidance: how far an obstacle is, metres. Time waits for the guidance meanwhile."""
-        self.done_s = 0.0
-        """Up to when the guidance is done. Its state's stamps can't be waited for: they lag behind where messages were held up."""
+        """What a sensor tells with each state of the guidance: how far an obstacle is, metres."""
+        self.done_s: float | None = None
+        """Up to when the guidance is done, None until it tells: time waits for it, as the simulator's does. Its state's stamps can't be
+        waited for: they lag behind where messages were held up."""
         self._clock = rospy.Publisher("/clock", Clock, queue_size=10)
         self.autopilot = FakeAutopilot(on_clock=lambda now_s: self._clock.publish(rospy.Time.from_sec(now_s)))
-        self.autopilot.keep_pace = lambda: self.sees is None or self.autopilot.now_s - self.done_s < PACE_S
+        self.autopilot.keep_pace = lambda: self.done_s is None or self.autopilot.now_s - self.done_s < PACE_S
         self._shown = rospy.Publisher("/navigation/resource_states", ResourceStates, queue_size=10, latch=True)
         self._service = rospy.Service("/navigation/transition", Transition, self._take_transition)
         self.obstacles = rospy.Publisher("/zed_depth/obstacle", Obstacle, queue_size=10)
@@ -77,6 +78,7 @@ class Bench:
         self.autopilot.start()
 
     def run_node(self) -> subprocess.Popen[bytes]:
+        self.done_s = None
         path = os.environ.get("PYTHONPATH", "")
         os.environ["PYTHONPATH"] = ":".join([str(SOURCES / "uav_guidance/src"), str(SOURCES / "resource_reporter/src"), path])
         self.node = self._start_node(["python3", str(SOURCES / "uav_guidance/scripts/uav_guidance_node")])
@@ -225,7 +227,7 @@ def test_whole_mission_leaves_the_golden_transcript(bench):
 
 def test_pilot_takes_over_and_nothing_is_taken_back(bench):
     bench.take_off()
-    bench.call("set_position", SetPositionReference, Point(20.0, 0.0, 3.0), 1.5, KEEP)
+    assert bench.call("set_position", SetPositionReference, Point(20.0, 0.0, 3.0), 1.5, KEEP).accepted
     bench.until(lambda s: s.position_enu_m.x > 1.0, "under way")
     bench.autopilot.pilot(LOITER)
     bench.until(lambda s: not s.authority and s.reference == "idle" and s.mode == "LOITER", "taken over")
@@ -283,7 +285,7 @@ def test_obstacle_stops_it_and_it_goes_on_when_clear(bench):
 
     send_raw(bench.obstacles, framed(bytes(20)))  # cut short on the wire: those after it count all the same
     bench.sees = sees
-    bench.call("set_position", SetPositionReference, Point(15.0, 0.0, 3.0), 1.5, KEEP)
+    assert bench.call("set_position", SetPositionReference, Point(15.0, 0.0, 3.0), 1.5, KEEP).accepted
     bench.until(lambda s: s.obstacle_stop and s.obstacle_m < 3.0, "it sees the obstacle")
     bench.until(lambda s: s.obstacle_stop and s.still_s > 3.0, "held back, and it counts as still")
     assert bench.autopilot.enu[0] < obstacle_at - 1.0
@@ -305,7 +307,6 @@ def test_what_it_is_done_with_is_told_whether_the_autopilot_speaks_or_not(bench)
     done: list[float] = []
     listener = rospy.Subscriber("/uav_guidance/done", Header, lambda m: done.append(m.stamp.to_sec()))
     bench.until(lambda s: s.link and s.home_valid and bool(done), "the autopilot speaks")
-    bench.autopilot.keep_pace = lambda: bench.autopilot.now_s - done[-1] <= 0.3  # time waits for the node, as the simulator's does
     autopilot = bench.autopilot
     for change in (lambda: None, autopilot.drop_client, autopilot.forget_streams, autopilot.close_port, autopilot.open_port):
         change()
@@ -317,7 +318,7 @@ def test_what_it_is_done_with_is_told_whether_the_autopilot_speaks_or_not(bench)
 
 def test_respawned_in_flight_it_hovers_where_it_is(bench):
     bench.take_off()
-    bench.call("set_position", SetPositionReference, Point(15.0, 0.0, 3.0), 1.0, KEEP)
+    assert bench.call("set_position", SetPositionReference, Point(15.0, 0.0, 3.0), 1.0, KEEP).accepted
     bench.until(lambda s: s.position_enu_m.x > 2.0, "under way")
     bench.node.kill()
     bench.node.wait()
