@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections import deque
 from collections.abc import Sequence
 
 import behaviortreepy
@@ -16,6 +17,9 @@ from alula.trees.standard import standard_palette
 from alula.trees.status import NAMES
 
 RAISED = "raised"
+KEPT = 50
+"""Trees that are kept for a while. As one goes, BehaviorTree.CPP joins the threads of its timers, which can miss that they are to end
+while they are about to wait, and the process hangs: by then they wait."""
 
 
 class Theirs:
@@ -23,6 +27,7 @@ class Theirs:
 
     def __init__(self) -> None:
         self._story = Story({})
+        self._kept: deque[object] = deque()
         status = behaviortreepy.NodeStatus.__members__
         self._factory = behaviortreepy.BehaviorTreeFactory()
 
@@ -35,6 +40,8 @@ class Theirs:
 
     def play(self, text: str, answers: Answers, ticks: int, halts: Sequence[int]) -> Story:
         """Tick a file so often, halted before some of the ticks."""
+        if len(self._kept) == KEPT:
+            self._kept.popleft()
         story = self._story = Story(answers)
         try:
             tree = self._factory.create_tree_from_text(text)
@@ -53,6 +60,7 @@ class Theirs:
                 break
             story.ticked(root)
         self._story = Story(answers)  # what a tree does as it goes is nobody's
+        self._kept.append(tree)
         return story
 
 
