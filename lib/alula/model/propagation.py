@@ -81,8 +81,7 @@ def _because(step: Step, invariant: Invariant) -> tuple[Unmet, str]:
         message += f" for {invariant.hold.for_s:g} s"
     causes = [happening for happening in step.happenings if isinstance(happening, Change)]
     if causes:
-        last = causes[-1]
-        message += f", after {last.resource} {last.source} -> {last.target} ({last.cause})" + (f": {last.reason}" if last.reason else "")
+        message += f", after {causes[-1].sentence()}"
     return unmet, message
 
 

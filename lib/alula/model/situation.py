@@ -46,6 +46,10 @@ class Change:
     cause: str
     reason: str = field(default="", compare=False)
 
+    def sentence(self) -> str:
+        """Return what changed, by what and why, for a person."""
+        return f"{self.resource} {self.source} -> {self.target} ({self.cause})" + (f": {self.reason}" if self.reason else "")
+
 
 @dataclass(frozen=True)
 class Entered:

@@ -104,6 +104,20 @@ def test_not_ready_names_the_precondition_and_the_states():
     assert bench.hooks["takeoff"].calls == ["validate"]
 
 
+def test_a_refusal_says_after_which_explained_change_it_came():
+    bench = Bench()
+    bench.engine.transition("sdk", "UNAVAILABLE", "the vehicle is in RTL")
+    refused = bench.run()
+    assert refused.state is S.NOT_READY
+    assert refused.message == "sdk_authority: sdk is UNAVAILABLE, after sdk AVAILABLE -> UNAVAILABLE (extern): the vehicle is in RTL"
+    assert [one.reason for one in refused.unmet] == ["sdk_authority: sdk is UNAVAILABLE"]
+    bench.engine.transition("sdk", "AVAILABLE", "it is in GUIDED")
+    running = bench.run()
+    second = bench.run()
+    assert running.state is S.RUNNING
+    assert second.message == "not_moving: axes is USED", "what a skill changed is no reason of the functional layer"
+
+
 def test_a_second_execution_is_for_the_preconditions_to_forbid():
     bench = Bench()
     first = bench.run()

@@ -125,7 +125,7 @@ class SkillsetContext:
                 events.append(self._changed(happening))
                 continue
             entry = self.entries[happening.execution.id]
-            _set_state(entry.execution, happening)
+            _set_state(entry.execution, self._with_cause(happening))
             events.append(self._entered(entry.execution))
             if entry.execution.done:
                 ended.append(entry)
@@ -151,6 +151,16 @@ class SkillsetContext:
         self.resources[change.resource] = ResourceStatus(change.target, change.source, now_ns, change.reason)
         states = (change.resource, change.source, change.target)
         return TransitionEvent(self.sequence, now_ns, *states, change.cause, self._skillset.name, change.reason)
+
+    def _with_cause(self, entered: Entered) -> Entered:
+        """Have a refusal say which change that was explained came last of what it asks for; an end by an invariant says it already."""
+        asked = [(name, self.resources[name]) for one in entered.unmet for name in one.states]
+        told = [(name, status) for name, status in asked if status.reason]
+        if entered.state is not ExecutionState.NOT_READY or not told:
+            return entered
+        name, last = max(told, key=lambda one: one[1].stamp_ns)
+        change = Change(name, last.previous, last.state, semantics.EXTERN, last.reason)
+        return replace(entered, message=f"{entered.message}, after {change.sentence()}")
 
     def _entered(self, execution: Execution) -> ExecutionEvent:
         self.sequence += 1
