@@ -13,6 +13,7 @@ from ros_bridge.discovery import GraphReader
 from ros_bridge.errors import BridgeError
 from ros_bridge.graph import LIST_NODE
 from ros_bridge.graph_events import GraphEvents
+from ros_bridge.ros2_graph import all_named
 from ros_bridge.ros2_types import interface_class
 from ros_bridge.tables import list_table, render
 
@@ -32,7 +33,8 @@ def list_routes(config: BridgeConfig, types: Types, master: Connection) -> str:
     reader = GraphReader(node, types, master, f"/{LIST_NODE}")
     try:
         end_s = time.monotonic() + AT_MOST_S
-        while time.monotonic() < end_s and events.wait(QUIET_S):  # DDS finds the others in its own time
+        # DDS finds the others in its own time, and their names after them.
+        while time.monotonic() < end_s and (events.wait(QUIET_S) or not all_named(node)):
             time.sleep(QUIET_S / 10)
         reader.read_ros1(master.call_raw("getSystemState", f"/{LIST_NODE}"))
         decisions = decide(reader.graphs(), config.selection, reader.types, config.routes)

@@ -3,6 +3,7 @@
 import json
 import subprocess
 import sys
+from types import SimpleNamespace
 
 import pytest
 from diagnostic_msgs.msg import DiagnosticArray, DiagnosticStatus
@@ -12,6 +13,7 @@ from std_msgs.msg import String
 
 from alula.common.network import free_port
 from alula_testing.waits import until
+from ros_bridge.ros2_graph import UNNAMED, all_named
 
 CONFIG = "discover: {all: true}"
 
@@ -78,8 +80,23 @@ def listed(master, topic):
         rows.update({line.split()[1]: " ".join(line.split()) for line in run.stdout.splitlines()})
         return topic in rows
 
-    until(has_topic, f"the list has {topic}")
+    try:
+        until(has_topic, f"the list has {topic}")
+    except AssertionError as error:
+        error.add_note(f"it had {sorted(rows)}")
+        raise
     return rows
+
+
+@pytest.mark.parametrize(("publisher", "named"), [("camera", True), (UNNAMED, False)])
+def test_a_node_that_is_not_known_yet_by_its_name_is_waited_for(publisher, named):
+    """DDS tells of a topic before it tells whose it is; the list leaves out what is nobody's."""
+    node = SimpleNamespace(
+        get_topic_names_and_types=lambda: [("/d/seen", ["std_msgs/msg/String"])],
+        get_publishers_info_by_topic=lambda _: [SimpleNamespace(node_name=publisher)],
+        get_subscriptions_info_by_topic=lambda _: [SimpleNamespace(node_name="viewer")],
+    )
+    assert all_named(node) is named
 
 
 def test_the_list_tells_what_would_be_and_what_can_not_and_ends(ros1, ros2_node, master):
