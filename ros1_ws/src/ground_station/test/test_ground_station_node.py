@@ -33,6 +33,7 @@ WIDTH, HEIGHT = 320, 180
 TICK_NS, FRAME_NS = NS // 50, NS // 20
 SHOWN = 40
 PLAYED = 10
+RESTS, HOLDS = 5, 100  # messages of a stick, at most 50 a second
 KEY = "a secret of this test"
 NODES = RADIO, STREAM, GROUND = "radio_link", "video_stream", "ground_station"
 
@@ -328,18 +329,19 @@ def test_the_stick_s_topic_takes_the_vehicle_over_and_the_service_gives_it_back(
     give_back.wait_for_service(HANGS_S)
     assert give_back().reason == "the telepilot does not have the vehicle"
 
-    def hold(forward: float) -> Callable[[], None]:
-        def held() -> None:
-            stick.publish(Twist(linear=Vector3(x=forward)))
-            autopilot.work()
-
-        return held
-
     def flown(forward: float, condition: Callable[[], bool]) -> None:
-        held = hold(forward)
-        until(lambda: held() or condition(), what=f"the stick at {forward}")
+        """Hold the stick; where nothing follows, rest and push again, as a person does: of positions only the newest is heard."""
 
-    hold(0.0)()
+        def follows() -> bool:
+            for position in [0.0] * RESTS + [forward] * HOLDS:
+                stick.publish(Twist(linear=Vector3(x=position)))
+                autopilot.work()
+                if condition():
+                    return True
+            return False
+
+        until(follows, what=f"the stick at {forward}")
+
     flown(0.5, lambda: 500 in autopilot.sticks)
     assert autopilot.mode == 5
     until(lambda: autopilot.work() or autopilot.sticks[-1] == 0, what="a stick that says nothing is centred")
