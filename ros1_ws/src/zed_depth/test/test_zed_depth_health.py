@@ -255,6 +255,21 @@ def test_images_that_are_displaced_by_some_bytes_are_known_by_their_seam(scene) 
     assert "both images have a step in column 100" in found.reason
 
 
+@pytest.mark.parametrize("width", [8, 12, 30])
+@pytest.mark.parametrize("brighter", [False, True])
+def test_edges_of_a_post_that_meet_in_a_column_are_of_the_scene(width, brighter) -> None:
+    """A post as wide as its disparity: its left edge in the left image is where its right edge is in the right one, at any distance."""
+    left, right = (image.copy() for image in wall_pair(2.4, seed=1))
+    grains = np.random.default_rng(4).normal(0.0, 1.0, (34, 60))
+    post = cv2.resize(grains, (width, 270), interpolation=cv2.INTER_LINEAR) * 20.0 + (225.0 if brighter else 30.0)
+    for image, begin in ((left, 200), (right, 200 - width)):
+        image[:, begin : begin + width] = np.clip(post, 0, 255)
+    pair = noisy(left, 5), noisy(right, 6)
+    assert fixed_columns_finding(*pair).ok
+    dead_column = [np.where(np.arange(480) == 100, 0, image).astype(np.uint8) for image in pair]
+    assert "in column 10" in fixed_columns_finding(*dead_column).reason, "beside what is of the scene"
+
+
 def far_and_near(shift_px) -> tuple[np.ndarray, np.ndarray]:
     """Return a pair whose upper third is far away, at 0.6 px, the right camera turned aside by some pixels."""
     (left, far), (_, near) = wall_pair(0.6, seed=1), wall_pair(9.5, seed=1)
