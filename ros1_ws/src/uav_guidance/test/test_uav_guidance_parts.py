@@ -15,7 +15,7 @@ from perception_core.tunable import check_ranges, ranges
 from uav_guidance.commands import ATTEMPTS, Outcome, Procedure, arm, set_mode, take_off
 from uav_guidance.encoding import from_autopilot_to_us
 from uav_guidance.settings import GuidanceSettings
-from uav_guidance.stamping import Alarm, FineClock, StampClock
+from uav_guidance.stamping import PERIOD_NS, Alarm, FineClock, StampClock, Steps
 from uav_guidance.stillness import StillWatch
 from uav_guidance.streams import STREAMS_HZ, StreamKeeper
 from uav_guidance.texts import TextAssembler
@@ -335,3 +335,37 @@ def test_an_alarm_wakes_at_its_moment_and_where_the_clock_is_set_back(last):
     assert wakes == [0, last]
     assert alarm.wait(last, 60.0)  # it has passed
     assert not alarm.wait(1000, 0.0)
+
+
+TICK_NS = 20_000_000
+
+
+@given(
+    st.integers(0, 10**9),
+    st.sampled_from([1.0, 1.2, 3.0, 6.0]),
+    st.lists(st.integers(0, 12), min_size=1, max_size=30),
+)
+def test_a_clock_that_waits_for_steps_never_waits_for_steps_that_wait_for_it(begin_ns, lag, held_up):
+    """``lag``: periods by which the clock may be ahead of what is done; ``held_up``: ticks that a step takes, where the clock goes on."""
+    steps = Steps(begin_ns)
+    now_ns = done_ns = begin_ns
+
+    def may_advance() -> bool:
+        return now_ns - done_ns <= lag * PERIOD_NS
+
+    for ticks in held_up:
+        while now_ns < steps.due_ns:
+            assert may_advance(), f"it stands at {now_ns}, the next step is due at {steps.due_ns}"
+            now_ns += TICK_NS
+        for _ in range(ticks):
+            now_ns += TICK_NS * may_advance()
+        if steps.made(now_ns):
+            done_ns = now_ns
+        assert now_ns - PERIOD_NS < steps.due_ns <= now_ns + PERIOD_NS
+
+
+def test_steps_follow_a_clock_that_is_set_back():
+    steps = Steps(10 * PERIOD_NS)
+    assert steps.made(10 * PERIOD_NS)
+    assert steps.made(2 * PERIOD_NS)
+    assert steps.due_ns == 3 * PERIOD_NS

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import contextlib
 import logging
-import math
 import threading
 import time
 from typing import Any
@@ -52,13 +51,12 @@ from uav_guidance.messages import (
     vec3,
 )
 from uav_guidance.settings import GuidanceSettings
-from uav_guidance.stamping import Alarm, FineClock, StampClock
+from uav_guidance.stamping import Alarm, FineClock, StampClock, Steps
 from uav_guidance.streams import STREAMS_HZ, StreamKeeper
 from uav_guidance.texts import TextAssembler
 
 log = logging.getLogger(__name__)
 
-STATE_HZ = 20.0
 HEARTBEAT_PERIOD_S = 1.0
 LOOK_S = 0.3  # wall clock; how often a sleep looks whether the node is shut down
 BUFFER_BYTES = 1 << 16
@@ -107,21 +105,26 @@ class GuidanceNode:
     def run(self) -> None:
         """Step at 20 Hz of the mission clock until the node is shut down; a clock that starts late is waited for."""
         self._link.start()
-        due_s = _now_s()
+        steps = Steps(rospy.get_rostime().to_nsec())
         while not rospy.is_shutdown():
             self._step()
-            due_s = _next_due(due_s, _now_s())
-            self._sleep_until(due_s)
+            now_ns = rospy.get_rostime().to_nsec()
+            if steps.made(now_ns):
+                self._stepped_ns = now_ns
+                if self._link.idle:
+                    self._report_done()
+            self._sleep_until(steps.due_ns)
         self._link.close()
         self._reporter.close()
 
-    def _sleep_until(self, due_s: float) -> None:
+    def _sleep_until(self, due_ns: int) -> None:
         """Sleep until a moment of the mission clock, or until it is set back, or the node is shut down."""
-        if not self._simulated or _now_s() == 0.0:  # rospy waits for a clock that was not heard yet
+        now_ns = rospy.get_rostime().to_nsec()
+        if not self._simulated or now_ns == 0:  # rospy waits for a clock that was not heard yet
             with contextlib.suppress(rospy.ROSInterruptException):
-                rospy.sleep(due_s - _now_s())
+                rospy.sleep((due_ns - now_ns) / 1e9)
             return
-        while not (rospy.is_shutdown() or self._alarm.wait(round(due_s * 1e9), LOOK_S)):
+        while not (rospy.is_shutdown() or self._alarm.wait(due_ns, LOOK_S)):
             pass
 
     # ---- services ------------------------------------------------------------------------------------------------------
@@ -244,12 +247,9 @@ class GuidanceNode:
             correction = correction_message(self._guidance.correction, now)
         self._tf.publish(correction)
         self._state.publish(state)
-        self._stepped_ns = now.to_nsec()
-        if self._link.idle:
-            self._report_done()
 
     def _report_done(self) -> None:
-        """Tell the last step's time, once: it is made, and all that the autopilot had sent by then has been taken."""
+        """Tell up to when all steps are made, once, where all that the autopilot had sent by then has been taken."""
         with self._changed:
             stepped_ns, told_ns = self._stepped_ns, self._done_ns
             self._done_ns = stepped_ns
@@ -275,12 +275,6 @@ def _on_garbage(reason: str) -> None:
 
 def _now_s() -> float:
     return float(rospy.get_rostime().to_sec())
-
-
-def _next_due(due_s: float, now_s: float) -> float:
-    """Return the time of the next step; steps that are missed are left out, and a clock that was set back is followed."""
-    missed = max(math.ceil((now_s - due_s) * STATE_HZ), 1)
-    return min(due_s + missed / STATE_HZ, now_s + 1.0 / STATE_HZ)
 
 
 def main() -> None:

@@ -1,4 +1,4 @@
-"""When a message was measured: the autopilot's own clock, set to the mission clock without the jitter of the arrival."""
+"""Times on the mission clock: of the guidance's steps, and of what the autopilot measured, without the jitter of the arrival."""
 
 from __future__ import annotations
 
@@ -9,6 +9,7 @@ from threading import Condition
 WINDOW = 250
 JUMP_NS = 500_000_000
 SMOOTHING = 0.1
+PERIOD_NS = 50_000_000  # of the guidance's steps
 
 
 class FineClock:
@@ -69,6 +70,23 @@ class Alarm:
     @property
     def _over(self) -> bool:
         return self._set_back or self._now_ns >= self._due_ns
+
+
+class Steps:
+    """When steps of the guidance are due, nanoseconds of the mission clock; a clock that was set back is followed."""
+
+    def __init__(self, begin_ns: int) -> None:
+        self.due_ns = begin_ns
+
+    def made(self, now_ns: int) -> bool:
+        """Take that a step was made, and what time it is after it; tell whether no step is due by now, so that all is done up to now.
+
+        Steps that were missed meanwhile are left out. Then the next may be due later than a clock comes that is held until what was due
+        is done: not the time of the step is to be told for that, but the time after it.
+        """
+        missed = max(-((self.due_ns - now_ns) // PERIOD_NS), 1)
+        self.due_ns = min(self.due_ns + missed * PERIOD_NS, now_ns + PERIOD_NS)
+        return self.due_ns > now_ns
 
 
 class StampClock:
