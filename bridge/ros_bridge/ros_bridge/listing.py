@@ -23,7 +23,7 @@ if TYPE_CHECKING:
     from ros_bridge.master import Connection
 
 QUIET_S = 1.0
-AT_MOST_S = 5.0
+AT_MOST_S = 10.0
 
 
 def list_routes(config: BridgeConfig, types: Types, master: Connection) -> str:

@@ -88,13 +88,16 @@ def listed(master, topic):
     return rows
 
 
-@pytest.mark.parametrize(("publisher", "named"), [("camera", True), (UNNAMED, False)])
-def test_a_node_that_is_not_known_yet_by_its_name_is_waited_for(publisher, named):
-    """DDS tells of a topic before it tells whose it is; the list leaves out what is nobody's."""
+@pytest.mark.parametrize(
+    ("publisher", "kind", "named"),
+    [("camera", "std_msgs/msg/String", True), (UNNAMED, "std_msgs/msg/String", False), (UNNAMED, "ShapeType", True)],
+)
+def test_a_node_that_is_not_known_yet_by_its_name_is_waited_for(publisher, kind, named):
+    """DDS tells of a topic before it tells whose it is; the list leaves out what is nobody's, and what is not of ROS never has a node."""
     node = SimpleNamespace(
-        get_topic_names_and_types=lambda: [("/d/seen", ["std_msgs/msg/String"])],
-        get_publishers_info_by_topic=lambda _: [SimpleNamespace(node_name=publisher)],
-        get_subscriptions_info_by_topic=lambda _: [SimpleNamespace(node_name="viewer")],
+        get_topic_names_and_types=lambda: [("/d/seen", [kind])],
+        get_publishers_info_by_topic=lambda _: [SimpleNamespace(node_name=publisher, topic_type=kind)],
+        get_subscriptions_info_by_topic=lambda _: [SimpleNamespace(node_name="viewer", topic_type=kind)],
     )
     assert all_named(node) is named
 
