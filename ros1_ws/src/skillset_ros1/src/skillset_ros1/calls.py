@@ -1,12 +1,18 @@
-"""Service calls that neither block their caller nor last for ever; rospy's own have no time limit."""
+"""Service calls that neither block their caller nor last for ever; rospy's own have no time limit.
+
+A rospy node's socket keeps five connections that were not accepted yet. The kernel drops what comes above that, and its sender asks again
+after 1, 3 and 7 s. So no more than a window of calls of one service is under way at a time; the others wait for their turn.
+"""
 
 from __future__ import annotations
 
 import contextlib
+import math
 import queue
 import socket
 import threading
 import time
+from collections import defaultdict, deque
 from collections.abc import Callable
 from typing import Any
 
@@ -16,6 +22,8 @@ from alula.runtime.core.errors import SkillRuntimeError
 
 DEFAULT_TIMEOUT_S = 2.0
 AGAIN_S = 0.1
+WINDOW = 4
+"""So many calls of a service are under way at a time, from one process; topics' connections come to the same socket."""
 OnReply = Callable[[Any], None]
 OnError = Callable[[str], None]
 
@@ -28,19 +36,26 @@ class _Call:
     """One call on a thread of its own; what closes it first, answer or deadline, decides."""
 
     def __init__(self, name: str, kind: Any, request: Any, timeout_s: float) -> None:
-        self._name, self._kind, self._request, self._timeout_s = name, kind, request, timeout_s
-        self._deadline_s = time.monotonic() + timeout_s
+        self.name, self.timeout_s = name, timeout_s
+        self._kind, self._request = kind, request
+        self.made_s = time.monotonic()
+        self._deadline_s = math.inf
         self._proxy: Any = None
         self._over = threading.Event()
         self._answer: queue.SimpleQueue[tuple[Any, str]] = queue.SimpleQueue()
 
-    def run(self) -> tuple[Any, str]:
-        """Return the reply, or None and why there is none; within the time limit."""
-        threading.Thread(target=self._try, name=f"call_{self._name}", daemon=True).start()
+    def run(self, from_s: float) -> tuple[Any, str]:
+        """Return the reply, or None and why there is none; within the time limit, which is counted from a time (`time.monotonic`)."""
+        late = f"service {self.name} did not answer within {self.timeout_s:g} s"
+        self._deadline_s = from_s + self.timeout_s
+        left_s = self._deadline_s - time.monotonic()
+        if left_s <= 0.0:
+            return None, late
+        threading.Thread(target=self._try, name=f"call_{self.name}", daemon=True).start()
         try:
-            return self._answer.get(timeout=self._timeout_s)
+            return self._answer.get(timeout=left_s)
         except queue.Empty:
-            return None, f"service {self._name} did not answer within {self._timeout_s:g} s"
+            return None, late
         finally:
             self._over.set()
             self._break_off()
@@ -48,7 +63,7 @@ class _Call:
     def _try(self) -> None:
         """Call, again while the service is not there yet."""
         while not self._over.is_set():
-            self._proxy = rospy.ServiceProxy(self._name, self._kind, persistent=True)
+            self._proxy = rospy.ServiceProxy(self.name, self._kind, persistent=True)
             try:
                 reply = self._proxy(self._request)
             except Exception as error:  # noqa: BLE001 - rospy lets through whatever the sockets below it raise
@@ -65,8 +80,8 @@ class _Call:
         late = time.monotonic() + AGAIN_S > self._deadline_s
         if not (sent or late or rospy.is_shutdown()):
             return False
-        what = f"broke off: {error}" if sent else f"is not there within {self._timeout_s:g} s"
-        self._answer.put((None, f"service {self._name} {what}"))
+        what = f"broke off: {error}" if sent else f"is not there within {self.timeout_s:g} s"
+        self._answer.put((None, f"service {self.name} {what}"))
         return True
 
     def _break_off(self) -> None:
@@ -84,26 +99,61 @@ def call_and_wait(name: str, kind: Any, request: Any, *, timeout_s: float = DEFA
     Raises:
         ServiceCallError: there is none within the time (wall clock).
     """
-    reply, error = _Call(name, kind, request, timeout_s).run()
+    reply, error = _Call(name, kind, request, timeout_s).run(time.monotonic())
     if error:
         raise ServiceCallError(error)
     return reply
 
 
-def call(name: str, kind: Any, request: Any, on_reply: OnReply, on_error: OnError, *, timeout_s: float = DEFAULT_TIMEOUT_S) -> None:
-    """Call a service; return at once. Then either ``on_reply`` or ``on_error`` is called, on another thread, in time.
+class _Queue:
+    """The calls of one service from this process, in order, a window of them at a time.
 
-    ``on_error`` is also called when ``on_reply`` raises, so ``on_error=execution.fail`` ends the execution whatever goes wrong.
+    The time of a call begins with the last answer before its turn, so that it is not counted how many came before; where the service has
+    answered none since the call was made, with the call.
     """
 
-    def run() -> None:
-        reply, error = _Call(name, kind, request, timeout_s).run()
+    def __init__(self) -> None:
+        self._lock = threading.Lock()
+        self._waiting: deque[tuple[_Call, OnReply, OnError]] = deque()
+        self._under_way = 0
+        self._answered_s = -math.inf
+
+    def put(self, call: _Call, on_reply: OnReply, on_error: OnError) -> None:
+        """Make a call when its turn comes."""
+        with self._lock:
+            self._waiting.append((call, on_reply, on_error))
+        self._begin()
+
+    def _begin(self) -> None:
+        with self._lock:
+            if not self._waiting or self._under_way >= WINDOW:
+                return
+            call, on_reply, on_error = self._waiting.popleft()
+            self._under_way += 1
+        threading.Thread(target=self._run, args=(call, on_reply, on_error), name=f"reply_{call.name}", daemon=True).start()
+
+    def _run(self, call: _Call, on_reply: OnReply, on_error: OnError) -> None:
+        reply, error = call.run(max(call.made_s, self._answered_s))
+        with self._lock:
+            self._under_way -= 1
+            self._answered_s = self._answered_s if error else time.monotonic()
+        self._begin()  # before the callbacks, which may take their time
         if error:
             on_error(error)
             return
         try:
             on_reply(reply)
         except Exception as problem:  # noqa: BLE001 - told, and the hook's to deal with
-            on_error(f"{name}: {type(problem).__name__}: {problem}")
+            on_error(f"{call.name}: {type(problem).__name__}: {problem}")
 
-    threading.Thread(target=run, name=f"reply_{name}", daemon=True).start()
+
+_queues: defaultdict[str, _Queue] = defaultdict(_Queue)
+
+
+def call(name: str, kind: Any, request: Any, on_reply: OnReply, on_error: OnError, *, timeout_s: float = DEFAULT_TIMEOUT_S) -> None:
+    """Call a service; return at once. Then either ``on_reply`` or ``on_error`` is called, on another thread, in time.
+
+    ``on_error`` is also called when ``on_reply`` raises, so ``on_error=execution.fail`` ends the execution whatever goes wrong. Of many
+    calls of one service each waits for its turn, and has its time from then on as long as the service answers.
+    """
+    _queues[rospy.resolve_name(name)].put(_Call(name, kind, request, timeout_s), on_reply, on_error)
