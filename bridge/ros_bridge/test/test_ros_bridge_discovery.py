@@ -86,7 +86,11 @@ def round_trip(ros1, ros2_node, publisher, topic, received, word):
     ros1.do("publish", topic=topic, values={field: f"{word} one"})
     see(f"{word} one")  # a peer hears itself
     markers = {f"{word} one", f"{word} two"}
-    ros2_node.until(lambda: markers <= {getattr(message, field) for message in received}, f"'{word}' arrives in ROS 2")
+    try:
+        ros2_node.until(lambda: markers <= {getattr(message, field) for message in received}, f"'{word}' arrives in ROS 2")
+    except AssertionError as error:
+        error.add_note(f"it had {[getattr(message, field) for message in received]}")
+        raise
     return seen
 
 
