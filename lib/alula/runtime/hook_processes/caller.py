@@ -16,7 +16,7 @@ from alula.runtime.core.errors import SkillRuntimeError
 from alula.runtime.core.events import EngineEvent, ExecutionEvent
 from alula.runtime.core.execution import Execution
 from alula.runtime.core.hook_calls import HookOutcome, Then
-from alula.runtime.hook_processes.place import Snapshot, admit, pipe_key, snapshot
+from alula.runtime.hook_processes.place import Snapshot, admit, hang_up, pipe_key, snapshot
 
 ENDED = "its process has ended"
 ASKED = {"terminate", "fail", "interrupted", "set_outputs"}
@@ -189,9 +189,8 @@ class _SkillProcess:
             then(answer)
 
     def close(self) -> None:
-        """Close the pipe, upon which the process ends."""
-        with contextlib.suppress(OSError):
-            self._pipe.close()
+        """End the pipe, upon which the process ends."""
+        hang_up(self._pipe)
 
     def _send(self, message: object) -> None:
         with self._sending, contextlib.suppress(OSError):

@@ -6,6 +6,7 @@ import contextlib
 import hashlib
 import os
 import secrets
+import socket
 import stat
 import tempfile
 from collections.abc import Callable, Mapping
@@ -64,6 +65,15 @@ def admit(pipe: Connection, key: bytes) -> None:
     """
     deliver_challenge(pipe, key)
     answer_challenge(pipe, key)
+
+
+def hang_up(pipe: Connection) -> None:
+    """End a connection that another thread reads: reading it raises EOFError from now on, here and at its other end.
+
+    To close it would not wake that thread, and the number of its file could be given to another file that is read then.
+    """
+    with contextlib.suppress(OSError), socket.socket(fileno=os.dup(pipe.fileno())) as end:
+        end.shutdown(socket.SHUT_RDWR)
 
 
 def _make_key(file: Path) -> None:

@@ -16,7 +16,7 @@ from alula.model.execution_state import ExecutionState
 from alula.runtime.core.execution import Execution
 from alula.runtime.core.hook_calls import HookOutcome, call_hook
 from alula.runtime.core.sanitize import as_text, error_line
-from alula.runtime.hook_processes.place import Snapshot, pipe_key
+from alula.runtime.hook_processes.place import Snapshot, hang_up, pipe_key
 from alula.runtime.hooks import HOOKS, SkillHooks, is_written
 from alula.runtime.workers import Workers
 
@@ -66,9 +66,9 @@ class HookServer:
             self._stopped.setdefault(execution.id, threading.Event()).wait(max(0.0, end_s - time.monotonic()))
         returned = self._workers.close(max(0.0, end_s - time.monotonic()))
         self._over.set()
-        with contextlib.suppress(OSError):
-            if self._pipe is not None:
-                self._pipe.close()
+        pipe = self._pipe
+        if pipe is not None:
+            hang_up(pipe)
         return returned
 
     def fail_all(self, reason: str) -> None:
@@ -126,6 +126,8 @@ class HookServer:
             strange = False
             written = [hook for hook in HOOKS if is_written(self._hooks, hook)]
             self._pipe = pipe
+            if self._over.is_set():
+                return  # `close` may have come before there was a pipe to end
             self._send(("hello", self._skill, written))
             self._read(pipe)
             self._pipe = None

@@ -9,8 +9,8 @@ import socket
 import subprocess
 import sys
 import threading
-from concurrent.futures import ThreadPoolExecutor
-from multiprocessing import AuthenticationError
+from concurrent.futures import ThreadPoolExecutor, wait
+from multiprocessing import AuthenticationError, Pipe
 from multiprocessing.connection import Client, Connection, Listener
 from pathlib import Path
 
@@ -20,7 +20,7 @@ from alula.runtime.core.errors import SkillRuntimeError
 from alula.runtime.core.execution import Execution
 from alula.runtime.core.hook_calls import HookOutcome
 from alula.runtime.hook_processes import HookServer, RemoteHooks, pipe_address
-from alula.runtime.hook_processes.place import pipe_key
+from alula.runtime.hook_processes.place import hang_up, pipe_key
 from alula.runtime.hooks import SkillHooks
 from alula_testing.runtime_models import flying_skill, flying_skillset
 from alula_testing.waits import until
@@ -115,6 +115,19 @@ def test_managers_say_in_one_line_what_is_wrong_with_the_folder(place, tmp_path)
     done = subprocess.run([sys.executable, script, "--part", "resources"], capture_output=True, text=True, check=False, timeout=60)
     assert done.returncode == 2
     assert [line for line in done.stderr.splitlines() if str(place) in line] == done.stderr.splitlines()[-1:]
+
+
+def test_whoever_reads_a_pipe_that_is_hung_up_is_told_at_both_ends():
+    ends = Pipe()
+    with ThreadPoolExecutor(2) as threads:
+        reading = [threads.submit(end.recv) for end in ends]
+        assert not wait(reading, QUIET_S).done
+        hang_up(ends[0])
+        errors = [one.exception(SOON_S) for one in reading]
+    assert [type(error) for error in errors] == [EOFError] * 2
+    hang_up(ends[0])
+    ends[0].close()
+    hang_up(ends[0])
 
 
 def test_all_processes_of_the_user_have_one_key_that_other_users_can_not_read(place):
