@@ -3,6 +3,7 @@
 import json
 import struct
 import threading
+import time
 from collections.abc import Callable
 
 import rclpy
@@ -67,6 +68,20 @@ class Ros2Peer:
         self.executor.shutdown(timeout_sec=2.0)
         self.thread.join(2.0)
         self.node.destroy_node()
+
+
+def paced(probe: Callable[[], object]) -> Callable[[], None]:
+    """Return what sends a probe, at most every ``PROBE_S``: more would push what comes after them out of queues."""
+    next_s = 0.0
+
+    def send() -> None:
+        nonlocal next_s
+        now_s = time.monotonic()
+        if now_s >= next_s:
+            next_s = now_s + PROBE_S
+            probe()
+
+    return send
 
 
 class Ros2Node:

@@ -8,7 +8,7 @@ from rcl_interfaces.srv import GetParameters, SetParameters
 from rclpy.parameter import Parameter
 from rclpy.qos import QoSProfile
 from ros_bridge_harness import Ros1Peer
-from ros_bridge_nodes import LATCHED, hex_of, text_of
+from ros_bridge_nodes import LATCHED, hex_of, paced, text_of
 from std_msgs.msg import Float64, Int32, String
 from std_srvs.srv import Trigger
 from uav_msgs.msg import GuidanceState
@@ -57,9 +57,13 @@ def test_a_publisher_that_restarts_is_picked_up_again(master, ros2_node):
 def open_both_ways(ros1, ros2_node, publisher, topic, received):
     """Publish on both sides until each side has a message of the other, and wait for the last of these."""
 
-    def opened():
+    @paced
+    def probe():
         ros1.do("publish", topic=topic, values={"data": "open one"})
         publisher.publish(publisher.msg_type(data="open two"))
+
+    def opened():
+        probe()
         # Each side hears itself, too.
         down = any("/ros_bridge" in line and b"open two".hex() in line for line in ros1.lines)
         return down and any(message.data == "open one" for message in received)
@@ -86,11 +90,7 @@ def round_trip(ros1, ros2_node, publisher, topic, received, word):
     ros1.do("publish", topic=topic, values={field: f"{word} one"})
     see(f"{word} one")  # a peer hears itself
     markers = {f"{word} one", f"{word} two"}
-    try:
-        ros2_node.until(lambda: markers <= {getattr(message, field) for message in received}, f"'{word}' arrives in ROS 2")
-    except AssertionError as error:
-        error.add_note(f"it had {[getattr(message, field) for message in received]}")
-        raise
+    ros2_node.until(lambda: markers <= {getattr(message, field) for message in received}, f"'{word}' arrives in ROS 2")
     return seen
 
 
@@ -117,9 +117,13 @@ def test_a_mapped_type_crosses_both_ways_without_an_echo(ros1, ros2_node):
     received = ros2_node.subscribe("/d/log", Log, QoSProfile(depth=200))
     publisher = ros2_node.publisher("/d/log", Log)
 
-    def arrive():
+    @paced
+    def probe():
         ros1.do("publish", topic="/d/log", values={"level": 4, "msg": "from one", "topics": ["/lost"]})
         publisher.publish(Log(level=Log.WARN, msg="from two"))
+
+    def arrive():
+        probe()
         # A peer hears itself, too, as soon as rospy has connected it to itself.
         heard = all(any(text.hex() in line for line in ros1.lines) for text in (b"from one", b"from two"))
         return heard and {message.msg for message in received} == {"from one", "from two"}

@@ -4,7 +4,7 @@ from geometry_msgs.msg import TransformStamped
 from rclpy.qos import DurabilityPolicy, QoSProfile, ReliabilityPolicy
 from rclpy.serialization import serialize_message
 from ros_bridge_harness import Ros1Peer
-from ros_bridge_nodes import BEST_EFFORT, LATCHED, RELIABLE, hex_of, wait_ros1_receives
+from ros_bridge_nodes import BEST_EFFORT, LATCHED, RELIABLE, hex_of, paced, wait_ros1_receives
 from std_msgs.msg import String
 from tf2_msgs.msg import TFMessage
 
@@ -69,8 +69,10 @@ def test_best_effort_and_reliable_ends_of_ros2_are_both_served(ros1, ros2_node):
     careless, careful = ros2_node.subscribe("/d/up", String, BEST_EFFORT), ros2_node.subscribe("/d/up", String, RELIABLE)
     ros1.do("advertise", topic="/d/up", type="std_msgs/String")
 
+    probe = paced(lambda: ros1.do("publish", topic="/d/up", values={"data": "x"}))
+
     def arrive():
-        ros1.do("publish", topic="/d/up", values={"data": "x"})
+        probe()
         return careless and careful
 
     ros2_node.until(arrive, "both get it")

@@ -8,7 +8,7 @@ from types import SimpleNamespace
 import pytest
 from diagnostic_msgs.msg import DiagnosticArray, DiagnosticStatus
 from ros_bridge_harness import Master
-from ros_bridge_nodes import BEST_EFFORT
+from ros_bridge_nodes import BEST_EFFORT, paced
 from std_msgs.msg import String
 
 from alula.common.network import free_port
@@ -51,9 +51,10 @@ def test_a_topic_that_the_bridge_publishes_itself_crosses_beside_its_own_message
     ros1.expect("message", topic="/diagnostics")
     publisher = ros2_node.publisher("/diagnostics", DiagnosticArray)
     foreign = DiagnosticArray(status=[DiagnosticStatus(name="motor 7")])
+    probe = paced(lambda: publisher.publish(foreign))
 
     def both_arrive():
-        publisher.publish(foreign)
+        probe()
         heard = [line for line in ros1.lines if "/diagnostics" in line]
         return any(b"motor 7".hex() in line for line in heard)
 
