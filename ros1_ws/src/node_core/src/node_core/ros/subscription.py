@@ -20,31 +20,37 @@ def warn_of_garbage(reason: str) -> None:
 
 
 class Stream:
-    """Tells from what a stream has brought so far, as seen from time to time, whether it has lost the borders between its messages.
+    """Tells from what waits in a stream, as seen from time to time, whether it has lost the borders between its messages.
 
-    It has where bytes came and for `SILENCE_S` no message, from the first look that sees it on: a look may fall between the bytes and
-    their message, and the mission clock may have run far since the look before. Each time the timeout is doubled, until a message comes.
+    It has where bytes have waited for the rest of their message for `SILENCE_S`, from the first look that sees it on: a look may fall
+    between the bytes and their message, and the mission clock may have run far since the look before. Each time the timeout is doubled,
+    until a message comes.
     """
 
     def __init__(self) -> None:
-        self._received, self._messages = 0, 0
+        self._messages = 0
         self._waits_since_s: float | None = None
         self._timeout_s = SILENCE_S
 
-    def lost(self, received: int, messages: int, now_s: float) -> bool:
-        """Return whether the connections are to be rebuilt; their counts begin at zero then. Bytes and messages so far, mission clock."""
+    def lost(self, waiting: int, messages: int, now_s: float) -> bool:
+        """Return whether the connections are to be rebuilt.
+
+        Args:
+            waiting: bytes that wait for the rest of their message.
+            messages: so many have come on the connections that are there now.
+            now_s: mission clock.
+        """
         if messages > self._messages:
             self._timeout_s = SILENCE_S
-        if messages != self._messages or received < self._received:
-            self._received, self._messages = received, messages
-        if received == self._received:
-            self._waits_since_s = None
+        if messages != self._messages or not waiting:
+            self._messages, self._waits_since_s = messages, None
+        if not waiting:
             return False
         if self._waits_since_s is None:
             self._waits_since_s = now_s
         if abs(now_s - self._waits_since_s) < self._timeout_s:  # absolute: the clock may go back
             return False
-        self._received, self._messages, self._waits_since_s = 0, 0, None
+        self._messages, self._waits_since_s = 0, None
         self._timeout_s = min(2.0 * self._timeout_s, LONGEST_SILENCE_S)
         return True
 
@@ -54,7 +60,7 @@ class RawSubscriber:
 
     rospy decodes inside its receiving loop and keeps what can't be decoded at the head of its buffer: nothing after it is ever received.
     So the bytes are taken as they are, and what can't be decoded is told to ``garbage``, with a sentence. A `Stream` that has lost the
-    borders between its messages can't be decoded at all: the connections are rebuilt, at growing intervals. Where no bytes come, as mostly
+    borders between its messages can't be decoded at all: the connections are rebuilt, at growing intervals. Where no bytes wait, as mostly
     on a latched topic, nothing is wrong with the stream. Of messages that wait the newest ``queue_size`` are decoded.
     """
 
@@ -95,8 +101,9 @@ class RawSubscriber:
             pause(LOOK_S)
             with self._lock:
                 connections = [] if self._ended else list(self._subscriber.impl.connections)
-            received, messages = (sum(int(getattr(each, count)) for each in connections) for count in ("stat_bytes", "stat_num_msg"))
-            if self._stream.lost(received, messages, rospy.get_time()):
+            buffers = [each.read_buff for each in connections]
+            waiting = sum(buffer.tell() for buffer in buffers if buffer is not None)  # None: closed since
+            if self._stream.lost(waiting, sum(each.stat_num_msg for each in connections), rospy.get_time()):
                 self._reconnect()
 
     def _reconnect(self) -> None:
