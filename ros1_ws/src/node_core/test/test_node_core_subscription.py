@@ -2,9 +2,13 @@
 
 from __future__ import annotations
 
+import socket
 import struct
+from threading import Thread
+from xmlrpc.server import SimpleXMLRPCServer
 
 import pytest
+import rosgraph
 import rospy
 from geometry_msgs.msg import Point
 from std_msgs.msg import String
@@ -125,6 +129,24 @@ def test_a_publisher_that_has_said_nothing_yet_is_left_alone(watched) -> None:
     until(lambda: heard == [6.0], what="the first message")
     subscriber.close()
     publisher.unregister()
+
+
+def test_a_publisher_that_has_gone_when_the_connection_stands_publishes_nothing(ros_master) -> None:
+    """Its node refuses the connection: rospy gives up, and counts the connection all the same."""
+    with socket.create_server(("127.0.0.1", 0)) as port, SimpleXMLRPCServer(("127.0.0.1", 0), logRequests=False) as node:
+        node.register_function(lambda *_asked: [1, "", ["TCPROS", "127.0.0.1", port.getsockname()[1]]], "requestTopic")
+        Thread(target=node.serve_forever, daemon=True).start()
+        uri = f"http://127.0.0.1:{node.server_address[1]}/"
+        rosgraph.Master("/gone").registerPublisher("/raw/gone", "geometry_msgs/Point", uri)
+        subscriber = RawSubscriber(Input("/raw/gone", Point, lambda _message: None, warn_of_garbage, BUFFER_BYTES))
+        connection, _ = port.accept()
+        assert subscriber.published
+        connection.sendall(framed(framed(b"error=/gone is not a publisher of [/raw/gone]")))
+        connection.close()
+        rosgraph.Master("/gone").unregisterPublisher("/raw/gone", uri)
+        until(lambda: not subscriber.published, what="rospy has given up", timeout_s=20.0)
+        subscriber.close()
+        node.shutdown()
 
 
 def test_another_type_is_told(ros_master) -> None:

@@ -82,7 +82,8 @@ class RawSubscriber:
     def published(self) -> bool:
         """Whether the topic has a publisher; one whose connection is being rebuilt counts."""
         with self._lock:
-            connected = not self._ended and bool(self._subscriber.get_num_connections())
+            # rospy keeps a connection that has failed where the publisher has gone meanwhile; it is done with it.
+            connected = not self._ended and not all(each.done for each in self._subscriber.impl.connections)
         return connected or abs(rospy.get_time() - self._reconnected_s) < SILENCE_S
 
     def close(self) -> None:
