@@ -22,17 +22,19 @@ TURNED = {
 OVERTURNED = {"rolled": np.diag([1.0, -1.0, -1.0]), "pitched": np.diag([-1.0, 1.0, -1.0]), "mirrored": np.diag([1.0, 1.0, -1.0])}
 
 
-def fly(way, *, mount=UP, turned=None, rate_hz=10.0, repeat_from=None) -> list[Finding]:
+def fly(way, *, mount=UP, turned=None, rate_hz=10.0, repeat_from=None, lost_from=None) -> list[Finding]:
     """Return the findings of sweeps along a way of (x, y, yaw) in a yard, 1.5 m above the ground; the data are ``turned`` in base_link.
 
-    From sweep ``repeat_from`` on the sensor repeats what it saw, in another order and with noise of 1 cm.
+    From sweep ``repeat_from`` on the sensor repeats what it saw, in another order and with noise of 1 cm; from ``lost_from`` on no pose
+    comes.
     """
     last = None
     poses, check, findings, rng = PoseBuffer(keep_s=1e6), MountCheck(), [], np.random.default_rng(1)
     for k, (x, y, yaw) in enumerate(way):
         stamp_ns = NS + int(k / rate_hz * NS)
         attitude = Rotation.from_euler("z", yaw)
-        poses.add(stamp_ns, (x, y, 1.5), attitude.as_quat())
+        if lost_from is None or k < lost_from:
+            poses.add(stamp_ns, (x, y, 1.5), attitude.as_quat())
         rotation, origin = attitude.as_matrix() @ mount[:3, :3], np.array([x, y, 1.5]) + attitude.as_matrix() @ mount[:3, 3]
         ray = RAYS @ rotation.T
         ray[np.abs(ray) < 1e-9] = 1e-9
@@ -76,6 +78,13 @@ def test_an_overturned_sensor_can_not_be_judged_even_while_the_vehicle_stands(na
     assert {(finding.verdict, finding.fault) for finding in findings[10:]} == {(Verdict.UNKNOWN, FaultKind.CALIBRATION)}
     assert findings[10].reason == "level surfaces above the LiDAR and none below: is it upside down?"
     assert all(finding.ok for finding in fly(standing))
+
+
+@pytest.mark.parametrize("turned", [OVERTURNED["rolled"], TURNED["mirrored"]], ids=["overturned", "mirrored"])
+def test_what_was_found_stays_while_no_poses_come(turned) -> None:
+    findings = fly(FORTH + ROUND, turned=turned, lost_from=45)
+    assert not findings[44].ok
+    assert set(findings[45:]) == {findings[44]}
 
 
 def test_without_poses_nothing_is_said() -> None:

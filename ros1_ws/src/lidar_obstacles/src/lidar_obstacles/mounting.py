@@ -9,6 +9,7 @@ has level surfaces above it and none below.
 
 from __future__ import annotations
 
+from contextlib import suppress
 from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
@@ -100,13 +101,11 @@ class MountCheck:
         self._above, self._below = 0.0, 0.0
 
     def finding(self, sweep: Sweep, T_base_lidar: Floats, poses: PoseBuffer, *, self_m: float) -> Finding:  # noqa: N803 -- T_target_source
-        """Return what the sweep, together with those before it, tells of the mount; nothing without poses."""
-        try:
+        """Return what the sweep, together with those before it, tells of the mount; without poses what was found before."""
+        with suppress(PoseUnavailableError):
             pose = poses.at([sweep.end_ns]).matrix()
             if self._due(sweep, pose):
                 self._look(sweep, pose, T_base_lidar, poses, self_m)
-        except PoseUnavailableError:
-            return FINE
         if self._times >= LOOKS:
             return self._found()
         if self._overturned:
