@@ -92,6 +92,18 @@ def test_tcp_that_is_not_there_yet_and_goes_away():
     ear.link.close()
 
 
+def test_a_connection_that_ends_leaves_the_link_idle_and_says_so():
+    with socket.create_server(("127.0.0.1", 0)) as listener:
+        ear = Ear(f"tcp:127.0.0.1:{listener.getsockname()[1]}")
+        assert ear.connected.acquire(timeout=5.0)
+        client, _ = listener.accept()
+        assert not ear.idle.acquire(timeout=0.1), "nothing has arrived"
+        client.close()
+        assert ear.idle.acquire(timeout=5.0)
+        assert ear.link.idle
+        ear.link.close()
+
+
 def test_a_message_that_can_not_be_dealt_with_does_not_end_the_link(peer):
     ear = Ear(f"udpout:127.0.0.1:{peer.getsockname()[1]}", take=lambda mode: 1 // (mode - 1))
     address = reached(ear, peer)

@@ -26,8 +26,8 @@ class LinkClosedError(ConnectionError):
 class Link:
     """A MAVLink 2 connection to the autopilot (system and component 1/1), as its companion (1/191).
 
-    ``on_message``, ``on_connect`` and ``on_idle`` (all that has arrived has been handed over) are called in the reader's thread;
-    ``send`` may be called from any thread.
+    ``on_message``, ``on_connect`` and ``on_idle`` (all that has arrived has been handed over, or the connection has ended) are called
+    in the reader's thread; ``send`` may be called from any thread.
     """
 
     def __init__(
@@ -86,6 +86,8 @@ class Link:
                 told = str(error)
             finally:
                 self._disconnect()
+            if not self._ended.is_set():
+                self._on_idle()  # the end of a connection is the last that arrives on it
             self._ended.wait(retry_s)
             retry_s = min(2.0 * retry_s, LONGEST_RETRY_S)
 
