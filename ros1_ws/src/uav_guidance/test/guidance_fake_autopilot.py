@@ -313,6 +313,7 @@ class FakeAutopilot(FakeVehicle):
         next_wall_s = time.monotonic()
         while not self._ended.is_set():
             next_wall_s = max(next_wall_s + TICK_S / self._rate, time.monotonic() - 0.1)
+            self._serve(0.0)  # also where time is to catch up: what has arrived is answered before time goes on
             while (left_s := next_wall_s - time.monotonic()) > 0.0:
                 self._serve(left_s)
             if not self.keep_pace():

@@ -150,8 +150,8 @@ FAULTS = (
     Expected("rotated", "calibration", "turned against each other", 1.0),
     Expected("shifted", "calibration", "px off the left one's rows", 1.0),
     Expected("swapped", "calibration", "left and right are swapped", 1.0),
-    # Info and image come on two ways: a pair may still meet the info before it.
-    Expected("wrong info", "info", "camera_info is for 960x540 images, the left image is 480x270", 1.0),
+    # Info and image come on two ways: a pair may still meet the info before it, which is right.
+    Expected("wrong info", "info", "camera_info is for 960x540 images, the left image is 480x270", 1.0, misleads=False),
     Expected("future", "stamp", "in the future"),
     Expected("late", "stamp", "old when it arrives"),
     Expected("cut short", "format", "bytes for"),

@@ -17,7 +17,7 @@ from skillset_interfaces.msg import ResourceState, ResourceStates
 from skillset_interfaces.srv import Transition, TransitionResponse
 from std_msgs.msg import Header
 from tf2_msgs.msg import TFMessage
-from uav_msgs.msg import GuidanceState, SensorHealth
+from uav_msgs.msg import GuidanceState, Obstacle, SensorHealth
 
 from perception_core.conversions import cloud_message
 from perception_core.poses import NS
@@ -69,7 +69,7 @@ class FakeFlight:
         self._steps = 0
         self._done = threading.Event()
         self._heard = threading.Event()
-        self._measured = False
+        self._measured = self._cut = False
 
     def __enter__(self) -> Self:
         """Go on simulated time and advertise everything."""
@@ -88,6 +88,7 @@ class FakeFlight:
         self._transition = rospy.Service("/perception/transition", Transition, self._on_transition)
         self._listener = rospy.Subscriber(f"/{self.node}/health", SensorHealth, self._on_health)
         self._done_listener = rospy.Subscriber(f"/{self.node}/done", Header, lambda _header: self._done.set())
+        self._obstacle_listener = rospy.Subscriber(f"/{self.node}/obstacle", Obstacle, self._on_obstacle)
         self._static.publish(_mounts())
         self._publish_resources()
         return self
@@ -97,6 +98,7 @@ class FakeFlight:
         self._transition.shutdown("the test is over")
         self._listener.unregister()
         self._done_listener.unregister()
+        self._obstacle_listener.unregister()
         for publisher in (
             *(self._clock, self._pose, self._state, self._static, self._cloud, self._resources),
             *(*self._images.values(), *self._infos.values()),
@@ -134,8 +136,8 @@ class FakeFlight:
     def run(self, seconds: float, *, until: Callable[[], object] = lambda: False) -> bool:
         """Let simulated time pass, at most so much, and return whether the condition came true.
 
-        Time goes at most twice as fast as the wall clock, and waits for the node to be done with each measurement: a slow machine
-        makes a test longer, not different.
+        Time goes at most twice as fast as the wall clock, and waits for the node to be done with each measurement and to follow the
+        clock: a slow machine makes a test longer, not different.
         """
         end_ns = self.now_ns + int(seconds * NS)
         pace = threading.Event()
@@ -158,10 +160,10 @@ class FakeFlight:
         if self.target is not None:
             state.reference, state.target_enu_m = "position", Point(*self.target)
         self._state.publish(state)
+        self._wait_for_health()  # else a measurement may come to a node whose clock is behind by more than it believes
         if self._steps % SENSOR_STEPS == 0:
             self._done.clear()
-            self._measured = False
-            self._wait_for_health()  # else a measurement may come to a node whose clock is behind by more than it believes
+            self._measured = self._cut = False
             self.at_10_hz(self.now_ns)
             if self._measured:
                 self._done.wait(LONGEST_WORK_WALL_S)
@@ -183,6 +185,11 @@ class FakeFlight:
         self.health.append(message)
         self._heard.set()
 
+    def _on_obstacle(self, message: Obstacle) -> None:
+        """Of what can't be decoded a node knows no stamp that it could be done with; while it is enabled it says that it sees nothing."""
+        if self._cut and message.unknown:
+            self._done.set()
+
     def publish_image(self, side: str, stamp_ns: int, image: NDArray[np.uint8], *, encoding: str = "mono8", info_scale: int = 1) -> None:
         """Publish one image and its camera_info; ``info_scale`` makes that the one of a larger image."""
         header = Header(stamp=rospy.Time(stamp_ns // NS, stamp_ns % NS), frame_id=f"zed_{side}")
@@ -196,10 +203,14 @@ class FakeFlight:
         self._images[side].publish(Image(header=header, height=height, width=width, encoding=encoding, step=step, data=image.tobytes()))
 
     def publish_cut_image(self, side: str, stamp_ns: int, image: NDArray[np.uint8]) -> None:
-        """Send an image whose last bytes are missing, as a message of its own that is complete as far as its length says."""
+        """Send an image whose last bytes are missing, as a message of its own that is complete as far as its length says.
+
+        The node is to be enabled.
+        """
         header = Header(stamp=rospy.Time(stamp_ns // NS, stamp_ns % NS), frame_id=f"zed_{side}")
         height, width = image.shape
         buffer = BytesIO()
+        self._measured = self._cut = bool(self._obstacle_listener.get_num_connections())
         Image(header=header, height=height, width=width, encoding="mono8", step=width, data=image.tobytes()).serialize(buffer)
         send_raw(self._images[side], framed(buffer.getvalue()[:-100]))
 
@@ -212,8 +223,12 @@ class FakeFlight:
         self._cloud.publish(message)
 
     def publish_cut_cloud(self, stamp_ns: int, points: NDArray[np.float32]) -> None:
-        """Send a cloud whose last bytes are missing, as a message of its own that is complete as far as its length says."""
+        """Send a cloud whose last bytes are missing, as a message of its own that is complete as far as its length says.
+
+        The node is to be enabled.
+        """
         buffer = BytesIO()
+        self._measured = self._cut = bool(self._obstacle_listener.get_num_connections())
         cloud_message(Header(stamp=rospy.Time(stamp_ns // NS, stamp_ns % NS), frame_id="lidar"), points).serialize(buffer)
         send_raw(self._cloud, framed(buffer.getvalue()[:-100]))
 
