@@ -62,7 +62,7 @@ def test_a_flight_arrives_and_tells_its_progress(rig, skill, heading):
     handle = rig.start("navigation", skill, target=(6.0, 0.0, 3.0), speed=1.0)
     seen = []
     rig.wait(lambda: handle.done or seen.append(handle.progress))
-    assert (handle.outcome, handle.result) == ("TERMINATED", "ARRIVED")
+    assert (handle.outcome, handle.result) == ("TERMINATED", "ARRIVED"), handle.message
     assert any(0.1 < progress < 1.0 for progress in seen)
     assert seen == sorted(seen)
     ((name, request),) = rig.functional.calls

@@ -45,6 +45,8 @@ def check_fault(flight: FakeFlight, sensor: FakeSensor, expected: Expected, obst
     """
     mode = expected.mode
     flight.run(0.5)
+    # What was seen before has arrived with the newest of it.
+    assert flight.run(2.0, until=lambda: obstacles and obstacles[-1].header.stamp.to_nsec() == sensor.last_good_ns), mode
     flight.reports.clear()
     sensor.mode, last_good_ns = mode, sensor.last_good_ns
     obstacles.clear()
