@@ -2,8 +2,9 @@
 
 A DDS service may answer before it has discovered the client: the answer is lost (rclpy 7.1.6 then warns of a "client [that] will not
 receive response"). And a burst of requests that is longer than the queue at its end is cut. So no more than a window of requests is
-under way at a time, each is asked again after a while without an answer, and given up after its time. The graph does not tell of every
-end that is there (rmw_fastrtps, issue 792): after a while without being told of a service, one request is sent all the same.
+under way at a time, each is asked again after a while without an answer, and given up after its time. Time in which this process could
+not run does not count: answers may wait for it. The graph does not tell of every end that is there (rmw_fastrtps, issue 792): after a
+while without being told of a service, one request is sent all the same.
 """
 
 from __future__ import annotations
@@ -79,6 +80,7 @@ class Calls:
         self._waiting: deque[_Call] = deque()
         self._open: list[_Call] = []
         self._looking = False
+        self._look_at_s = 0.0
         self._closed = False
         self._met_unseen = False
         """The service answers although the graph does not tell of it."""
@@ -160,6 +162,7 @@ class Calls:
             if self._looking or not (self._open or self._waiting):
                 return
             self._looking = True
+            self._look_at_s = time.monotonic() + LOOK_S
         self._later(LOOK_S, self._look)
 
     def _look(self) -> None:
@@ -167,7 +170,11 @@ class Calls:
         with self._lock:
             self._looking = False
             calls, waiting = list(self._open), list(self._waiting)
-        now_s = time.monotonic()
+            now_s = time.monotonic()
+            late_s = now_s - self._look_at_s
+            if late_s > LOOK_S:
+                for call in (*calls, *waiting):
+                    call.begun_s, call.asked_s = min(call.begun_s + late_s, now_s), min(call.asked_s + late_s, now_s)
         if any(now_s - call.asked_s > AGAIN_S for call in calls):
             self._met_unseen = False  # it may have gone: what waits must wait for the next one
         for call in calls:

@@ -62,7 +62,7 @@ def bench(monkeypatch):
         end_s = now.s + seconds
         while (due := [job for job in now.jobs if job[0] <= end_s]) and (first := min(due, key=lambda job: job[0])):
             now.jobs.remove(first)
-            now.s = first[0]
+            now.s = max(now.s, first[0])  # a process that could not run is late for it
             first[1]()
         now.s = end_s
 
@@ -101,6 +101,20 @@ def test_an_answer_comes_once_and_with_the_number_of_tries(bench):
     bench.service.sent[1].answer("twice")
     assert bench.answers == [("late", 2)]
     assert (bench.now.awaited[0], bench.now.awaited[-1]) == (True, False)
+
+
+def test_time_in_which_the_process_could_not_run_does_not_count(bench):
+    bench.ask("a", timeout_s=1.0, once=True)
+    bench.run_for(2 * LOOK_S)
+    bench.now.s += 60.0  # the answer has arrived meanwhile, and waits for the executor
+    bench.run_for(LOOK_S)
+    assert bench.answers == []
+    bench.service.sent[0].answer("late")
+    assert bench.answers == [("late", 1)]
+    bench.ask("b", timeout_s=1.0, once=True)
+    bench.now.s += 60.0
+    bench.run_for(1.0 + 3 * LOOK_S)
+    assert bench.answers[1:] == ["service ask did not answer within 1 s"]
 
 
 def test_what_must_not_be_done_twice_is_asked_once(bench):
