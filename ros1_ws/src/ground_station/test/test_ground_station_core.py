@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import dataclasses
 import random
+import threading
 
 import cv2
 import numpy as np
@@ -11,6 +12,7 @@ import pytest
 from ground_station.assembler import Assembler
 from ground_station.control import ControlLink
 from ground_station.quality import grey, no_reference, ssim
+from ground_station.references import KEPT, References
 from ground_station.rehearsal import Rehearsal
 from ground_station.window import LossMeter, Shown, Window
 from radio_link.conditions import PRESETS, Both, Quality
@@ -131,6 +133,58 @@ def test_the_figure_without_reference_falls_with_compression():
         no_reference(cv2.imdecode(cv2.imencode(".jpg", image, [cv2.IMWRITE_JPEG_QUALITY, q])[1], cv2.IMREAD_GRAYSCALE)) for q in (90, 20, 5)
     ]
     assert scores[0] > scores[1] > scores[2]
+
+
+@pytest.fixture
+def asked():
+    """Return what asks for a reference in a thread of its own; its list holds the answer."""
+    threads = []
+
+    def ask(references, stamp_ns):
+        answers = []
+        threads.append(threading.Thread(target=lambda: answers.append(references.find(stamp_ns))))
+        threads[-1].start()
+        return answers, threads[-1]
+
+    yield ask
+    for thread in threads:
+        thread.join()
+
+
+def test_a_reference_on_its_way_is_waited_for(asked):
+    references = References()
+    assert not references
+    answers, thread = asked(references, 2 * STEP_NS)
+    references.note(STEP_NS, camera(1))
+    thread.join(0.05)
+    assert thread.is_alive(), "an older one does not do"
+    references.note(2 * STEP_NS, camera(2))
+    thread.join()
+    assert references
+    np.testing.assert_array_equal(answers[0], camera(2))
+
+
+def test_a_reference_that_was_lost_is_not_waited_for():
+    references = References()
+    for number in (1, 3):
+        references.note(number * STEP_NS, camera(number))
+    assert references.find(2 * STEP_NS) is None
+    for number in range(4, 4 + KEPT):
+        references.note(number * STEP_NS, camera(0))
+    assert references.find(STEP_NS) is None, "long ago"
+
+
+def test_a_silent_camera_is_waited_for_once_and_again_when_it_is_back(asked, monkeypatch):
+    monkeypatch.setattr("ground_station.references.WAIT_S", 0.01)
+    references = References()
+    assert references.find(STEP_NS) is None
+    monkeypatch.setattr("ground_station.references.WAIT_S", None)
+    assert references.find(STEP_NS) is None, "at once: another wait would not end"
+    references.note(STEP_NS, camera(1))
+    answers, thread = asked(references, 2 * STEP_NS)
+    references.note(2 * STEP_NS, camera(2))
+    thread.join()
+    np.testing.assert_array_equal(answers[0], camera(2))
 
 
 def test_a_window_counts_the_last_second_only():

@@ -20,6 +20,7 @@ from video_stream.wire import NS, Seal, sdp
 
 from ground_station.control import ControlLink
 from ground_station.receiver import Picture, VideoReceiver
+from ground_station.references import References
 from ground_station.settings import GroundStationSettings
 from ground_station.stick import Deflection
 from perception_core.ros import read_settings
@@ -35,19 +36,20 @@ class GroundStationNode:
     def __init__(self, settings: GroundStationSettings) -> None:
         self._settings = settings
         self._seal = Seal(settings.key.encode())
-        self._receiver = VideoReceiver(self._seal, settings.width, settings.height)
+        self._references = References() if settings.reference else None
+        self._receiver = VideoReceiver(self._seal, settings.width, settings.height, self._references)
         self._control = ControlLink()
         self._log = _ShownLog(Path(settings.video_path), settings) if settings.video_path else None
         self._screen = rospy.Publisher("~screen", Image, queue_size=1)
         self._refused = 0
-        self._loop: MissionLoop[Image | Twist] = MissionLoop(
-            [settings.video_port, settings.telemetry_port], on_tick=self._on_tick, on_datagram=self._on_datagram, on_item=self._on_item
+        self._loop: MissionLoop[Twist] = MissionLoop(
+            [settings.video_port, settings.telemetry_port], on_tick=self._on_tick, on_datagram=self._on_datagram, on_item=self._on_stick
         )
         self._stick = rospy.Subscriber("~stick", Twist, self._loop.post, queue_size=1, tcp_nodelay=True)
         self._give_back = ToldService("~give_back", Command, self._on_give_back)
-        if settings.reference:
+        if self._references is not None:
             self._subscriber = rospy.Subscriber(
-                settings.reference, Image, self._loop.post, queue_size=5, buff_size=IMAGE_BYTES, tcp_nodelay=True
+                settings.reference, Image, self._on_reference, self._references, buff_size=IMAGE_BYTES, tcp_nodelay=True
             )
 
     def run(self) -> None:
@@ -56,12 +58,16 @@ class GroundStationNode:
         if self._log is not None:
             self._log.close()
 
-    def _on_item(self, message: Image | Twist) -> None:
-        if isinstance(message, Image):
-            self._receiver.reference(message.header.stamp.to_nsec(), pixels(message))
-        else:
-            ahead, turn = message.linear, message.angular.z
-            self._control.stick.move(Deflection(ahead.x, ahead.y, ahead.z, turn), self._loop.now_ns)
+    def _on_reference(self, message: Image, references: References) -> None:
+        # By ROS's own thread: the loop waits for it.
+        try:
+            references.note(message.header.stamp.to_nsec(), pixels(message))
+        except ValueError as error:
+            rospy.logerr_throttle(5.0, f"{self._settings.reference}: {error}")
+
+    def _on_stick(self, message: Twist) -> None:
+        ahead, turn = message.linear, message.angular.z
+        self._control.stick.move(Deflection(ahead.x, ahead.y, ahead.z, turn), self._loop.now_ns)
 
     def _on_give_back(self, _request: object) -> CommandResponse:
         reason = self._control.stick.give_back(self._loop.now_ns)

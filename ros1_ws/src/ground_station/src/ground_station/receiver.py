@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from collections import OrderedDict
 from dataclasses import dataclass
 
 import av
@@ -13,10 +12,10 @@ from video_stream.wire import NS, Seal, VideoPacket, WireError
 
 from ground_station.assembler import Assembler, WholeFrame
 from ground_station.quality import Rgb, grey, no_reference, ssim
+from ground_station.references import References
 from ground_station.window import LossMeter, Shown, Window
 
 REPORT_PERIOD_NS = NS // 20
-REFERENCES = 120
 NO_REFERENCE_EVERY = 10
 
 
@@ -34,16 +33,20 @@ class Picture:
 
 
 class VideoReceiver:
-    """Receives, decodes, measures. ``width``, ``height``: of the screen, to which smaller pictures are enlarged."""
+    """Receives, decodes, measures.
 
-    def __init__(self, seal: Seal, width: int = 640, height: int = 360) -> None:
+    ``width``, ``height``: of the screen, to which smaller pictures are enlarged; ``references``: to compare with, which only a
+    simulation can have.
+    """
+
+    def __init__(self, seal: Seal, width: int = 640, height: int = 360, references: References | None = None) -> None:
         self._seal = seal
         self._size = width, height
         self._assembler = Assembler()
         self._decoder = _decoder()
         self._window = Window()
         self._losses = LossMeter()
-        self._references: OrderedDict[int, Rgb] = OrderedDict()
+        self._references = references
         self._number = 0
         self._report_due_ns = 0
         self._shown_id = -1
@@ -52,12 +55,6 @@ class VideoReceiver:
         self._quality = 0.0
         self.refused = 0
         self.last_refusal = ""
-
-    def reference(self, stamp_ns: int, image: Rgb) -> None:
-        """Learn what the camera saw at a moment, to compare with; only a simulation can tell."""
-        self._references[stamp_ns] = image
-        while len(self._references) > REFERENCES:
-            self._references.popitem(last=False)
 
     def datagram(self, data: bytes, now_ns: int) -> bool:
         """Take what came and tell whether it is a new packet of the video; what is not ours is counted and forgotten."""
@@ -120,7 +117,7 @@ class VideoReceiver:
         image = decoded
         if (decoded.shape[1], decoded.shape[0]) != self._size:
             image = np.asarray(cv2.resize(decoded, self._size, interpolation=cv2.INTER_CUBIC), dtype=np.uint8)
-        reference = self._references.get(whole.stamp_ns)
+        reference = None if self._references is None else self._references.find(whole.stamp_ns)
         similarity = None if reference is None else ssim(grey(reference), grey(image))
         if self._shown_count % NO_REFERENCE_EVERY == 0:
             self._no_reference = no_reference(grey(image))

@@ -18,6 +18,7 @@ from video_stream.wire import NS, Seal
 
 from ground_station.quality import Rgb
 from ground_station.receiver import Picture, VideoReceiver
+from ground_station.references import References
 
 TICK_NS = NS // 50
 FRAME_NS = NS // 20
@@ -56,7 +57,8 @@ class Rehearsal:
     def __post_init__(self) -> None:
         seal = Seal(b"rehearsal")
         self.sender = VideoSender(seal, self.settings)
-        self.receiver = VideoReceiver(seal)
+        self.references = References()
+        self.receiver = VideoReceiver(seal, references=self.references)
         self._seal = seal
         self._filmed: deque[tuple[int, int, Rgb]] = deque()
         both = self.radio(0.0)
@@ -100,7 +102,7 @@ class Rehearsal:
                 self._down.send(again, now_ns)
 
     def _film(self, image: Rgb, stamp_ns: int, now_ns: int) -> None:
-        self.receiver.reference(stamp_ns, image)
+        self.references.note(stamp_ns, image)
         begun = time.perf_counter()
         frame = self.sender.frame(image, stamp_ns, now_ns)
         self.encode_s.append(time.perf_counter() - begun)
