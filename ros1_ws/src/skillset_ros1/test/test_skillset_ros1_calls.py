@@ -2,6 +2,10 @@
 
 from __future__ import annotations
 
+import os
+import signal
+import subprocess
+import sys
 import threading
 import time
 from collections.abc import Callable, Iterator
@@ -11,7 +15,7 @@ import rospy
 from std_srvs.srv import SetBool, SetBoolRequest, SetBoolResponse
 
 from alula_testing.waits import until
-from skillset_ros1.calls import WINDOW, call
+from skillset_ros1.calls import WINDOW, ServiceCallError, call, call_and_wait
 
 SOON_S = 30.0
 
@@ -96,3 +100,32 @@ def test_a_callback_that_takes_its_time_holds_up_no_call(serve):
     until(lambda: len(ends) == 3 * WINDOW, "each call is answered", SOON_S)
     go_on.set()
     assert all(ends)
+
+
+LIMIT_S = 3.0
+CALLER = f"""
+import rospy
+from std_srvs.srv import SetBool, SetBoolRequest
+from skillset_ros1.calls import call_and_wait
+
+rospy.init_node("caller", anonymous=True)
+print(call_and_wait("/calls/stops", SetBool, SetBoolRequest(data=True), timeout_s={LIMIT_S}).success)
+"""
+
+
+def test_time_in_which_the_process_could_not_run_does_not_count(serve):
+    asked = threading.Event()
+    go_on = threading.Event()
+    serve("/calls/stops", lambda: asked.set() or go_on.wait(SOON_S))
+    with subprocess.Popen([sys.executable, "-c", CALLER], stdout=subprocess.PIPE, text=True) as caller:
+        assert asked.wait(SOON_S)
+        os.kill(caller.pid, signal.SIGSTOP)
+        time.sleep(1.1 * LIMIT_S)
+        os.kill(caller.pid, signal.SIGCONT)
+        go_on.set()
+        assert caller.communicate(timeout=SOON_S)[0] == "True\n"
+
+
+def test_a_service_that_is_not_there_is_told_so(ros_master):
+    with pytest.raises(ServiceCallError, match=r"service /calls/nobody is not there within 0\.3 s"):
+        call_and_wait("/calls/nobody", SetBool, SetBoolRequest(), timeout_s=0.3)

@@ -1,5 +1,7 @@
 """Service calls that neither block their caller nor last for ever; rospy's own have no time limit.
 
+Time in which this process could not run does not count: the answer may wait to be read.
+
 A rospy node's socket keeps five connections that were not accepted yet. The kernel drops what comes above that, and its sender asks again
 after 1, 3 and 7 s. So no more than a window of calls of one service is under way at a time; the others wait for their turn.
 """
@@ -22,6 +24,7 @@ from alula.runtime.core.errors import SkillRuntimeError
 
 DEFAULT_TIMEOUT_S = 2.0
 AGAIN_S = 0.1
+LOOK_S = 0.25
 WINDOW = 4
 """So many calls of a service are under way at a time, from one process; topics' connections come to the same socket."""
 OnReply = Callable[[Any], None]
@@ -39,26 +42,31 @@ class _Call:
         self.name, self.timeout_s = name, timeout_s
         self._kind, self._request = kind, request
         self.made_s = time.monotonic()
-        self._deadline_s = math.inf
         self._proxy: Any = None
         self._over = threading.Event()
         self._answer: queue.SimpleQueue[tuple[Any, str]] = queue.SimpleQueue()
 
     def run(self, from_s: float) -> tuple[Any, str]:
         """Return the reply, or None and why there is none; within the time limit, which is counted from a time (`time.monotonic`)."""
-        late = f"service {self.name} did not answer within {self.timeout_s:g} s"
-        self._deadline_s = from_s + self.timeout_s
-        left_s = self._deadline_s - time.monotonic()
-        if left_s <= 0.0:
-            return None, late
-        threading.Thread(target=self._try, name=f"call_{self.name}", daemon=True).start()
+        now_s = time.monotonic()
+        left_s = from_s + self.timeout_s - now_s
+        if left_s > 0.0:
+            threading.Thread(target=self._try, name=f"call_{self.name}", daemon=True).start()
         try:
-            return self._answer.get(timeout=left_s)
-        except queue.Empty:
-            return None, late
+            while left_s > 0.0:
+                with contextlib.suppress(queue.Empty):
+                    return self._answer.get(timeout=min(left_s, LOOK_S))
+                before_s, now_s = now_s, time.monotonic()
+                left_s -= min(now_s - before_s, 2.0 * LOOK_S)
+            why = "is not there" if self._proxy is not None and not self._sent else "did not answer"
+            return None, f"service {self.name} {why} within {self.timeout_s:g} s"
         finally:
             self._over.set()
             self._break_off()
+
+    @property
+    def _sent(self) -> bool:
+        return self._proxy.transport is not None
 
     def _try(self) -> None:
         """Call, again while the service is not there yet."""
@@ -67,22 +75,13 @@ class _Call:
             try:
                 reply = self._proxy(self._request)
             except Exception as error:  # noqa: BLE001 - rospy lets through whatever the sockets below it raise
-                if self._is_last(error):
+                if self._sent or rospy.is_shutdown():
+                    self._answer.put((None, f"service {self.name} broke off: {error}"))
                     return
             else:
                 self._answer.put((reply, ""))
                 return
             self._over.wait(AGAIN_S)
-
-    def _is_last(self, error: Exception) -> bool:
-        """Tell whether a failed attempt was the last one, and then the caller why it failed."""
-        sent = self._proxy.transport is not None
-        late = time.monotonic() + AGAIN_S > self._deadline_s
-        if not (sent or late or rospy.is_shutdown()):
-            return False
-        what = f"broke off: {error}" if sent else f"is not there within {self.timeout_s:g} s"
-        self._answer.put((None, f"service {self.name} {what}"))
-        return True
 
     def _break_off(self) -> None:
         """Free a thread that still waits for an answer."""
