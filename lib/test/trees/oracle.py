@@ -17,32 +17,40 @@ from alula.trees.standard import standard_palette
 from alula.trees.status import NAMES
 
 RAISED = "raised"
-KEPT = 50
-"""Trees that are kept for a while. As one goes, BehaviorTree.CPP joins the threads of its timers, which can miss that they are to end
+_kept: deque[object] = deque(maxlen=50)
+"""Trees are kept for a while. As one goes, BehaviorTree.CPP joins the threads of its timers, which can miss that they are to end
 while they are about to wait, and the process hangs: by then they wait."""
+
+
+class Leaves:
+    """What the leaves do. A factory keeps this for good, so it must not know of factory or trees: the trees' threads would never end."""
+
+    def __init__(self) -> None:
+        self.story = Story({})
+        self._status = behaviortreepy.NodeStatus.__members__
+
+    def start(self, node):
+        return self._status[self.story.answer("start", node.full_path(), node.name())]
+
+    def tick(self, node):
+        return self._status[self.story.answer("tick", node.full_path(), node.name())]
+
+    def halted(self, node) -> None:
+        self.story.halted(node.full_path())
 
 
 class Theirs:
     """BehaviorTree.CPP; one factory for many files, because making one is what takes most of the time."""
 
     def __init__(self) -> None:
-        self._story = Story({})
-        self._kept: deque[object] = deque()
-        status = behaviortreepy.NodeStatus.__members__
+        self._leaves = Leaves()
         self._factory = behaviortreepy.BehaviorTreeFactory()
-
-        def ask(call):
-            return lambda node: status[self._story.answer(call, node.full_path(), node.name())]
-
-        halted = lambda node: self._story.halted(node.full_path())  # noqa: E731
-        self._factory.register_simple_stateful_action("Act", ask("start"), ask("tick"), halted)
-        self._factory.register_simple_condition("Ask", ask("start"))
+        self._factory.register_simple_stateful_action("Act", self._leaves.start, self._leaves.tick, self._leaves.halted)
+        self._factory.register_simple_condition("Ask", self._leaves.start)
 
     def play(self, text: str, answers: Answers, ticks: int, halts: Sequence[int]) -> Story:
         """Tick a file so often, halted before some of the ticks."""
-        if len(self._kept) == KEPT:
-            self._kept.popleft()
-        story = self._story = Story(answers)
+        story = self._leaves.story = Story(answers)
         try:
             tree = self._factory.create_tree_from_text(text)
         except (RuntimeError, ValueError) as error:
@@ -59,8 +67,8 @@ class Theirs:
                 story.ticked(RAISED)
                 break
             story.ticked(root)
-        self._story = Story(answers)  # what a tree does as it goes is nobody's
-        self._kept.append(tree)
+        self._leaves.story = Story(answers)  # what a tree does as it goes is nobody's
+        _kept.append(tree)
         return story
 
 
