@@ -13,7 +13,7 @@ import rospy
 from geometry_msgs.msg import Point
 from std_msgs.msg import String
 
-from alula_testing.waits import until
+from alula_testing.waits import HANGS_S, until
 from node_core.core import Input
 from node_core.ros import RawSubscriber, subscription, warn_of_garbage
 from perception_core.testing import framed, send_raw
@@ -131,8 +131,8 @@ def test_a_publisher_that_has_said_nothing_yet_is_left_alone(watched) -> None:
     publisher.unregister()
 
 
-def test_a_publisher_that_has_gone_when_the_connection_stands_publishes_nothing(ros_master) -> None:
-    """Its node refuses the connection: rospy gives up, and counts the connection all the same."""
+def test_a_publisher_that_has_gone_when_the_connection_stands_publishes_nothing_until_it_is_back(ros_master) -> None:
+    """Its node refuses the connection: rospy gives up, and keeps the connection all the same."""
     with socket.create_server(("127.0.0.1", 0)) as port, SimpleXMLRPCServer(("127.0.0.1", 0), logRequests=False) as node:
         node.register_function(lambda *_asked: [1, "", ["TCPROS", "127.0.0.1", port.getsockname()[1]]], "requestTopic")
         Thread(target=node.serve_forever, daemon=True).start()
@@ -145,8 +145,24 @@ def test_a_publisher_that_has_gone_when_the_connection_stands_publishes_nothing(
         connection.close()
         rosgraph.Master("/gone").unregisterPublisher("/raw/gone", uri)
         until(lambda: not subscriber.published, what="rospy has given up", timeout_s=20.0)
+        rosgraph.Master("/gone").registerPublisher("/raw/gone", "geometry_msgs/Point", uri)
+        port.settimeout(HANGS_S)
+        port.accept()[0].close()
         subscriber.close()
         node.shutdown()
+
+
+def test_a_driver_that_goes_and_is_back_at_once_is_heard(ros_master) -> None:
+    """Its node's address is the same: rospy takes it for the publisher that it is connected to, until it has seen that connection end."""
+    heard: list[float] = []
+    subscriber = RawSubscriber(Input("/raw/back", Point, lambda message: heard.append(message.x), warn_of_garbage, BUFFER_BYTES))
+    for life in range(5):
+        publisher = rospy.Publisher("/raw/back", Point, queue_size=10)
+        until(publisher.get_num_connections, what="connected")
+        publisher.publish(Point(x=life))
+        until(lambda life=life: heard[-1:] == [life], what="a message")
+        publisher.unregister()
+    subscriber.close()
 
 
 def test_another_type_is_told(ros_master) -> None:

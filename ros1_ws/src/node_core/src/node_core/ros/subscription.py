@@ -3,7 +3,9 @@
 from __future__ import annotations
 
 import math
+from collections.abc import Sequence
 from threading import Lock, Thread
+from typing import Any
 
 import rospy
 
@@ -62,6 +64,9 @@ class RawSubscriber:
     So the bytes are taken as they are, and what can't be decoded is told to ``garbage``, with a sentence. A `Stream` that has lost the
     borders between its messages can't be decoded at all: the connections are rebuilt, at growing intervals. Where no bytes wait, as mostly
     on a latched topic, nothing is wrong with the stream. Of messages that wait the newest ``queue_size`` are decoded.
+
+    Nor does rospy hear of a publisher that is back as long as it keeps its old connection, for good if it gave that up. So when the last
+    connection has ended, the topic is subscribed to anew.
     """
 
     def __init__(self, taken: Input) -> None:
@@ -69,8 +74,8 @@ class RawSubscriber:
         self._lock = Lock()
         self._stream = Stream()
         self._reconnected_s = -math.inf
-        self._ended = False
-        self._subscriber = self._subscribe()
+        self._ended = self._met = False
+        self._subscriber: rospy.Subscriber | None = self._subscribe()
         self._watch = Thread(target=self._watch_connections, daemon=True)
         self._watch.start()
 
@@ -81,16 +86,19 @@ class RawSubscriber:
     @property
     def published(self) -> bool:
         """Whether the topic has a publisher; one whose connection is being rebuilt counts."""
-        with self._lock:
-            # rospy keeps a connection that has failed where the publisher has gone meanwhile; it is done with it.
-            connected = not self._ended and not all(each.done for each in self._subscriber.impl.connections)
+        connected = any(not each.done for each in self._connections)
         return connected or abs(rospy.get_time() - self._reconnected_s) < SILENCE_S
+
+    @property
+    def _connections(self) -> Sequence[Any]:
+        """Rospy's connections, also those that it gave up as the publisher had gone meanwhile: it keeps them, and is done with them."""
+        with self._lock:
+            return () if self._subscriber is None else self._subscriber.impl.connections
 
     def close(self) -> None:
         """Unregister; no callback is called any more."""
-        with self._lock:
-            self._ended = True
-            self._subscriber.unregister()
+        self._ended = True
+        self._unsubscribe()
 
     def _on_bytes(self, raw: rospy.AnyMsg) -> None:
         sent = raw._connection_header.get("type", "*")  # noqa: SLF001 -- rospy's documented way to the publisher's type
@@ -100,17 +108,31 @@ class RawSubscriber:
         pause = rospy.rostime.wallsleep
         while not (rospy.is_shutdown() or self._ended):
             pause(LOOK_S)
-            with self._lock:
-                connections = [] if self._ended else list(self._subscriber.impl.connections)
+            connections = self._connections
             buffers = [each.read_buff for each in connections]
             waiting = sum(buffer.tell() for buffer in buffers if buffer is not None)  # None: closed since
             if self._stream.lost(waiting, sum(each.stat_num_msg for each in connections), rospy.get_time()):
-                self._reconnect()
+                self._reconnected_s = rospy.get_time()
+                self._subscribe_anew()
+            elif self._met and all(each.done for each in connections):
+                self._subscribe_anew()
+            else:
+                self._met = bool(connections)
 
-    def _reconnect(self) -> None:
+    def _subscribe_anew(self) -> None:
+        """Without the lock: rospy waits here for a master that is away."""
+        self._met = False
+        self._unsubscribe()
+        if self._ended:
+            return
+        subscriber = self._subscribe()
         with self._lock:
-            if self._ended:
-                return
-            self._reconnected_s = rospy.get_time()
-            self._subscriber.unregister()
-            self._subscriber = self._subscribe()
+            self._subscriber = subscriber
+        if self._ended:  # meanwhile
+            self._unsubscribe()
+
+    def _unsubscribe(self) -> None:
+        with self._lock:
+            subscriber, self._subscriber = self._subscriber, None
+        if subscriber is not None:
+            subscriber.unregister()
