@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Sequence
-from threading import Lock, Thread
+from threading import Event, Lock, Thread
 from typing import Any
 
 import rospy
@@ -74,7 +74,8 @@ class RawSubscriber:
         self._lock = Lock()
         self._stream = Stream()
         self._reconnected_s = -math.inf
-        self._ended = self._met = False
+        self._ended = Event()
+        self._met = False
         self._subscriber: rospy.Subscriber | None = self._subscribe()
         self._watch = Thread(target=self._watch_connections, daemon=True)
         self._watch.start()
@@ -97,7 +98,7 @@ class RawSubscriber:
 
     def close(self) -> None:
         """Unregister; no callback is called any more."""
-        self._ended = True
+        self._ended.set()
         self._unsubscribe()
 
     def _on_bytes(self, raw: rospy.AnyMsg) -> None:
@@ -106,7 +107,7 @@ class RawSubscriber:
 
     def _watch_connections(self) -> None:
         pause = rospy.rostime.wallsleep
-        while not (rospy.is_shutdown() or self._ended):
+        while not (rospy.is_shutdown() or self._ended.is_set()):
             pause(LOOK_S)
             connections = self._connections
             buffers = [each.read_buff for each in connections]
@@ -123,12 +124,12 @@ class RawSubscriber:
         """Without the lock: rospy waits here for a master that is away."""
         self._met = False
         self._unsubscribe()
-        if self._ended:
+        if self._ended.is_set():
             return
         subscriber = self._subscribe()
         with self._lock:
             self._subscriber = subscriber
-        if self._ended:  # meanwhile
+        if self._ended.is_set():  # meanwhile
             self._unsubscribe()
 
     def _unsubscribe(self) -> None:
