@@ -11,7 +11,8 @@ import pytest
 
 from flight_bench.__main__ import environment_of, main
 from flight_bench.figures import Figures, as_json, ratio, table
-from flight_bench.watching import FRONT, PHASES, SUPERVISOR, UNSEEN, watch
+from flight_bench.picture import draw
+from flight_bench.watching import FRONT, PHASES, SUPERVISOR, UNSEEN, Watched, watch
 
 BUSY = "import time\nwhile time.process_time() < {s}: pass\n"
 TREE = f"""
@@ -49,6 +50,18 @@ def test_medians_ratios_and_files_tell_of_each_checkout(tmp_path: Path) -> None:
     assert [one["checkout"] for one in as_json(flights)] == ["here"] * 3
 
 
+@pytest.mark.parametrize(("name", "magic"), [("cost.svg", b"<?xml"), ("cost.png", b"\x89PNG")])
+def test_the_picture_has_each_process(tmp_path: Path, name: str, magic: bytes) -> None:
+    cost = [{"camera": {"start": 0.5, "flight": 2.0, "report": 0.0}, FRONT: {"start": 0.3, "flight": 0.1, "report": 1.25}}, {}]
+    flown = [[Figures(f"/checkouts/{n}", "accomplished", Watched(0, one, {}, {}), {})] for n, one in enumerate(cost)]
+    draw(flown, tmp_path / name)
+    drawn = (tmp_path / name).read_bytes()
+    assert drawn.startswith(magic)
+    if name.endswith("svg"):
+        words = {text for text in drawn.decode().replace("<", ">").split(">") if text.strip()}
+        assert {"camera", FRONT, "start", "flight", "report", "2.5", "1.6", "0: 4 s in all", "1: 0 s in all"} <= words
+
+
 def test_another_checkout_is_told_nothing_of_where_this_one_lies(tmp_path: Path) -> None:
     own = Path(os.environ["ALULA_ROOT"])
     assert environment_of(own) == dict(os.environ)
@@ -58,7 +71,12 @@ def test_another_checkout_is_told_nothing_of_where_this_one_lies(tmp_path: Path)
 
 
 @pytest.mark.parametrize(
-    ("arguments", "named"), [(["--repeat", "0"], "at least one flight"), (["--vs", "no/such/checkout"], "no/such/checkout")]
+    ("arguments", "named"),
+    [
+        (["--repeat", "0"], "at least one flight"),
+        (["--vs", "no/such/checkout"], "no/such/checkout"),
+        (["--picture", "cost.txt"], ".png or .svg"),
+    ],
 )
 def test_wrong_input_is_named(arguments: list[str], named: str, capsys: pytest.CaptureFixture[str]) -> None:
     with pytest.raises(SystemExit) as ended:

@@ -11,6 +11,7 @@ from collections.abc import Sequence
 from pathlib import Path
 
 from flight_bench.figures import Figures, accuracy_of, as_json, ratio, table
+from flight_bench.picture import draw
 from flight_bench.watching import watch
 
 FLIGHT = ("mapping", "--fail", "zed@30", "--rate", "0")
@@ -25,12 +26,15 @@ def parse_arguments(arguments: Sequence[str] | None) -> argparse.Namespace:
     """Return the command line's values; wrong ones print the usage on stderr and exit with code 2."""
     parser = argparse.ArgumentParser(prog="alula bench flight", description="Measures the processor time of a flight.")
     parser.add_argument("--json", type=Path, metavar="FILE", help="write all figures to this file")
+    parser.add_argument("--picture", type=Path, metavar="FILE", help="draw the processes' time, as PNG or SVG")
     parser.add_argument("--repeat", type=int, default=1, metavar="N", help="fly N times and tell medians (default 1)")
     parser.add_argument("--vs", type=Path, metavar="CHECKOUT", help="fly another checkout, set up as this one, by turns with this one")
     parser.add_argument("run", nargs="*", default=FLIGHT, metavar="-- RUN", help=f"arguments of `alula run` (default: {' '.join(FLIGHT)})")
     given = parser.parse_args(arguments)
     if given.repeat < 1:
         parser.error(f"--repeat {given.repeat}: at least one flight")
+    if given.picture is not None and given.picture.suffix not in {".png", ".svg"}:
+        parser.error(f"--picture {given.picture}: end the name with .png or .svg")
     if given.vs is not None and not (given.vs / "alula").is_file():
         parser.error(f"--vs {given.vs}: there is no `alula` in it; name a checkout")
     return given
@@ -81,6 +85,8 @@ def main(arguments: Sequence[str] | None = None) -> int:
     if options.json is not None:
         told = [one for flights in flown for one in as_json(flights)]
         options.json.write_text(json.dumps({"run": list(options.run), "flights": told}, indent=1) + "\n", encoding="utf-8")
+    if options.picture is not None:
+        draw(flown, options.picture)
     lines = [table(flights) for flights in flown] + ([ratio(*flown)] if options.vs else [])
     sys.stdout.write("\n\n".join(lines) + "\n")
     return EXIT_OK
