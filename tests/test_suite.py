@@ -3,15 +3,18 @@
 from __future__ import annotations
 
 import os
+import signal
 import subprocess
 import sys
 from pathlib import Path
 from textwrap import dedent
 
+import psutil
 import pytest
 
 from alula_testing.flights import ALULA_ROOT
 from alula_testing.progress import time_left_s, told
+from alula_testing.waits import HANGS_S, until
 
 
 def pytest_over(folder: Path, plugin: str) -> list[str]:
@@ -127,13 +130,18 @@ PLACES = {
 }
 
 
-def test_each_part_is_run_once_though_there_are_more_than_lanes_and_shown_one_after_the_other(tmp_path: Path) -> None:
-    for entry in Path(os.environ["ALULA_STATE"]).iterdir():  # what is installed, and logs of its own
+def environment_of_a_suite(state: Path) -> dict[str, str]:
+    """Return the environment of a suite with what is installed here, and logs of its own."""
+    for entry in Path(os.environ["ALULA_STATE"]).iterdir():
         if not entry.name.startswith("test-"):
-            (tmp_path / entry.name).symlink_to(entry)
-    command = [ALULA_ROOT / "tests/run", *PLACES.values(), "-k", "no_test_is_called_so"]
+            (state / entry.name).symlink_to(entry)
     environment = {name: value for name, value in os.environ.items() if not name.startswith("OMP_")}  # by which nproc goes
-    environment["ALULA_STATE"] = str(tmp_path)
+    return {**environment, "ALULA_STATE": str(state)}
+
+
+def test_each_part_is_run_once_though_there_are_more_than_lanes_and_shown_one_after_the_other(tmp_path: Path) -> None:
+    command = [ALULA_ROOT / "tests/run", *PLACES.values(), "-k", "no_test_is_called_so"]
+    environment = environment_of_a_suite(tmp_path)
     done = subprocess.run(command, capture_output=True, text=True, check=False, env=environment, cwd=ALULA_ROOT)
     assert done.returncode == 5, done.stdout + done.stderr
     shown = [line for line in done.stdout.splitlines() if line.startswith("==") and line.endswith("==") and "/" in line]
@@ -142,6 +150,42 @@ def test_each_part_is_run_once_though_there_are_more_than_lanes_and_shown_one_af
     assert {name: log.splitlines()[0] for name, log in logs.items()} == {
         f"test-{name.replace(' ', '-')}.log": f"== {name}: {place} ==" for name, place in PLACES.items()
     }
+
+
+WAITS = """
+    import os, pathlib, subprocess, time
+    import pytest
+
+    HERE = pathlib.Path(__file__).parent
+
+    @pytest.fixture
+    def started():
+        child = subprocess.Popen(["sleep", "1000"], start_new_session=True)
+        yield child
+        child.kill()
+        child.wait()
+
+    def test_waits(started):
+        (HERE / "coming").write_text(f"{os.getpid()} {started.pid}")
+        (HERE / "coming").rename(HERE / "pids")
+        time.sleep(1000)
+"""
+AS_A_SCRIPT_STARTS_IT = 'trap "" INT; exec "$0" "$@"'  # in its background
+
+
+@pytest.mark.parametrize(("shell", "number"), [((), signal.SIGINT), (("sh", "-c", AS_A_SCRIPT_STARTS_IT), signal.SIGTERM)])
+def test_a_suite_that_is_ended_early_ends_all_its_parts_with_what_they_started(tmp_path: Path, shell: tuple[str, ...], number: int) -> None:
+    (tmp_path / "state").mkdir()
+    (tmp_path / "test_waits.py").write_text(dedent(WAITS), encoding="utf-8")
+    command = [*shell, ALULA_ROOT / "tests/run", tmp_path / "test_waits.py", PLACES["ROS 1 world"]]
+    environment, told = environment_of_a_suite(tmp_path / "state"), subprocess.DEVNULL
+    with subprocess.Popen(command, cwd=ALULA_ROOT, env=environment, stdout=told, stderr=told, start_new_session=True) as front:
+        until((tmp_path / "pids").exists, "the test has begun")
+        pids = [int(pid) for pid in (tmp_path / "pids").read_text(encoding="utf-8").split()]
+        assert all(psutil.pid_exists(pid) for pid in pids)
+        front.send_signal(number)
+        assert front.wait(HANGS_S) == 130
+        assert not any(psutil.pid_exists(pid) for pid in pids)
 
 
 DPKG = """\

@@ -1,11 +1,12 @@
-"""A pytest plugin for tests that leave a thread behind which keeps Python from ending: they are named, and the tests fail.
+"""A pytest plugin for the end of the tests: SIGTERM ends them as Ctrl-C does, and a thread that keeps Python from ending is named.
 
-rospy's connections have such threads: one that nobody closes, and the tests hang after they have passed.
+Of such a thread the tests fail. rospy's connections have them: one that nobody closes, and the tests hang after they have passed.
 """
 
 from __future__ import annotations
 
 import os
+import signal
 import threading
 import time
 
@@ -45,5 +46,6 @@ class Ending:
 
 
 def pytest_configure(config: pytest.Config) -> None:
-    """Begin."""
+    """Begin. Where Ctrl-C is ignored, as in the background of a script, fixtures end what they started all the same."""
+    signal.signal(signal.SIGTERM, signal.default_int_handler)
     config.pluginmanager.register(Ending(), "alula-ending")
