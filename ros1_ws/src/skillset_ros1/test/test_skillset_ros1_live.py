@@ -8,6 +8,7 @@ import threading
 import actionlib
 import pytest
 import rospy
+from actionlib.action_client import CommState
 from actionlib_msgs.msg import GoalID, GoalStatus
 from geometry_msgs.msg import Point
 from navigation_interfaces.msg import LandActionResult, TakeoffAction, TakeoffActionGoal, TakeoffActionResult, TakeoffGoal
@@ -111,20 +112,26 @@ def test_wrong_inputs_are_the_callers_error(navigation):
 
 def test_any_actionlib_client_gets_its_answers(navigation):
     navigation.bring({"SDK_authority": "AVAILABLE", "homepoint_status": "VALID"})
-    client = actionlib.SimpleActionClient(navigation.name("skill/takeoff"), TakeoffAction)
+    # Not a SimpleActionClient: one of Python misses an end that comes before its `send_goal` returns (github.com/ros/actionlib/issues/206).
+    client = actionlib.ActionClient(navigation.name("skill/takeoff"), TakeoffAction)
     assert client.wait_for_server(rospy.Duration(SOON_S))
+
+    def answer(goal):
+        until(lambda: goal.get_comm_state() == CommState.DONE, "it is answered")
+        return goal.get_terminal_state(), goal.get_result()
+
     navigation.hooks["takeoff"].acts["validate"] = lambda inputs: "" if inputs.height < 10 else "too high"
-    assert client.send_goal_and_wait(TakeoffGoal(height=30, speed=1), rospy.Duration(SOON_S)) == GoalStatus.REJECTED
-    assert (client.get_result().outcome, client.get_result().message) == ("NOT_VALIDATED", "too high")
+    status, refusal = answer(client.send_goal(TakeoffGoal(height=30, speed=1)))
+    assert (status, refusal.outcome, refusal.message) == (GoalStatus.REJECTED, "NOT_VALIDATED", "too high")
     navigation.hooks["takeoff"].acts["on_dispatch"] = lambda execution: on_thread(lambda: execution.terminate("AT_ALTITUDE"))
-    assert client.send_goal_and_wait(TakeoffGoal(height=3, speed=1), rospy.Duration(SOON_S)) == GoalStatus.SUCCEEDED
-    assert (client.get_result().outcome, client.get_result().result) == ("TERMINATED", "AT_ALTITUDE")
+    status, end = answer(client.send_goal(TakeoffGoal(height=3, speed=1)))
+    assert (status, end.outcome, end.result) == (GoalStatus.SUCCEEDED, "TERMINATED", "AT_ALTITUDE")
     navigation.hooks["takeoff"].acts.pop("on_dispatch")
-    client.send_goal(TakeoffGoal(height=3, speed=1))
-    until(lambda: client.get_state() == GoalStatus.ACTIVE, "it runs")
-    client.cancel_goal()
-    assert client.wait_for_result(rospy.Duration(SOON_S))
-    assert (client.get_state(), client.get_result().outcome) == (GoalStatus.PREEMPTED, "INTERRUPTED")
+    flying = client.send_goal(TakeoffGoal(height=3, speed=1))
+    until(lambda: flying.get_goal_status() == GoalStatus.ACTIVE, "it runs")
+    flying.cancel()
+    status, end = answer(flying)
+    assert (status, end.outcome) == (GoalStatus.PREEMPTED, "INTERRUPTED")
 
 
 def test_a_cancellation_that_overtakes_its_goal(navigation):
