@@ -112,6 +112,24 @@ def test_a_thread_that_is_left_over_is_named_with_its_test_and_ends_the_tests(tm
     assert [("left over" in line, line.rpartition(":")[2]) for line in told_of] == [(True, "test_two")]
 
 
+HANGS_IN_C = """
+import ctypes
+
+def test_hangs():
+    lock, keeping_the_interpreter = ctypes.create_string_buffer(64), ctypes.PyDLL(None)
+    for _ in range(2):
+        keeping_the_interpreter.pthread_mutex_lock(lock)
+"""
+
+
+def test_a_call_in_c_that_never_returns_is_named_with_its_test_and_ends_the_tests(tmp_path: Path) -> None:
+    (tmp_path / "test_part.py").write_text(HANGS_IN_C, encoding="utf-8")
+    command = [*pytest_over(tmp_path, "alula_testing.ending"), "-o", "timeout=1", "-o", "faulthandler_timeout=2"]
+    done = subprocess.run(command, cwd=tmp_path, capture_output=True, text=True, check=False, timeout=HANGS_S)
+    assert done.returncode == 1
+    assert f'"{tmp_path / "test_part.py"}", line 7 in test_hangs' in done.stderr
+
+
 def test_an_expression_that_is_called_as_a_folder_is_selects_tests_and_no_part() -> None:
     command = [ALULA_ROOT / "tests/run", "tests/test_manifests.py", "-k", "lib", "--collect-only"]
     done = subprocess.run(command, capture_output=True, text=True, check=False)
