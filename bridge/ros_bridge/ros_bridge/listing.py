@@ -7,6 +7,7 @@ from typing import TYPE_CHECKING
 
 import rclpy
 
+from alula.common.fast_dds import leave
 from ros_bridge.config import ActionRoute, ServiceRoute, TopicRoute
 from ros_bridge.decisions import decide
 from ros_bridge.discovery import GraphReader
@@ -41,7 +42,7 @@ def list_routes(config: BridgeConfig, types: Types, master: Connection) -> str:
         return render(list_table(decisions, {spec: problem(spec, types) for spec in config.routes}))
     finally:
         events.close()
-        node.destroy_node()
+        leave(node)
 
 
 def problem(spec: Spec, types: Types) -> str:

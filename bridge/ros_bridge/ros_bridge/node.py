@@ -14,6 +14,7 @@ from typing import TYPE_CHECKING
 import rclpy
 from rclpy.executors import SingleThreadedExecutor
 
+from alula.common.fast_dds import leave
 from alula.common.files import write_json
 from ros_bridge import actions, services, topics
 from ros_bridge.config import ActionRoute, ServiceRoute, TopicRoute
@@ -149,3 +150,4 @@ class Bridge:
         self._executor.shutdown(timeout_sec=SPIN_END_S)
         if self._spinner.is_alive():
             self._spinner.join(SPIN_END_S)
+        leave(self._node)

@@ -9,6 +9,7 @@ from rclpy.exceptions import InvalidHandle
 from rclpy.executors import SingleThreadedExecutor
 from std_msgs.msg import String
 
+from alula.common.fast_dds import leave
 from alula_testing.waits import HANGS_S
 from ros_bridge.spinning import spin
 
@@ -40,8 +41,7 @@ def world(ros2_domain):
     yield node, executor, thread
     executor.shutdown(timeout_sec=0.0)
     thread.join(HANGS_S)
-    node.destroy_node()
-    context.try_shutdown()
+    leave(node)
 
 
 def works(node):

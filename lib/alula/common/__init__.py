@@ -1,5 +1,6 @@
 """Plain Python below everything else: files, processes, signals, ports and domains. Imports no ROS and no other package of the project.
 
+- `fast_dds`: how a process leaves DDS without hanging in it
 - `faults`: what is to fail in a run, and what did
 - `files`: JSON and text files that are never seen half written
 - `located_yaml`: YAML whose errors name file and line

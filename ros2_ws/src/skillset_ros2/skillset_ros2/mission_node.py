@@ -25,6 +25,7 @@ from rclpy.signals import SignalHandlerOptions
 from std_msgs.msg import Header, String
 from std_srvs.srv import SetBool, Trigger
 
+from alula.common.fast_dds import leave
 from alula.common.signals import on_end_signal
 from alula.missions.director import EXIT_CODES, START_TIMEOUT_S, End, Outcome
 from alula.missions.driver import TICK_PERIOD_S, MissionDriver
@@ -218,6 +219,5 @@ def run_mission(plan: MissionPlan, out: Path, arguments: Sequence[str] | None = 
     end = tick_to_the_end(node, signals)
     node.finish(end)
     node.get_logger().info(f"{end.outcome.value}{': ' + end.reason if end.reason else ''}")
-    node.destroy_node()
-    rclpy.try_shutdown()
+    leave(node)
     return EXIT_CODES[end.outcome]

@@ -21,6 +21,7 @@ from rclpy.node import Node
 from rclpy.signals import SignalHandlerOptions
 from rclpy.utilities import remove_ros_args
 
+from alula.common.fast_dds import leave
 from alula.common.faults import FaultError, FaultRequest, parse_fault
 from alula.common.robots import BEHAVIOUR, RobotError, find_robot
 from alula.common.ros_arguments import without_roslaunch
@@ -88,8 +89,9 @@ class MockNodes:
         for thread in threads:
             thread.join()
         executor.shutdown(timeout_sec=0)
-        for node in (*self.host.nodes.values(), self.helper):
+        for node in self.host.nodes.values():
             node.destroy_node()
+        leave(self.helper)
 
 
 def parse(words: Sequence[str], *, program: str, folder: bool) -> argparse.Namespace:

@@ -17,6 +17,7 @@ from rclpy.signals import SignalHandlerOptions
 from rclpy.time_source import CLOCK_TOPIC
 from rosgraph_msgs.msg import Clock
 
+from alula.common.fast_dds import leave
 from skillset_ros2.executor import NodeExecutor
 
 JOIN_S = 5.0
@@ -63,8 +64,7 @@ class Session:
         self._executor.shutdown(timeout_sec=0)
         if threading.current_thread() is not self._thread:
             self._thread.join(JOIN_S)
-        self.node.destroy_node()
-        self._context.try_shutdown()
+        leave(self.node)
 
     def _spin(self) -> None:
         while not self._over.is_set():

@@ -20,6 +20,7 @@ from rclpy.node import Node
 from rclpy.signals import SignalHandlerOptions
 from std_msgs.msg import Header
 
+from alula.common.fast_dds import leave
 from alula.common.ros_arguments import ROS_ARGUMENTS, without_roslaunch
 from alula.common.shared_memory import sweep_shared_memory
 from alula.common.signals import StopEvent
@@ -82,20 +83,25 @@ def run_skillset(
         refusals.append(reason)
         stop.set()
 
+    last: Node | None = None
     try:
-        if options.part in {ALL, RESOURCES} and rivals_there(skillset.name):
-            refuse(f"managers of {skillset.name} are there already; end them first")
-        else:
-            names = (os.environ.get("ROS_DOMAIN_ID", ""), skillset.name, *words)
-            address = "" if options.part == ALL else pipe_address(*names)
-            node = make_part(options.part, skillset, interfaces, hooks_factory, data_bindings, address=address, stop=stop, on_rival=refuse)
-            if node is not None:
-                warn_of_names_outside(node)
-                spin_until(node, stop, at_stop=_limit_the_end)
-                node.destroy_node()
+        if options.part in {ALL, RESOURCES}:
+            last = listen_for_rivals(skillset.name)
+        names = (os.environ.get("ROS_DOMAIN_ID", ""), skillset.name, *words)
+        address = "" if options.part == ALL else pipe_address(*names)
+        node = make_part(options.part, skillset, interfaces, hooks_factory, data_bindings, address=address, stop=stop, on_rival=refuse)
+        if node is not None:
+            if last is not None:
+                # Only now: the participant in DDS, which goes with the last node, is both nodes'.
+                last.destroy_node()
+            last = node
+            warn_of_names_outside(node)
+            spin_until(node, stop, at_stop=_limit_the_end)
     except SkillRuntimeError as error:
         refuse(str(error))
     finally:
+        if last is not None:
+            leave(last)
         rclpy.try_shutdown()
         faulthandler.cancel_dump_traceback_later()
     if refusals:
@@ -109,19 +115,26 @@ def warn_of_names_outside(node: Node) -> None:
         node.get_logger().warning(f"not in {node.get_namespace()}: {', '.join(outside)}; hooks write names without the slash in front")
 
 
-def rivals_there(skillset: str) -> bool:
-    """Tell whether managers of this skillset send heartbeats, before anything is done that might disturb them."""
-    node = Node(skillset, enable_rosout=False)
+def listen_for_rivals(skillset: str) -> Node:
+    """Return the node that has heard no heartbeats of other managers of this skillset, before anything is done that might disturb them.
+
+    Raises:
+        SkillRuntimeError: There are some.
+    """
+    node = Node(skillset, enable_rosout=False, start_parameter_services=False)
     heard: list[object] = []
-    node.create_subscription(Header, f"{skillset}/alive", heard.append, latched(1))
+    subscription = node.create_subscription(Header, f"{skillset}/alive", heard.append, latched(1))
     executor = NodeExecutor()
     executor.add_node(node)
     end_s = time.monotonic() + LISTEN_FIRST_S
     while not heard and (left_s := end_s - time.monotonic()) > 0:
         executor.spin_once(timeout_sec=left_s)
     executor.shutdown(timeout_sec=0)
-    node.destroy_node()
-    return bool(heard)
+    if heard:
+        leave(node)
+        raise SkillRuntimeError(f"managers of {skillset} are there already; end them first")
+    node.destroy_subscription(subscription)
+    return node
 
 
 def make_part(

@@ -24,6 +24,7 @@ from rclpy.waitable import NumberOfEntities, Waitable  # noqa: E402
 from std_msgs.msg import String  # noqa: E402
 from std_srvs.srv import Trigger  # noqa: E402
 
+from alula.common.fast_dds import stop_discovery  # noqa: E402
 from alula_testing.waits import until  # noqa: E402
 from skillset_ros2 import ActionClient  # noqa: E402
 from skillset_ros2.executor import RclpyExecutor, SparingExecutor  # noqa: E402
@@ -57,6 +58,7 @@ def make_node(context, name):
 def node(context):
     node = make_node(context, "served")
     yield node
+    stop_discovery(node)
     node.destroy_node()
 
 
@@ -64,6 +66,7 @@ def node(context):
 def other(context):
     node = make_node(context, "other")
     yield node
+    stop_discovery(node)
     node.destroy_node()
 
 

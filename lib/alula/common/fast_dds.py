@@ -1,0 +1,54 @@
+"""How a process leaves DDS.
+
+With the last node of a context goes its participant in DDS. Fast DDS waits then until no callback of its discovery runs, and by default has
+no deadline. As compiled for the wheels (2.14.5), that wait fails at once and is repeated for ever where a callback does run: at full load,
+with the lock that the callback needs, and with Python's interpreter (https://github.com/eProsima/Fast-DDS/issues/6513). With a deadline the
+wait is as it should be, and there is nothing left to wait for at the end.
+"""
+
+from __future__ import annotations
+
+import ctypes
+from functools import cache
+from typing import Any
+
+DISCOVERY_ENDS_S = 10
+"""Wall clock; a callback takes some microseconds, on a busy machine some milliseconds."""
+_GET_PARTICIPANT = "_ZN16rmw_fastrtps_cpp22get_domain_participantEP10rmw_node_s"
+_SET_LISTENER = (
+    "_ZN8eprosima7fastdds3dds17DomainParticipant12set_listener"
+    "EPNS1_25DomainParticipantListenerERKNS1_10StatusMaskENSt6chrono8durationIlSt5ratioILl1ELl1EEEE"
+)
+
+
+def leave(node: Any) -> None:
+    """Destroy the last node (rclpy's) of a context, and shut the context down."""
+    stop_discovery(node)
+    node.destroy_node()
+    node.context.try_shutdown()
+
+
+def stop_discovery(node: Any) -> bool:
+    """Have the nodes of a context learn no more of others; return whether that was done: not where the DDS is another one."""
+    library = _library()
+    if library is None:
+        return False
+    rmw_node, participant_of, set_listener = library
+    participant = participant_of(rmw_node(node.handle.pointer))
+    nothing = ctypes.c_uint64(0)
+    return participant is not None and set_listener(participant, None, ctypes.byref(nothing), DISCOVERY_ENDS_S) == 0
+
+
+@cache
+def _library() -> tuple[Any, Any, Any] | None:
+    """Return the functions of rcl, rmw and DDS that it takes, or None where they are not those that are known here."""
+    try:
+        rmw_node = ctypes.CDLL("librcl.so").rcl_node_get_rmw_handle
+        participant_of = getattr(ctypes.CDLL("librmw_fastrtps_cpp.so"), _GET_PARTICIPANT)
+        set_listener = getattr(ctypes.CDLL("libfastrtps.so.2.14"), _SET_LISTENER)
+    except (OSError, AttributeError):
+        return None
+    for function in (rmw_node, participant_of):
+        function.argtypes, function.restype = [ctypes.c_void_p], ctypes.c_void_p
+    set_listener.argtypes, set_listener.restype = [ctypes.c_void_p, ctypes.c_void_p, ctypes.c_void_p, ctypes.c_long], ctypes.c_int
+    return rmw_node, participant_of, set_listener
