@@ -188,10 +188,11 @@ WAITS = """
         (HERE / "coming").rename(HERE / "pids")
         time.sleep(1000)
 """
+AT_A_TERMINAL = ("env", "--default-signal=INT")  # also where these tests are a script's
 AS_A_SCRIPT_STARTS_IT = 'trap "" INT; exec "$0" "$@"'  # in its background
 
 
-@pytest.mark.parametrize(("shell", "number"), [((), signal.SIGINT), (("sh", "-c", AS_A_SCRIPT_STARTS_IT), signal.SIGTERM)])
+@pytest.mark.parametrize(("shell", "number"), [(AT_A_TERMINAL, signal.SIGINT), (("sh", "-c", AS_A_SCRIPT_STARTS_IT), signal.SIGTERM)])
 def test_a_suite_that_is_ended_early_ends_all_its_parts_with_what_they_started(tmp_path: Path, shell: tuple[str, ...], number: int) -> None:
     (tmp_path / "state").mkdir()
     (tmp_path / "test_waits.py").write_text(dedent(WAITS), encoding="utf-8")

@@ -123,13 +123,16 @@ class Ros1Peer(Lines):
     def expect(self, *kinds: str, within_s: float = HANGS_S, **wanted: object) -> dict:
         """Return the next event of one of the kinds that has the wanted values; others in between are passed over."""
         deadline = time.monotonic() + within_s
+        passed_over: list[str] = []
         while True:
             try:
-                event = json.loads(self.next_line(max(deadline - time.monotonic(), 0.001)))
+                line = self.next_line(max(deadline - time.monotonic(), 0.001))
             except queue.Empty:
-                pytest.fail(f"no {kinds} {wanted} from the ROS 1 peer within {within_s} s")
+                pytest.fail(f"no {kinds} {wanted} from the ROS 1 peer within {within_s} s, but {''.join(passed_over[-10:]) or 'nothing'}")
+            event = json.loads(line)
             if event["event"] in kinds and all(event.get(key) == value for key, value in wanted.items()):
                 return event
+            passed_over.append(line)
 
 
 class BridgeProcess(Lines):
