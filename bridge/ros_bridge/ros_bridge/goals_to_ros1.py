@@ -245,14 +245,15 @@ class GoalsToRos1:
         unanswered = goal.status is Ros2Status.UNKNOWN
         if goal.ended_in_ros1 is not None and now_s - goal.ended_in_ros1[1] > RESULT_WITHIN_S:
             self._end_as_in_ros1(goal, goal.ended_in_ros1[0], None, "the server in ROS 1 has sent no result", now_s)
-        elif goal.sent_s is not None and gone:
+        elif goal.sent_s is not None and gone and (goal.listed_s is not None or goal.cancel_seen):
             self._give_up(goal, "the server in ROS 1 is gone", now_s)
         elif unanswered and goal.listed_s is not None and now_s - goal.listed_s > QUEUED_S and goal.ended_in_ros1 is None:
             self._accept(goal)
         elif unanswered and now_s > goal.answer_by_s and goal.listed_s is None:
             if goal.sent_s is not None:
                 self._server.send_cancel(goal.name)  # it must not begin after the client was told that it doesn't
-            reason = "no server in ROS 1" if goal.sent_s is None else "the server in ROS 1 has not taken the goal in time"
+            asked = goal.sent_s is not None and not gone
+            reason = "the server in ROS 1 has not taken the goal in time" if asked else "no server in ROS 1"
             self._reject(goal, reason, now_s)
         elif goal.sent_s is None or (goal.listed_s is None and now_s - goal.sent_s > SEND_AGAIN_S):
             self._send_if_possible(goal, now_s)

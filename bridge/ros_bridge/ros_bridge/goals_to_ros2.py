@@ -239,10 +239,11 @@ class GoalsToRos2:
                 self._next_status_s = now_s + STATUS_PERIOD_S
 
     def _tick_open(self, goal: GoalToRos2, now_s: float, *, present: bool, come: bool) -> None:
-        if goal.sent_s is not None and not present:
+        if goal.sent_s is not None and not present and (goal.accepted or goal.cancel_asked):
             self._give_up(goal, "the server in ROS 2 is gone", now_s)
         elif not goal.accepted and now_s > goal.answer_by_s:
-            reason = "no server in ROS 2" if goal.sent_s is None else "the server in ROS 2 has not answered in time"
+            asked = goal.sent_s is not None and present
+            reason = "the server in ROS 2 has not answered in time" if asked else "no server in ROS 2"
             self._give_up(goal, reason, now_s)
         elif goal.sent_s is None:
             self._send_if_possible(goal, now_s)

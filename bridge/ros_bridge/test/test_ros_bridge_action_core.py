@@ -321,6 +321,49 @@ def test_goal_lost_on_the_way_is_sent_again_and_one_that_a_new_server_does_not_k
     assert clients.texts == {"a": "the server in ROS 2 does not know the goal: it was restarted"}
 
 
+def test_goal_that_a_server_has_not_answered_that_goes_is_for_the_one_that_comes_in_time():
+    table, server, clients = to_ros2()
+    table.on_goal(GoalId("a", 1), b"", 0.0)
+    server.here = False
+    table.tick(0.5)
+    assert clients.results == {}
+    server.here = server.come = True
+    table.tick(1.0)
+    table.on_result(server.goals[0], Ros2Status.UNKNOWN, b"", "", 1.1)
+    assert server.goals == [server.goals[0]] * 2
+    table.on_answer(server.goals[0], accepted=True, stamp_ns=1, reason="", now_s=1.2)
+    server.here = False
+    table.tick(1.5)
+    assert (clients.results, clients.texts) == ({"a": Ros1Status.ABORTED}, {"a": "the server in ROS 2 is gone"})
+
+
+def test_goal_that_a_server_has_not_answered_that_goes_ends_when_no_other_comes_or_it_is_cancelled():
+    table, server, clients = to_ros2()
+    table.on_goal(GoalId("a", 1), b"", 0.0)
+    table.on_goal(GoalId("b", 1), b"", 0.0)
+    server.here = False
+    table.on_cancel(GoalId("b", 0), 0.5)
+    table.tick(0.6)
+    assert clients.results == {"b": Ros1Status.REJECTED}
+    table.tick(5.5)
+    assert (clients.results["a"], clients.texts["a"]) == (Ros1Status.REJECTED, "no server in ROS 2")
+
+
+def test_goal_that_an_actionlib_server_has_not_taken_that_goes_is_for_the_one_that_comes_in_time():
+    server, clients = Server(), Clients2()
+    table = GoalsToRos1("test", 5.0)
+    table.connect(server, clients)
+    table.request_goal("goal", goal_uuid(0), b"", 0.0)
+    server.here = False
+    table.tick(0.5)
+    assert clients.answers == {}
+    server.here = True
+    table.tick(2.0)
+    assert server.goals == [goal_name(0)] * 2
+    table.on_status([GoalStatus(GoalId(goal_name(0), 9), Ros1Status.ACTIVE)], 2.1)
+    assert clients.answers == {"goal": True}
+
+
 def test_goal_accepted_after_its_client_was_told_no_is_cancelled():
     table, server, clients = to_ros2()
     table.on_goal(GoalId("a", 1), b"", 0.0)
