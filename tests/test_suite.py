@@ -124,7 +124,8 @@ def test_hangs():
 
 def test_a_call_in_c_that_never_returns_is_named_with_its_test_and_ends_the_tests(tmp_path: Path) -> None:
     (tmp_path / "test_part.py").write_text(HANGS_IN_C, encoding="utf-8")
-    command = [*pytest_over(tmp_path, "alula_testing.ending"), "-o", "timeout=1", "-o", "faulthandler_timeout=2"]
+    (tmp_path / "conftest.py").write_text("import alula_testing.ending\nalula_testing.ending.WATCHDOG_S = 1.0\n", encoding="utf-8")
+    command = [*pytest_over(tmp_path, "alula_testing.ending"), "-o", "timeout=1"]
     done = subprocess.run(command, cwd=tmp_path, capture_output=True, text=True, check=False, timeout=HANGS_S)
     assert done.returncode == 1
     assert f'"{tmp_path / "test_part.py"}", line 7 in test_hangs' in done.stderr

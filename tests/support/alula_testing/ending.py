@@ -1,19 +1,30 @@
-"""A pytest plugin for the end of the tests: SIGTERM ends them as Ctrl-C does, and a thread that keeps Python from ending is named.
+"""A pytest plugin for the end of the tests: SIGTERM ends them as Ctrl-C does, and what keeps them from ending is named.
 
-Of such a thread the tests fail. rospy's connections have them: one that nobody closes, and the tests hang after they have passed.
+That is a thread, for whose end Python waits: rospy's connections have them, one that nobody closes is enough. Or a call in C that never
+returns and keeps the interpreter, so that its test's own timeout can't end it. Of either the tests fail.
 """
 
 from __future__ import annotations
 
+import faulthandler
 import os
 import signal
 import threading
 import time
+from collections.abc import Iterator
 
 import pytest
 
 HANGS_S = 60.0
 """Wall clock after the last test: what ends by itself has ended then."""
+WATCHDOG_S = 30.0
+"""Wall clock after a test's timeout: what that can end has ended then."""
+
+
+def timeout_s(item: pytest.Item) -> float:
+    """Return the timeout of a test, 0 where it has none."""
+    marker = item.get_closest_marker("timeout")
+    return float(marker.args[0] if marker else item.config.getini("timeout") or 0.0)
 
 
 def kept_alive() -> list[threading.Thread]:
@@ -22,10 +33,25 @@ def kept_alive() -> list[threading.Thread]:
 
 
 class Ending:
-    """Knows after which test a thread was there first."""
+    """Knows after which test a thread was there first, and watches over each test's end.
 
-    def __init__(self) -> None:
+    Args:
+        errors: the file descriptor that stacks are written to.
+    """
+
+    def __init__(self, errors: int) -> None:
+        self._errors = errors
         self._first_after: dict[int | None, str] = {}
+
+    @pytest.hookimpl(wrapper=True)
+    def pytest_runtest_protocol(self, item: pytest.Item) -> Iterator[None]:
+        """End the process, with all stacks, where a test with its fixtures has not ended well after its timeout."""
+        if limit_s := timeout_s(item):
+            faulthandler.dump_traceback_later(limit_s + WATCHDOG_S, exit=True, file=self._errors)
+        try:
+            return (yield)
+        finally:
+            faulthandler.cancel_dump_traceback_later()
 
     def pytest_runtest_logfinish(self, nodeid: str) -> None:
         """Look which threads are there."""
@@ -48,4 +74,4 @@ class Ending:
 def pytest_configure(config: pytest.Config) -> None:
     """Begin. Where Ctrl-C is ignored, as in the background of a script, fixtures end what they started all the same."""
     signal.signal(signal.SIGTERM, signal.default_int_handler)
-    config.pluginmanager.register(Ending(), "alula-ending")
+    config.pluginmanager.register(Ending(os.dup(2)), "alula-ending")  # pytest keeps the usual one to itself
