@@ -31,27 +31,39 @@ class NoFreePortError(Exception):
     """Other programs hold all UDP ports that a run of a domain may take; the message names them."""
 
 
-def free_port() -> int:
-    """Return a TCP port on loopback that is free at this moment, and that no other process of Alula is given while this one lives.
+def free_port(count: int = 1) -> int:
+    """Return the first of ``count`` TCP ports in a row that are free on loopback now, and that no other process of Alula is given.
 
     Below the range that the system takes ports of outgoing connections from: any process could be given a port of that range
     between this look and the moment when our own process listens. The claim is the name of a socket; a process holds its latest
-    ``CLAIMED_PORTS``.
+    ``CLAIMED_PORTS``, as long as it lives.
     """
     while True:
-        port = secrets.choice(PORTS)
-        claim = socket.socket(socket.AF_UNIX, socket.SOCK_STREAM)
-        with socket.socket(socket.AF_INET, socket.SOCK_STREAM) as probe:
-            try:
-                claim.bind(f"\0alula/port/{port}")
-                probe.bind(("127.0.0.1", port))
-            except OSError:
+        first = secrets.choice(PORTS)
+        claims = [claim for claim in map(_claimed, range(first, first + count)) if claim is not None]
+        if len(claims) < count:
+            for claim in claims:
                 claim.close()
-                continue
-        _claims.append(claim)
-        if len(_claims) > CLAIMED_PORTS:
+            continue
+        _claims.extend(claims)
+        while len(_claims) > CLAIMED_PORTS:
             _claims.popleft().close()
-        return port
+        return first
+
+
+def _claimed(port: int) -> socket.socket | None:
+    """Return what holds a TCP port for this process, or None where another has it, or it is none of those that are given."""
+    if port not in PORTS:
+        return None
+    claim = socket.socket(socket.AF_UNIX, socket.SOCK_STREAM)
+    with socket.socket(socket.AF_INET, socket.SOCK_STREAM) as probe:
+        try:
+            claim.bind(f"\0alula/port/{port}")
+            probe.bind(("127.0.0.1", port))
+        except OSError:
+            claim.close()
+            return None
+    return claim
 
 
 def udp_port_is_free(port: int, address: str = "127.0.0.1") -> bool:

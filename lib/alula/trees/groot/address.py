@@ -10,6 +10,8 @@ from alula.trees.groot.protocol import DEFAULT_PORT
 
 LOOPBACK = "127.0.0.1"
 LAST_PORT = 65535
+PORTS_IN_A_ROW = 2
+"""Replies and what is published, as Groot2's protocol has it."""
 
 
 class ServerError(Exception):
@@ -35,10 +37,10 @@ class Address:
 
     def looked_up(self) -> Address:
         """Return it in numbers, with a port, both ports of which are free at this moment; raises ServerError."""
-        port = self.port or free_port()
+        port = self.port or free_port(PORTS_IN_A_ROW)
         try:
             host = socket.gethostbyname(self.host)
-            for one in (port, port + 1):
+            for one in range(port, port + PORTS_IN_A_ROW):
                 with socket.socket() as probe:
                     probe.setsockopt(socket.SOL_SOCKET, socket.SO_REUSEADDR, 1)  # as ZeroMQ does
                     probe.bind((host, one))

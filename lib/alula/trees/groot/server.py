@@ -18,7 +18,7 @@ from threading import Thread
 import zmq
 
 from alula.common.network import free_port
-from alula.trees.groot.address import Address, taken
+from alula.trees.groot.address import PORTS_IN_A_ROW, Address, taken
 from alula.trees.groot.protocol import REFUSAL, Header, ProtocolError, Request
 from alula.trees.groot.states import Shown
 from alula.trees.groot.values import pack_values
@@ -84,7 +84,7 @@ class Server:
         return socket
 
     def _bind(self, wanted: Address) -> Address:
-        address = Address(wanted.host, wanted.port or free_port())
+        address = Address(wanted.host, wanted.port or free_port(PORTS_IN_A_ROW))
         try:
             self._replies.bind(f"tcp://{address.host}:{address.port}")
             self._publisher.bind(f"tcp://{address.host}:{address.port + 1}")
