@@ -150,4 +150,5 @@ class Bridge:
         self._executor.shutdown(timeout_sec=SPIN_END_S)
         if self._spinner.is_alive():
             self._spinner.join(SPIN_END_S)
-        leave(self._node)
+        if not self._spinner.is_alive():
+            leave(self._node)
