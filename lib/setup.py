@@ -4,12 +4,13 @@ import sys
 
 from setuptools import find_packages, setup
 
-if sys.version_info < (3, 11):  # noqa: UP036 - as `requires-python` colcon could not read it: it wants literals only
-    sys.exit("error: alula needs Python 3.11 or newer")
+# Colcon looks at this file by a dry run, and then understands literals only, which a range of versions is not.
+requires = {} if "--dry-run" in sys.argv else {"python_requires": ">=3.10"}
 
 setup(
     name="alula",
-    version="0.2.0",
+    version="0.3.0",
+    **requires,
     packages=find_packages(include=["alula", "alula.*"]),
     package_dir={"": "."},  # so that an editable installation is a path, not an import hook
     package_data={

@@ -187,6 +187,8 @@ def test_version_is_the_change_logs() -> None:
     newest = re.search(r"^## (\S+)", (ALULA_ROOT / "CHANGELOG.md").read_text(encoding="utf-8"), re.MULTILINE)
     assert newest is not None
     assert alula("--version").stdout == f"alula {newest[1]}\n"
+    for place in ("lib/setup.py", "lib/package.xml", "CITATION.cff", "ros2_ws/src/skillset_ros2/package.xml"):
+        assert newest[1] in (ALULA_ROOT / place).read_text(encoding="utf-8"), place
 
 
 def test_doctor_finds_all_well() -> None:

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import argparse
-from datetime import UTC, datetime
+from datetime import datetime, timezone
 from pathlib import Path
 
 from alula.common.robots import find_robot, wrong_world
@@ -72,6 +72,6 @@ def run_folder(wanted: Path | None, scenario: str) -> Path:
         if folder.exists() and (not folder.is_dir() or any(folder.iterdir())):
             raise RequestError(f"--out {wanted}: exists and is not an empty folder; choose another, a run never overwrites")
         return folder
-    base = runs_folder().absolute() / f"{datetime.now(tz=UTC).astimezone():%Y%m%d-%H%M%S}-{scenario}"
+    base = runs_folder().absolute() / f"{datetime.now(tz=timezone.utc).astimezone():%Y%m%d-%H%M%S}-{scenario}"
     candidates = (base, *(base.with_name(f"{base.name}-{n}") for n in range(2, 1000)))
     return next(folder for folder in candidates if not folder.exists())

@@ -8,7 +8,7 @@ import subprocess
 import time
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
-from datetime import UTC, datetime
+from datetime import datetime, timezone
 from pathlib import Path
 
 from alula.common.faults import FaultError, parse_fault
@@ -134,7 +134,7 @@ def start(wanted: WantedRun) -> Path:
     Raises:
         ActError: it does not start; the message is its own.
     """
-    out = runs_folder() / f"{datetime.now(tz=UTC).astimezone():%Y%m%d-%H%M%S}-{wanted.scenario}"
+    out = runs_folder() / f"{datetime.now(tz=timezone.utc).astimezone():%Y%m%d-%H%M%S}-{wanted.scenario}"
     runs_folder().mkdir(parents=True, exist_ok=True)
     said = runs_folder() / f".{out.name}.log"
     with said.open("wb") as log:

@@ -6,7 +6,7 @@ import ipaddress
 import os
 import socket
 import ssl
-from datetime import UTC, datetime, timedelta
+from datetime import datetime, timedelta, timezone
 from pathlib import Path
 
 VALID = timedelta(days=825)
@@ -57,7 +57,7 @@ def _runs_out(path: Path) -> bool:
     from cryptography import x509
 
     try:
-        return x509.load_pem_x509_certificate(path.read_bytes()).not_valid_after_utc < datetime.now(tz=UTC) + timedelta(days=1)
+        return x509.load_pem_x509_certificate(path.read_bytes()).not_valid_after_utc < datetime.now(tz=timezone.utc) + timedelta(days=1)
     except ValueError:
         return True
 
@@ -72,7 +72,7 @@ def _made() -> bytes:
     key = ec.generate_private_key(ec.SECP256R1())
     name = x509.Name([x509.NameAttribute(NameOID.COMMON_NAME, f"Alula console on {socket.gethostname()}"[:64])])
     names = [x509.DNSName("localhost"), x509.DNSName(socket.gethostname()), x509.IPAddress(ipaddress.ip_address("127.0.0.1"))]
-    now = datetime.now(tz=UTC)
+    now = datetime.now(tz=timezone.utc)
     certificate = (
         x509.CertificateBuilder()
         .subject_name(name)

@@ -61,7 +61,7 @@ class SkillLanguageServer(LanguageServer):
     """Keeps what was read of each open document until it changes."""
 
     def __init__(self) -> None:
-        super().__init__("alula-skill-language", "0.2.0", text_document_sync_kind=lsp.TextDocumentSyncKind.Incremental)
+        super().__init__("alula-skill-language", "0.3.0", text_document_sync_kind=lsp.TextDocumentSyncKind.Incremental)
         self._files: dict[str, tuple[int | None, ModelFile]] = {}
         self.missions = Missions()
 

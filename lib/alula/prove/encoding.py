@@ -173,9 +173,9 @@ def _breaks(model: Encoded, breaker: Breaker) -> None:
 
 
 def _end_faults(model: Encoded, key: tuple[str, ...], running: Any, effect: Effect, applies: Any, post: Expression) -> None:
-    model.faults["effect", *key] = running & ~applies
+    model.faults[("effect", *key)] = running & ~applies
     after = model.bdd.let(model.changes(effect), model.term(post)) if effect.assignments else model.term(post)
-    model.faults["post", *key] = running & applies & ~after
+    model.faults[("post", *key)] = running & applies & ~after
 
 
 def _changed(effect: Effect) -> tuple[str, ...]:

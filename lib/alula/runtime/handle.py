@@ -5,11 +5,14 @@ from __future__ import annotations
 from collections import deque
 from collections.abc import Callable, Generator, Mapping
 from dataclasses import dataclass
-from typing import Any, Generic, Self, TypeVar, cast
+from typing import TYPE_CHECKING, Any, Generic, TypeVar, cast
 
 from alula.model.execution_state import ExecutionState
 from alula.runtime.core.errors import SkillRuntimeError
 from alula.runtime.waiting import Moment, Pending, Waitable, Waiter
+
+if TYPE_CHECKING:
+    from typing import Self  # of Python 3.11
 
 OutputsT = TypeVar("OutputsT", bound=Mapping[str, object])
 ResultT = TypeVar("ResultT", bound=str)

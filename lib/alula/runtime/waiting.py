@@ -5,9 +5,12 @@ from __future__ import annotations
 import asyncio
 import threading
 from collections.abc import Callable, Generator
-from typing import Generic, Protocol, Self, TypeVar
+from typing import TYPE_CHECKING, Generic, Protocol, TypeVar
 
 from alula.runtime.core.errors import SkillRuntimeError
+
+if TYPE_CHECKING:
+    from typing import Self  # of Python 3.11
 
 T = TypeVar("T")
 

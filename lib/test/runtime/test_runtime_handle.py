@@ -121,7 +121,7 @@ def test_an_await_that_is_cancelled_leaves_nothing_behind():
     one = handle()
 
     async def main() -> None:
-        with pytest.raises(TimeoutError):
+        with pytest.raises(asyncio.TimeoutError):
             await asyncio.wait_for(one, 0.01)
         assert one._after == []
         waiting = asyncio.ensure_future(asyncio.wait_for(one, SOON_S))

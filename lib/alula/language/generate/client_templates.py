@@ -61,13 +61,15 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from functools import partial
-from typing import TYPE_CHECKING, Self
+from typing import TYPE_CHECKING
 
 $imports
 
 from skillset_ros2.robot import CONNECT_S, RobotClient, connected
 
 if TYPE_CHECKING:
+    from typing import Self  # of Python 3.11
+
     from rclpy.node import Node
 
 SKILLSETS = ($names)

@@ -13,7 +13,7 @@ import math
 from collections.abc import Iterable, Mapping
 from dataclasses import dataclass, field
 from enum import Enum
-from typing import Self
+from typing import TYPE_CHECKING
 
 from alula.model.model import Skillset
 from alula.prove.mission.oracle import Asked, Oracle, UndecidedError
@@ -24,6 +24,9 @@ from alula.trees.reading import TreeFiles
 from alula.trees.script import ScriptError, parse
 from alula.trees.script.compiler import EPSILON
 from alula.trees.script.syntax import Assignment, Call, Chain, Comparison, Conditional, Literal, Name, Node, Prefix, children
+
+if TYPE_CHECKING:
+    from typing import Self  # of Python 3.11
 
 DATA, FRESH, NUMBER = "data", "fresh", "number"
 LOGIC = frozenset({"&&", "||"})

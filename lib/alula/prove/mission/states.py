@@ -10,7 +10,7 @@ from __future__ import annotations
 from collections import Counter
 from collections.abc import Iterable, Iterator, Mapping
 from dataclasses import dataclass, field
-from typing import Self
+from typing import TYPE_CHECKING
 
 from alula.missions.filed.world import states_of
 from alula.model.model import Skillset
@@ -20,6 +20,9 @@ from alula.prove.mission.unknown import Distance
 from alula.trees.reading import POSTCONDITIONS, PRECONDITIONS, TreeFiles, type_name
 from alula.trees.script import ScriptError, parse
 from alula.trees.script.syntax import Call, Comparison, Name, Node, children, walk
+
+if TYPE_CHECKING:
+    from typing import Self  # of Python 3.11
 
 STATE = "state"
 EQUAL = frozenset({"==", "!="})

@@ -9,10 +9,13 @@ from __future__ import annotations
 import math
 from collections.abc import Callable, Hashable
 from dataclasses import dataclass
-from typing import Self
+from typing import TYPE_CHECKING
 
 from alula.prove.mission.oracle import Oracle, UndecidedError
 from alula.trees.values import BOOL, NUMBERS, STRING, PortType
+
+if TYPE_CHECKING:
+    from typing import Self  # of Python 3.11
 
 LARGE = 2.0**53
 """Bounds of C's numbers are compared with, too; no unknown number is meant to be beyond."""
