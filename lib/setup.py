@@ -18,7 +18,7 @@ setup(
         "alula.console": ["page/*"],
         "alula.language": ["examples.yaml"],
         "alula.prove": ["examples.yaml"],
-        "alula.scaffold": ["robot/**/*.in"],
+        "alula.generate.scaffold": ["robot/**/*.in"],
     },
     data_files=[("share/ament_index/resource_index/packages", ["resource/alula"]), ("share/alula", ["package.xml"])],
 )

@@ -71,17 +71,17 @@ make_venv2() { make_environment 2 "$robot_python2"; }
 title_generated="skillsets: interfaces, managers, bridge configuration"
 key_generated() { # of the models and of what generates from them
   echo "$robot_name $robot_skillsets"
-  find "$robot_skillsets" "${robot_fleet[@]}" "$ALULA_ROOT"/lib/alula/{model,language} -type f \( -name '*.py' -o -name '*.skill' -o -name '*.rl' -o -name '*.yaml' \) \
+  find "$robot_skillsets" "${robot_fleet[@]}" "$ALULA_ROOT"/lib/alula/{model,language,generate} -type f \( -name '*.py' -o -name '*.skill' -o -name '*.rl' -o -name '*.yaml' \) \
     -not -path '*/test/*' -print0 2>/dev/null | LC_ALL=C sort -z | xargs -0 sha256sum | sha256sum | cut -c1-16
 }
 make_generated() {
   if [ ${#robot_fleet[@]} -gt 0 ]; then   # a fleet's missions call the skills of its robots, and need no more
-    clean "$ALULA_STATE/venv2/bin/python3" -m alula.language.generate "${robot_fleet[@]}" --interfaces --out "$state/generated" --prune
+    clean "$ALULA_STATE/venv2/bin/python3" -m alula.generate "${robot_fleet[@]}" --interfaces --out "$state/generated" --prune
     return
   fi
   [ -d "$robot_skillsets" ] || { mkdir -p "$state/generated"; return; }   # a robot without models so far
   # In place: what is as it was keeps its time stamps, so that a changed skillset rebuilds no other.
-  clean "$ALULA_STATE/venv2/bin/python3" -m alula.language.generate "$robot_skillsets" --name "$robot_name" --out "$state/generated" --prune
+  clean "$ALULA_STATE/venv2/bin/python3" -m alula.generate "$robot_skillsets" --name "$robot_name" --out "$state/generated" --prune
 }
 
 make_workspace() { # WORLD

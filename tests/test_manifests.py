@@ -22,7 +22,7 @@ def tracked(*patterns: str) -> list[Path]:
 
 @pytest.mark.skipif(not (ALULA_ROOT / ".git").exists(), reason="which files are Alula's, a checkout knows")
 def test_no_manifest_has_an_address_that_may_be_a_strangers() -> None:
-    manifests = tracked("*package.xml", "*package.xml.in", "*pyproject.toml", "*setup.py", "lib/alula/language/generate/*.py")
+    manifests = tracked("*package.xml", "*package.xml.in", "*pyproject.toml", "*setup.py", "lib/alula/generate/*.py")
     found = {(path.name, domain) for path in manifests for domain in ADDRESS.findall(path.read_text(encoding="utf-8"))}
     assert found, "ROS requires an address in every package.xml"
     assert not {(name, domain) for name, domain in found if not EXAMPLE.fullmatch(domain)}

@@ -16,7 +16,7 @@ COMMANDS = {
     "odds": ("alula.commands.odds", "tell how likely a mission is accomplished, degraded, given up, or neither: alula odds FILE"),
     "tree": ("alula.commands.tree", "draw a mission, or tick it without any robot: alula tree FILE [--svg FILE] [--answers FILE]"),
     "palette": ("alula.commands.palette", "write a robot's skills as a palette for Groot2: alula palette FOLDER"),
-    "new": ("alula.scaffold.__main__", "make a robot: alula new robot FOLDER"),
+    "new": ("alula.generate.scaffold.__main__", "make a robot: alula new robot FOLDER"),
     "run": ("alula.commands.run", "run a scenario over mocks, in virtual time: alula run SCENARIO --mock [--fail WHAT@SECONDS]"),
     "replay": ("alula.commands.replay", "make a recorded mission's decisions again, with one thing changed"),
     "expect": ("alula.commands.expect", "write a run's expectations, or check a run against them"),
@@ -25,7 +25,7 @@ COMMANDS = {
     "campaign": ("alula.campaign.__main__", "run scenarios many times with faults, and report the responses to failures"),
     "console": ("alula.console.__main__", "serve the page of runs"),
     "editor": ("alula.editor.__main__", "serve editors over the standard streams (language server)"),
-    "generate": ("alula.language.generate.__main__", "generate interfaces, managers and bridge configuration from a robot's models"),
+    "generate": ("alula.generate.__main__", "generate interfaces, managers and bridge configuration from a robot's models"),
 }
 ROBOT = "--robot"
 

@@ -5,7 +5,7 @@ from __future__ import annotations
 import pytest
 from language_rover import BINDINGS, SKILL, TYPES
 
-from alula.language.generate import robot_files
+from alula.generate import robot_files
 from alula.language.load import load_robot
 
 

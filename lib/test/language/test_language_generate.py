@@ -6,7 +6,7 @@ import ast
 
 import yaml
 
-from alula.language.generate import robot_files
+from alula.generate import robot_files
 from alula.language.load import load_robot
 
 

@@ -12,8 +12,8 @@ import types
 
 import pytest
 
-from alula.language.generate import robot_files
-from alula.language.generate.writer import write_files
+from alula.generate import robot_files
+from alula.generate.writer import write_files
 from alula.language.load import load_robot
 
 

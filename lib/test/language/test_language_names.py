@@ -10,10 +10,10 @@ import types
 
 import pytest
 
+from alula.generate import robot_files
+from alula.generate.client_code import attribute_names
 from alula.language import reserved_names
 from alula.language.errors import LanguageError
-from alula.language.generate import robot_files
-from alula.language.generate.client_code import attribute_names
 from alula.language.load import load_robot
 from alula.model.ros_types import camel
 from alula.runtime import views

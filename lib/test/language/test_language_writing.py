@@ -8,9 +8,9 @@ from pathlib import Path
 import pytest
 from language_rover import SKILL
 
-from alula.language.generate import robot_files
-from alula.language.generate.__main__ import main
-from alula.language.generate.writer import write_files
+from alula.generate import robot_files
+from alula.generate.__main__ import main
+from alula.generate.writer import write_files
 from alula.language.load import load_robot
 
 

@@ -4,9 +4,9 @@ from __future__ import annotations
 
 from collections.abc import Iterable, Iterator
 
-from alula.language.generate.client_templates import CLIENT, SKILL
-from alula.language.generate.python_code import WIDTH, annotation, keyword_only, message_imports, tidy, wrapped
-from alula.language.generate.text import comment, fill, header, lines, packages
+from alula.generate.client_templates import CLIENT, SKILL
+from alula.generate.python_code import WIDTH, annotation, keyword_only, message_imports, tidy, wrapped
+from alula.generate.text import comment, fill, header, lines, packages
 from alula.language.reserved_names import CLIENT as CLIENT_ATTRIBUTES
 from alula.language.reserved_names import Attributes
 from alula.language.robot import Robot

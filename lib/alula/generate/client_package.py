@@ -4,10 +4,10 @@ from __future__ import annotations
 
 import re
 
-from alula.language.generate.client_templates import INIT, ROBOT
-from alula.language.generate.python_code import tidy
-from alula.language.generate.python_package import package_files
-from alula.language.generate.text import fill, lines
+from alula.generate.client_templates import INIT, ROBOT
+from alula.generate.python_code import tidy
+from alula.generate.python_package import package_files
+from alula.generate.text import fill, lines
 from alula.language.reserved_names import ROBOT as ROBOT_ATTRIBUTES
 from alula.language.reserved_names import Attributes
 from alula.language.robot import Robot

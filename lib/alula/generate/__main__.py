@@ -1,4 +1,4 @@
-"""`python -m alula.language.generate ROBOT_FOLDER... --out DIR`: make ROS 2 packages and bridge configurations.
+"""`python -m alula.generate ROBOT_FOLDER... --out DIR`: make ROS 2 packages and bridge configurations.
 
 Ends with 0 when all was written, 2 when a model, a side file or the output folder is not as it should be; then nothing
 was changed.
@@ -12,10 +12,10 @@ from collections.abc import Sequence
 from dataclasses import replace
 from pathlib import Path
 
+from alula.generate.interfaces import interface_package
+from alula.generate.robot_files import robot_files
+from alula.generate.writer import prune, write_files
 from alula.language.errors import Diagnostic, LanguageError
-from alula.language.generate.interfaces import interface_package
-from alula.language.generate.robot_files import robot_files
-from alula.language.generate.writer import prune, write_files
 from alula.language.load import load_robot
 from alula.model.span import Span
 

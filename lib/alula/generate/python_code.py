@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Iterable, Sequence
 
-from alula.language.generate.text import lines, packages
+from alula.generate.text import lines, packages
 from alula.language.robot import Robot
 from alula.model.model import Parameter
 

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 
-from alula.language.generate.text import MAINTAINER, fill, lines
+from alula.generate.text import MAINTAINER, fill, lines
 
 PACKAGE_XML = """\
 <?xml version="1.0"?>

@@ -2,10 +2,10 @@
 
 from __future__ import annotations
 
-from alula.language.generate.bridge import bridge_configuration
-from alula.language.generate.client_package import client_package
-from alula.language.generate.interfaces import interface_package
-from alula.language.generate.manager_package import manager_package
+from alula.generate.bridge import bridge_configuration
+from alula.generate.client_package import client_package
+from alula.generate.interfaces import interface_package
+from alula.generate.manager_package import manager_package
 from alula.language.robot import Robot
 
 Files = dict[str, str]

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from alula.language.generate.text import fill, header
+from alula.generate.text import fill, header
 from alula.language.robot import Robot
 from alula.model.model import Skillset
 

@@ -4,11 +4,11 @@ from __future__ import annotations
 
 import json
 
-from alula.language.generate.client_code import client_module
-from alula.language.generate.manager_code import hooks_module, inputs_module
-from alula.language.generate.mock_module import mock_module
-from alula.language.generate.python_package import package_files
-from alula.language.generate.text import fill, header, lines, packages
+from alula.generate.client_code import client_module
+from alula.generate.manager_code import hooks_module, inputs_module
+from alula.generate.mock_module import mock_module
+from alula.generate.python_package import package_files
+from alula.generate.text import fill, header, lines, packages
 from alula.language.robot import Robot
 from alula.model.json_form import to_json
 from alula.model.model import Skillset

@@ -2,9 +2,9 @@
 
 from __future__ import annotations
 
-from alula.language.generate.manager_templates import HOOKS, HOOKS_CLASS, INPUTS, INPUTS_CLASS, TERMINATED
-from alula.language.generate.python_code import annotation, keyword_only, message_imports, tidy, wrapped
-from alula.language.generate.text import comment, fill, header, lines
+from alula.generate.manager_templates import HOOKS, HOOKS_CLASS, INPUTS, INPUTS_CLASS, TERMINATED
+from alula.generate.python_code import annotation, keyword_only, message_imports, tidy, wrapped
+from alula.generate.text import comment, fill, header, lines
 from alula.language.robot import Robot
 from alula.model.model import Result, Skill, Skillset
 from alula.model.ros_types import camel

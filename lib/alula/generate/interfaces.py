@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Iterable
 
-from alula.language.generate.text import MAINTAINER, comment, fill, header, lines, packages
+from alula.generate.text import MAINTAINER, comment, fill, header, lines, packages
 from alula.language.robot import Robot
 from alula.model.model import Parameter, Skill, Skillset
 from alula.model.ros_types import camel

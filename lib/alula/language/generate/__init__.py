@@ -1,5 +1,0 @@
-"""Makes ROS 2 packages and the bridge's configuration from a robot's models; ``python -m alula.language.generate``."""
-
-from alula.language.generate.robot_files import robot_files
-
-__all__ = ["robot_files"]
