@@ -21,8 +21,8 @@ from alula.common.scenarios import load_scenario
 from alula.missions.director import Outcome
 from alula.missions.mocked import MockedMission
 from alula.missions.plan import plan_of
+from alula.mock import MockSkill, load_behaviour
 from alula.records.models import robot_skillsets
-from alula.runtime.mock import MockSkill, load_behaviour
 from alula_flight.replay import main
 from uav_missions.route import inputs_of
 

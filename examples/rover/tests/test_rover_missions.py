@@ -12,7 +12,7 @@ from alula.language.load import load_robot
 from alula.missions.director import Outcome
 from alula.missions.mocked import MockedMission
 from alula.missions.plan import inputs_of, plan_of
-from alula.runtime.mock import load_behaviour
+from alula.mock import load_behaviour
 
 ROOT = Path(__file__).resolve().parents[1]
 SKILLSETS = load_robot(ROOT / "skillsets").skillsets

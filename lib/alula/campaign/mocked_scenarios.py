@@ -14,6 +14,7 @@ from alula.common.scenarios import Scenario, ScenarioError, load_scenario
 from alula.missions.director import End
 from alula.missions.mocked import MockedMission
 from alula.missions.plan import InputError, Inputs, MissionPlan, inputs_of, plan_of
+from alula.mock import Behaviour
 from alula.model.model import Skillset
 from alula.records.errors import AnalysisError
 from alula.records.mocks import behaviour_of
@@ -21,7 +22,6 @@ from alula.records.models import robot_skillsets
 from alula.records.tree import Places, tip_of
 from alula.runtime.core.errors import SkillRuntimeError
 from alula.runtime.core.events import EngineEvent
-from alula.runtime.mock import Behaviour
 from alula.trees.node import Node
 
 

@@ -16,6 +16,7 @@ from alula.common.files import write_text
 from alula.common.robots import FAULTS, RobotError, RobotFolder, find_robot
 from alula.common.scenarios import ScenarioError, load_scenario, scenario_names
 from alula.missions.plan import InputError, Inputs, inputs_of
+from alula.mock import load_behaviour
 from alula.model.model import Skillset
 from alula.odds.errors import OddsError
 from alula.odds.figures import Figures
@@ -31,7 +32,6 @@ from alula.records.causes.effects import FaultEffects
 from alula.records.causes.fault_file import load_effects
 from alula.records.errors import AnalysisError
 from alula.runtime.core.errors import SkillRuntimeError
-from alula.runtime.mock import load_behaviour
 from alula.trees.errors import TreeError
 
 COMMAND = "alula odds"

@@ -17,13 +17,13 @@ from __future__ import annotations
 import sys
 from typing import TYPE_CHECKING
 
-from alula.runtime.mock import mock_world
+from alula.mock import mock_world
 
 from ${skillset}_managers.model import DATA_TOPICS, SKILLSET
 
 if TYPE_CHECKING:
     from alula.runtime.local import LocalWorld
-    from alula.runtime.mock import Behaviour, Play
+    from alula.mock import Behaviour, Play
 
 
 def in_process(behaviour: Behaviour | None = None, *, seed: int = 0) -> tuple[LocalWorld, Play]:

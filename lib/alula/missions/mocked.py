@@ -13,11 +13,11 @@ from alula.missions.driver import TICK_PERIOD_S, Job, MissionDriver
 from alula.missions.plan import MissionPlan
 from alula.missions.record import MissionRecord
 from alula.missions.skillset import MissionClient, Recorder
+from alula.mock import Behaviour, MockRobot, mock_world
 from alula.model.execution_state import ExecutionState
 from alula.model.model import Skillset
 from alula.runtime.core.events import EngineEvent, ExecutionEvent
 from alula.runtime.local import LocalWorld
-from alula.runtime.mock import Behaviour, MockRobot, mock_world
 
 LATENCY_S = 0.005
 LIMIT_S = 3600.0

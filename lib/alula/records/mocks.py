@@ -8,8 +8,8 @@ from functools import partial
 from pathlib import Path
 
 from alula.common.robots import RobotFolder, fleet_name
+from alula.mock import Behaviour, load_behaviour
 from alula.records.models import robot_model
-from alula.runtime.mock import Behaviour, load_behaviour
 
 
 def behaviour_of(robot: RobotFolder, files: Sequence[Path] = ()) -> Behaviour:

@@ -11,8 +11,8 @@ from alula.common.robots import RobotError, load_robot_folder
 from alula.generate.__main__ import main as generate
 from alula.language.errors import LanguageError
 from alula.language.fleet import load_models
+from alula.mock import mock_world
 from alula.records.mocks import behaviour_of
-from alula.runtime.mock import mock_world
 
 MODEL = """\
 type Width

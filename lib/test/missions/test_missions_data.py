@@ -17,8 +17,8 @@ from alula.missions.director import End, Outcome
 from alula.missions.filed.part import NO_PART
 from alula.missions.filed.plan import plan_of_file
 from alula.missions.mocked import MockedMission
+from alula.mock import load_behaviour
 from alula.model.ros_types import RosType
-from alula.runtime.mock import load_behaviour
 from alula.trees.script import parse
 from alula.trees.script.scope import Unknown
 from alula_testing.battery import BATTERY, make_robot

@@ -15,7 +15,7 @@ from alula.missions.director import Outcome
 from alula.missions.filed.part import NO_PART
 from alula.missions.filed.plan import plan_of_file
 from alula.missions.mocked import MockedMission
-from alula.runtime.mock import load_behaviour
+from alula.mock import load_behaviour
 
 MODEL = """
 skillset rover { resource wheels { state { FREE USED } initial FREE transition { FREE -> USED USED -> FREE } }

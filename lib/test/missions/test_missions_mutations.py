@@ -18,13 +18,13 @@ from alula.missions.director import Outcome
 from alula.missions.filed.part import NO_PART, MissionPart
 from alula.missions.filed.plan import plan_of_file
 from alula.missions.mocked import MockedMission
+from alula.mock import Behaviour
 from alula.model.model import Skillset
 from alula.prove.mission.page import ROBOT
 from alula.prove.mission.prover import LOOKED_AT
 from alula.prove.mission.state import State
 from alula.prove.mission.system import System
 from alula.runtime.core.events import ExecutionEvent
-from alula.runtime.mock import Behaviour
 from alula.trees.node import SyncAction
 from alula.trees.palette import output_port
 from alula.trees.status import Answer

@@ -10,11 +10,11 @@ from hypothesis import strategies as st
 
 from alula.campaign.failures import RESULT, ways_to_fail
 from alula.language.paper import parse
+from alula.mock.behaviour import default_script
 from alula.model.execution_state import ExecutionState as S
 from alula.model.model import Result, ResultKind, Skill, Skillset
 from alula.records.causes.failures import skill_failures
 from alula.runtime.core.events import ExecutionEvent, event_record, read_event
-from alula.runtime.mock.behaviour import default_script
 
 PLAIN, SUCCESS, FAILURE = ResultKind.PLAIN, ResultKind.SUCCESS, ResultKind.FAILURE
 NAMES = ["UNLOCKED", "BLOCKING", "UNBLOCKED", "FAILSAFE_OFF", "ABORTED", "ARRIVED", "CLEAR_OF_IT"]

@@ -16,12 +16,12 @@ from alula.common.faults import FaultRequest
 from alula.missions.director import Outcome
 from alula.missions.mocked import MockedMission
 from alula.missions.plan import MissionPlan
+from alula.mock import Behaviour, Ending, Rule
+from alula.mock.behaviour import MockChange, MockFault, Place
+from alula.mock.formula import Formula
 from alula.model.model import ResultKind, Skillset
 from alula.odds.figures import NEVER, Figures, Range, point
 from alula.records.causes.effects import FaultEffects
-from alula.runtime.mock import Behaviour, Ending, Rule
-from alula.runtime.mock.behaviour import MockChange, MockFault, Place
-from alula.runtime.mock.formula import Formula
 
 BEGINS_S = 2.1
 """When the mission has begun, seconds of mission clock: the odds are of one that begins."""

@@ -18,12 +18,12 @@ from alula.missions.director import Outcome
 from alula.missions.filed.part import NO_PART
 from alula.missions.filed.plan import plan_of_file
 from alula.missions.mocked import MockedMission
+from alula.mock import Behaviour, Ending, Rule
 from alula.odds.figures import Figures
 from alula.odds.graph import explore
 from alula.odds.odds import Odds, odds_of
 from alula.odds.reading import load_figures
 from alula.records.causes.fault_file import effects_of_robot
-from alula.runtime.mock import Behaviour, Ending, Rule
 
 CARRIER = Path(__file__).parent / "carrier"
 FLIGHTS = 1000

@@ -9,11 +9,11 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from alula.common.faults import FaultRequest
+from alula.mock import Behaviour, BehaviourError, Ending, Formula, FormulaError, MockChange, Rule, load_behaviour, mock_world
 from alula.model.execution_state import ExecutionState
 from alula.model.model import Data, Parameter, Result, ResultKind
 from alula.runtime.core.errors import SkillRuntimeError
 from alula.runtime.core.events import event_record
-from alula.runtime.mock import Behaviour, BehaviourError, Ending, Formula, FormulaError, MockChange, Rule, load_behaviour, mock_world
 from alula_testing.runtime_models import flying_skill, flying_skillset
 
 S = ExecutionState

@@ -6,10 +6,10 @@ from collections.abc import Iterable, Mapping
 from dataclasses import dataclass, field
 from fnmatch import fnmatchcase
 
+from alula.mock import Behaviour
+from alula.mock.behaviour import Place
 from alula.records.causes.alarms import Alarms
 from alula.runtime.core.events import ExecutionEvent, TransitionEvent
-from alula.runtime.mock import Behaviour
-from alula.runtime.mock.behaviour import Place
 
 EXTERN = "extern"
 """The cause of a change that the functional layer reported."""

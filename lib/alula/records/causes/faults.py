@@ -7,10 +7,10 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
 
 from alula.common.faults import MENDED, FaultChange, FaultRequest, spans_of
+from alula.mock import Behaviour
 from alula.records.causes.effects import EffectsByFault, FaultEffects
 from alula.records.causes.failures import SkillFailure, skill_failures
 from alula.runtime.core.events import EngineEvent, TransitionEvent
-from alula.runtime.mock import Behaviour
 
 EARLY_S = 0.05
 """The managers' clock ticks at 50 Hz: an event's stamp may be some ticks older than what caused it."""

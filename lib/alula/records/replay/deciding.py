@@ -13,12 +13,12 @@ from pathlib import Path
 from alula.common.record import Entry
 from alula.missions.plan import MissionPlan
 from alula.missions.record import MissionRecord
+from alula.mock import Behaviour
 from alula.model.model import Skillset
 from alula.records.replay.recorded import Recorded, ReplayError
 from alula.records.replay.replay import Replay, Result
 from alula.records.replay.request import behaviour_for, faults_for, parameters_for, plan_for, skillsets_for
 from alula.records.replay.robot import RecordedSkills, ReplayedRobot
-from alula.runtime.mock import Behaviour
 
 BAG = "functional.bag"
 

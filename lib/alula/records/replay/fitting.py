@@ -6,10 +6,10 @@ from collections import defaultdict
 from collections.abc import Mapping
 from typing import Any
 
+from alula.mock import Behaviour, Ending, Rule
 from alula.model.execution_state import ExecutionState
 from alula.records.replay.comparison import alike
 from alula.records.replay.recorded import Recorded, RecordedEnd
-from alula.runtime.mock import Behaviour, Ending, Rule
 
 
 def fitted(recorded: Recorded) -> Behaviour:

@@ -15,6 +15,7 @@ from alula.language.errors import LanguageError
 from alula.language.load import load_skillset
 from alula.missions.filed.scenario import plan_of_mission_file
 from alula.missions.plan import InputError, Inputs, MissionPlan, plan_of
+from alula.mock import Behaviour
 from alula.model.model import Skillset
 from alula.records.errors import AnalysisError
 from alula.records.mocks import behaviour_of
@@ -22,7 +23,6 @@ from alula.records.models import robot_skillsets
 from alula.records.replay.fitting import fitted
 from alula.records.replay.recorded import Recorded, ReplayError
 from alula.runtime.core.errors import SkillRuntimeError
-from alula.runtime.mock import Behaviour
 
 
 def inputs_of_record(recorded: Recorded) -> Inputs:

@@ -9,6 +9,7 @@ from dataclasses import replace
 
 from alula.common.faults import FaultRequest
 from alula.common.record import DATA, EVENTS, REPORTS, Entry
+from alula.mock import NEVER, Behaviour, Choice, Ending, LocalMockHost, MockRobot, MockSkill, MockState, Rule, serve_robot
 from alula.model.execution_state import ExecutionState
 from alula.model.model import Skill, Skillset
 from alula.records.replay.recorded import EXTERN, Recorded, RecordedDecision, RecordedEnd, event_of
@@ -16,7 +17,6 @@ from alula.runtime.core.events import EngineEvent, TransitionEvent
 from alula.runtime.core.execution import Execution
 from alula.runtime.handle import SkillHandle
 from alula.runtime.local import LocalWorld
-from alula.runtime.mock import NEVER, Behaviour, Choice, Ending, LocalMockHost, MockRobot, MockSkill, MockState, Rule, serve_robot
 
 
 class ReplayedSkill(MockSkill):

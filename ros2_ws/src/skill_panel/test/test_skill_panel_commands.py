@@ -13,7 +13,7 @@ import perception_managers.model as perception
 import pytest
 
 from alula.common.record import EVENTS, FILE, RecordWriter
-from alula.runtime.mock import load_behaviour, mock_world
+from alula.mock import load_behaviour, mock_world
 from skill_panel import commands
 from skill_panel.commands import COMMANDS, CommandError, main, parse
 

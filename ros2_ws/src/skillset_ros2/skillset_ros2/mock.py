@@ -29,10 +29,10 @@ from alula.common.signals import StopEvent
 from alula.language.errors import LanguageError
 from alula.language.load import load_robot
 from alula.language.robot import Robot
+from alula.mock import Behaviour, MockRobot, load_behaviour, starter
 from alula.model.model import Skillset
 from alula.runtime.core.errors import SkillRuntimeError
 from alula.runtime.managers import DataBindings
-from alula.runtime.mock import Behaviour, MockRobot, load_behaviour, starter
 from skillset_ros2.executor import NodeExecutor
 from skillset_ros2.mock_host import RosMockHost
 from skillset_ros2.node import SkillsetNode

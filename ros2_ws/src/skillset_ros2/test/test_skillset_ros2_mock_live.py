@@ -249,7 +249,7 @@ def test_the_starter_is_a_behaviour_file(tmp_path):
         [sys.executable, "-m", "skillset_ros2.mock", UAV, "--starter"], capture_output=True, text=True, timeout=60, check=True
     )
     from alula.language.load import load_robot
-    from alula.runtime.mock import load_behaviour
+    from alula.mock import load_behaviour
 
     (tmp_path / "mock.yaml").write_text(done.stdout)
     skillsets = load_robot(UAV).skillsets

@@ -20,9 +20,9 @@ from alula.common.scenarios import load_scenario
 from alula.missions.director import Outcome
 from alula.missions.mocked import MockedMission
 from alula.missions.plan import plan_of
+from alula.mock import load_behaviour
 from alula.records.models import robot_skillsets
 from alula.runtime.core import ExecutionEvent
-from alula.runtime.mock import load_behaviour
 from uav_missions.route import inputs_of, route_of
 
 ALULA_ROOT = Path(__file__).resolve().parents[4]

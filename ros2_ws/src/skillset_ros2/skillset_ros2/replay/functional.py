@@ -17,6 +17,7 @@ from typing import Any
 
 from alula.common.record import Entry
 from alula.common.robots import FILE, find_robot
+from alula.mock import NEVER, Behaviour, Choice, MockSkill, follow
 from alula.model.execution_state import ExecutionState
 from alula.model.model import Skillset
 from alula.records.replay.comparison import alike
@@ -27,7 +28,6 @@ from alula.runtime.core.events import EngineEvent, ExecutionEvent
 from alula.runtime.core.execution import Execution
 from alula.runtime.hooks import SkillHooks
 from alula.runtime.local import LocalManagers
-from alula.runtime.mock import NEVER, Behaviour, Choice, MockSkill, follow
 from alula.runtime.plain import to_plain
 from skillset_ros2.convert import fill, values_of
 from skillset_ros2.replay.actions import RecordedActionClient

@@ -4,8 +4,8 @@ from __future__ import annotations
 
 from collections.abc import Iterable, Sequence
 
+from alula.mock.behaviour import DEFAULT_DELAY_S, default_script
 from alula.model.model import Resource, Skill, Skillset
-from alula.runtime.mock.behaviour import DEFAULT_DELAY_S, default_script
 
 
 def starter(skillsets: Sequence[Skillset]) -> str:

@@ -7,12 +7,12 @@ import random
 from collections.abc import Callable, Mapping, Sequence
 
 from alula.common.faults import FaultRequest
+from alula.mock.behaviour import Behaviour, DataScript, MockFault, Place, Rule
+from alula.mock.formula import Formula, FormulaError
+from alula.mock.host import MockHost
+from alula.mock.skill import MockSkill
+from alula.mock.state import MockState
 from alula.model.model import Skill, Skillset
-from alula.runtime.mock.behaviour import Behaviour, DataScript, MockFault, Place, Rule
-from alula.runtime.mock.formula import Formula, FormulaError
-from alula.runtime.mock.host import MockHost
-from alula.runtime.mock.skill import MockSkill
-from alula.runtime.mock.state import MockState
 from alula.runtime.timers import Job
 
 MakeSkill = Callable[[MockState, str, Skill, Sequence[Rule], random.Random], MockSkill]

@@ -9,10 +9,10 @@ from pathlib import Path
 from typing import TypeVar
 
 from alula.common.located_yaml import Located, choices, read_yaml
+from alula.mock.behaviour import NEVER, Behaviour, DataScript, Ending, MockChange, MockFault, Place, Rule, TimelineEvent, Value
+from alula.mock.errors import BehaviourError
+from alula.mock.formula import Formula, FormulaError
 from alula.model.model import Skill, Skillset
-from alula.runtime.mock.behaviour import NEVER, Behaviour, DataScript, Ending, MockChange, MockFault, Place, Rule, TimelineEvent, Value
-from alula.runtime.mock.errors import BehaviourError
-from alula.runtime.mock.formula import Formula, FormulaError
 
 SECTIONS = ("memory", "skills", "timeline", "faults", "data")
 CONDITIONS = ("call", "when", "chance")

@@ -6,9 +6,9 @@ import random
 import threading
 from collections.abc import Callable, Mapping
 
-from alula.runtime.mock.behaviour import Place, Value
-from alula.runtime.mock.formula import Formula, FormulaError
-from alula.runtime.mock.host import MockHost
+from alula.mock.behaviour import Place, Value
+from alula.mock.formula import Formula, FormulaError
+from alula.mock.host import MockHost
 
 
 class MockState:

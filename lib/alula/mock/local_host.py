@@ -6,12 +6,12 @@ import functools
 from collections.abc import Iterable, Mapping, Sequence
 from types import SimpleNamespace
 
+from alula.mock.behaviour import Behaviour
+from alula.mock.robot import MakeSkill, MockRobot
+from alula.mock.skill import MockSkill
 from alula.model.model import Skillset
 from alula.runtime.core.events import EngineEvent, TransitionEvent
 from alula.runtime.local import LocalWorld
-from alula.runtime.mock.behaviour import Behaviour
-from alula.runtime.mock.robot import MakeSkill, MockRobot
-from alula.runtime.mock.skill import MockSkill
 from alula.runtime.timers import Job, Timer
 
 

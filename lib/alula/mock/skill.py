@@ -10,11 +10,11 @@ from itertools import pairwise
 from types import SimpleNamespace
 from typing import TYPE_CHECKING
 
+from alula.mock.behaviour import Rule, Script, cascade, default_script
+from alula.mock.formula import FormulaError, coordinates
+from alula.mock.state import MockState
 from alula.model.model import Skill
 from alula.runtime.hooks import SkillHooks
-from alula.runtime.mock.behaviour import Rule, Script, cascade, default_script
-from alula.runtime.mock.formula import FormulaError, coordinates
-from alula.runtime.mock.state import MockState
 
 if TYPE_CHECKING:
     from alula.runtime.core.execution import Execution

@@ -11,9 +11,9 @@ from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 
 from alula.common.faults import FaultRequest
+from alula.mock.formula import Formula
 from alula.model.model import ResultKind, Skill
 from alula.runtime.core.errors import SkillRuntimeError
-from alula.runtime.mock.formula import Formula
 
 Value = Formula | float | str | bool | Callable[..., object]
 """A constant, a formula, or (in tests) a function of the names, ``f(names) -> value``."""
