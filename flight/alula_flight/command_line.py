@@ -16,9 +16,9 @@ from alula.common.network import DOMAINS, NAMESPACE, DomainClaim, free_port
 from alula.common.robots import find_robot, fleet_name
 from alula.common.scenarios import Scenario, ScenarioError, load_scenario
 from alula.common.suggestions import nearest
-from alula.live import options
-from alula.live.part import RunPart
-from alula.live.spec import RequestError, RunSpec
+from alula.runtime.live import options
+from alula.runtime.live.part import RunPart
+from alula.runtime.live.spec import RequestError, RunSpec
 from alula_flight.launch import launch_file
 
 

@@ -5,8 +5,8 @@ from __future__ import annotations
 from alula.common.faults import parse_fault
 from alula.common.robots import find_robot
 from alula.common.scenarios import Scenario, load_scenario
-from alula.live.part import RunPart
-from alula.live.spec import RequestError, RunSpec
+from alula.runtime.live.part import RunPart
+from alula.runtime.live.spec import RequestError, RunSpec
 
 
 def launch_file(scenario: Scenario) -> str:

@@ -13,9 +13,9 @@ from pathlib import Path
 
 from alula.common.processes import die_with_parent, end_run
 from alula.common.robots import find_robot
-from alula.live.options import entry
-from alula.live.spec import FILE, RunSpec
 from alula.report.deaths import Death, describe_exit, note_death
+from alula.runtime.live.options import entry
+from alula.runtime.live.spec import FILE, RunSpec
 
 LOOK_S = 0.1
 END_TIMEOUT_S = 300.0  # wall clock, for the robots to come to rest, and for their reports

@@ -5,9 +5,9 @@ from __future__ import annotations
 import sys
 from pathlib import Path
 
-from alula.live.spec import RunSpec
 from alula.records.conformance import Monitor
 from alula.report.deaths import read_deaths
+from alula.runtime.live.spec import RunSpec
 
 GIVEN_UP, CANNOT_START = 1, 2
 """Exit codes of a run that did not reach its goal, and of one that could not begin, as the mission's own; 0: accomplished."""

@@ -12,7 +12,7 @@ from typing import Any, Protocol
 from alula.common.faults import MENDED, FaultChange, FaultRequest, parse_fault
 from alula.common.run_log import FAULT, note
 from alula.common.scenarios import load_scenario
-from alula.live.spec import RunSpec
+from alula.runtime.live.spec import RunSpec
 
 KILLED, HUNG = "killed", "hung"
 WAYS = (KILLED, HUNG)

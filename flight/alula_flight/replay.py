@@ -18,10 +18,10 @@ from alula.commands.replay import Arguments, Below, Depth
 from alula.common.robots import RobotError, find_robot
 from alula.common.scenarios import ScenarioError, load_scenario
 from alula.language.load import load_robot
-from alula.live.spec import FILE as RUN
-from alula.live.spec import RunSpec
 from alula.records.replay.deciding import BAG, bag_of
 from alula.records.replay.recorded import Recorded, ReplayError
+from alula.runtime.live.spec import FILE as RUN
+from alula.runtime.live.spec import RunSpec
 from skillset_ros2.replay import from_bag
 from skillset_ros2.replay.bag import read_calls
 

@@ -25,13 +25,13 @@ from alula.common.robots import RobotError
 from alula.common.scenarios import ScenarioError, load_scenario
 from alula.common.shared_memory import sweep_shared_memory
 from alula.common.signals import Interrupts
-from alula.live.part import part_of_robot
-from alula.live.spec import FILE, RequestError, RunSpec
 from alula.records.conformance import Monitor
 from alula.records.models import models_of
 from alula.report.deaths import Death, describe_exit, note_death
 from alula.report.ends import FRONT, ReportedEnd, ended_by_signal, note_end
 from alula.report.live import LiveEvents
+from alula.runtime.live.part import part_of_robot
+from alula.runtime.live.spec import FILE, RequestError, RunSpec
 from alula_flight.command_line import parse, with_claim
 from alula_flight.console_page import console_page
 from alula_flight.members import members_of, reports_of

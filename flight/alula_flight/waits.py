@@ -6,8 +6,8 @@ import time
 from pathlib import Path
 
 from alula.common.run_log import note_wait
-from alula.live.part import RunPart
-from alula.live.spec import RunSpec
+from alula.runtime.live.part import RunPart
+from alula.runtime.live.spec import RunSpec
 from alula_flight.mission_clock import MissionClock
 
 TELL_CLOCK_S, LOOK_S = 5.0, 1.0  # wall clock until it is told that time has not begun, and how often it is looked

@@ -18,14 +18,14 @@ from alula.common.processes import RUN_ID_VARIABLE, end_run, ends_within, proces
 from alula.common.record import EVENTS, RecordWriter
 from alula.common.record import FILE as RECORD
 from alula.common.run_log import FILE
-from alula.live.options import RunOption, words_of
-from alula.live.part import RunPart
-from alula.live.spec import RequestError, RunSpec
 from alula.model.execution_state import ExecutionState
 from alula.report.deaths import Death, describe_exit, note_again, note_death, read_deaths
 from alula.report.live import LiveEvents, event_line
 from alula.report.verdict import conformance_lines
 from alula.runtime.core.events import ExecutionEvent, TransitionEvent
+from alula.runtime.live.options import RunOption, words_of
+from alula.runtime.live.part import RunPart
+from alula.runtime.live.spec import RequestError, RunSpec
 from alula_flight.command_line import parse, with_claim
 from alula_flight.console_page import console_page
 from alula_flight.outcome import CANNOT_START

@@ -13,9 +13,9 @@ import pytest
 from alula.common.processes import RUN_ID_VARIABLE
 from alula.common.robots import load_robot_folder, meaning
 from alula.common.scenarios import load_scenario
-from alula.live.part import RunPart
-from alula.live.spec import FILE, RequestError, RunSpec
 from alula.report.deaths import read_deaths
+from alula.runtime.live.part import RunPart
+from alula.runtime.live.spec import FILE, RequestError, RunSpec
 from alula_flight.command_line import parse
 from alula_flight.launch import launch_arguments
 from alula_flight.members import Member, Members, members_of, reports_of

@@ -10,10 +10,10 @@ from types import SimpleNamespace
 
 import pytest
 
-from alula.live.part import DEAD_S, Clock, Consequence, RunPart
-from alula.live.spec import RunSpec
 from alula.report.deaths import read_deaths
 from alula.report.ends import OPERATOR, SIGNAL, SUPERVISOR, ReportedEnd, note_end, read_end
+from alula.runtime.live.part import DEAD_S, Clock, Consequence, RunPart
+from alula.runtime.live.spec import RunSpec
 from alula_flight import mission_clock, supervisor
 from alula_flight.mission_clock import MissionClock
 from alula_flight.outcome import GIVEN_UP

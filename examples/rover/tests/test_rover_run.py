@@ -3,7 +3,7 @@ from __future__ import annotations
 import re
 from pathlib import Path
 
-from alula.live.part import Consequence, part_of_robot
+from alula.runtime.live.part import Consequence, part_of_robot
 
 ROOT = Path(__file__).resolve().parents[1]
 NODE = re.compile(r"<node\s[^>]*?>")

@@ -17,7 +17,6 @@ from alula.campaign.mocked_scenarios import MockedScenario, load_mocked_scenario
 from alula.campaign.plan import SIMULATOR, PlannedRun
 from alula.common.record import RecordError, read_record
 from alula.common.robots import find_robot
-from alula.live.options import entry
 from alula.mock import Behaviour
 from alula.records.causes.effects import EffectsByFault
 from alula.records.causes.fault_file import effects_of_robot
@@ -29,6 +28,7 @@ from alula.records.models import models_of
 from alula.records.run import RecordedRun, lift_off_of, load_recorded_run, origin_of
 from alula.records.tree import Places, places_in
 from alula.runtime.core.events import EngineEvent, ExecutionEvent, TransitionEvent
+from alula.runtime.live.options import entry
 
 Row = dict[str, Any]
 

@@ -11,9 +11,9 @@ from pathlib import Path
 from alula.campaign.plan import SIMULATOR, Campaign, PlannedRun
 from alula.campaign.rows import rows_of
 from alula.campaign.table import Table
-from alula.live.options import ask_options, words_of
-from alula.live.spec import RequestError
 from alula.records.errors import AnalysisError
+from alula.runtime.live.options import ask_options, words_of
+from alula.runtime.live.spec import RequestError
 
 TOGETHER = 10
 """Mock runs that are handed over at a time: a run takes tens of milliseconds."""

@@ -24,7 +24,6 @@ from alula.common.robots import RobotError
 from alula.common.run_log import note_mocked
 from alula.common.scenarios import ScenarioError
 from alula.common.signals import Interrupts
-from alula.live.spec import FILE, RequestError, RunSpec
 from alula.missions.director import EXIT_CODES, Outcome
 from alula.missions.mocked import MockedMission
 from alula.missions.plan import InputError
@@ -36,6 +35,7 @@ from alula.report.facts import RunFacts
 from alula.report.live import LiveEvents
 from alula.report.making import make_report
 from alula.report.verdict import verdict_lines
+from alula.runtime.live.spec import FILE, RequestError, RunSpec
 from alula.trees.groot.address import ServerError
 
 CANNOT_START = EXIT_CODES[Outcome.NOT_STARTED]

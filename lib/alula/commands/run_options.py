@@ -9,7 +9,7 @@ from pathlib import Path
 from alula.common.robots import find_robot, wrong_world
 from alula.common.runs import runs_folder
 from alula.common.scenarios import Scenario, scenario_names
-from alula.live.spec import RequestError
+from alula.runtime.live.spec import RequestError
 from alula.trees.groot.address import Address, ServerError
 
 FAULT = "WHAT[:HOW][@SECONDS[-SECONDS]]"

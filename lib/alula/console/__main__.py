@@ -24,7 +24,7 @@ from alula.console.admission import Admission, is_loopback
 from alula.console.certificates import fingerprint, own_certificate, server_context
 from alula.console.link import ActError, Link, Mission, Skillsets
 from alula.console.server import Console
-from alula.live.options import ask_options
+from alula.runtime.live.options import ask_options
 
 PORT = 8440
 DOMAINS = range(233)

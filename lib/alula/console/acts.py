@@ -18,9 +18,9 @@ from alula.common.robots import find_robot
 from alula.common.runs import runs_folder
 from alula.common.scenarios import scenario_names
 from alula.console.link import ActError
-from alula.live.options import RunOption, entry, words_of
-from alula.live.spec import RequestError
 from alula.report.ends import OPERATOR, ReportedEnd, note_end
+from alula.runtime.live.options import RunOption, entry, words_of
+from alula.runtime.live.spec import RequestError
 
 START_S = 20.0
 LOOK_S = 0.05

@@ -12,7 +12,7 @@ from alula.common.runs import NoRunError, Run, load_run
 from alula.console import acts
 from alula.console.link import ActError, Link, Mission, PerRun
 from alula.console.manual_control import QUESTIONS, ManualControl
-from alula.live.options import RunOption
+from alula.runtime.live.options import RunOption
 
 ON_THE_FLIGHT = frozenset({"abort", "pause", "resume", "off"})
 """Acts of which each is begun once: a request that comes while the act is under way gets the same answer."""

@@ -35,8 +35,8 @@ from alula.console.embedded import REPORT
 from alula.console.feed import Feed, place_of
 from alula.console.link import ActError, Link
 from alula.console.page import make_page
-from alula.live.options import RunOption
-from alula.live.spec import RequestError
+from alula.runtime.live.options import RunOption
+from alula.runtime.live.spec import RequestError
 
 FEED = "/feed"
 STATUS_S = 0.3

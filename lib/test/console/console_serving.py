@@ -20,7 +20,7 @@ from alula.common.runs import Run
 from alula.console.admission import Admission
 from alula.console.link import ActError, Link, Skillsets
 from alula.console.server import FEED, Console
-from alula.live.options import RunOption
+from alula.runtime.live.options import RunOption
 
 WAIT_S = 60.0
 

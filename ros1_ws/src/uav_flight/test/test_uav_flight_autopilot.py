@@ -16,8 +16,8 @@ from uav_flight_requests import flight_of, launch_arguments, parse, with_domain
 
 from alula.common.network import NoFreePortError, free_port, udp_port_is_free, udp_ports_of
 from alula.common.run_log import read_waits
-from alula.live.spec import RequestError, RunSpec
 from alula.report.live import LiveEvents
+from alula.runtime.live.spec import RequestError, RunSpec
 from alula_flight.mission_clock import MissionClock
 from alula_flight.run import main
 from alula_flight.waits import Beginning

@@ -8,7 +8,7 @@ import pytest
 from uav_flight_requests import launch_arguments, parse
 
 from alula.common.network import free_port
-from alula.live.spec import RunSpec
+from alula.runtime.live.spec import RunSpec
 from alula_flight.outcome import CANNOT_START
 from alula_flight.process_faults import process_faults_of
 from alula_flight.run import main

@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Sequence
 
 from alula.common.network import DomainClaim
-from alula.live.spec import RunSpec
+from alula.runtime.live.spec import RunSpec
 from alula_flight import command_line, launch
 from uav_flight.part import DronePart, Flight
 

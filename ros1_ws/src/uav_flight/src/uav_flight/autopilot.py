@@ -9,7 +9,7 @@ from pathlib import Path
 import psutil
 
 from alula.common.network import udp_port_is_free, udp_ports_of
-from alula.live.spec import RequestError
+from alula.runtime.live.spec import RequestError
 from uav_simulator.ardupilot.protocol import PORT, PORTS_OF_INSTANCE, options
 from uav_simulator.settings import FOLLOWED
 from uav_simulator.world.config import WORLDS

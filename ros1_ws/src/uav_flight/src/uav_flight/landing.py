@@ -11,7 +11,7 @@ from std_msgs.msg import Header
 from uav_msgs.msg import GuidanceState
 from uav_msgs.srv import Command
 
-from alula.live.part import Clock
+from alula.runtime.live.part import Clock
 
 LANDING_TIMEOUT_S = 90.0  # mission clock; a landing from 20 m takes about 40 s
 STATE_TIMEOUT_S = 30.0  # wall clock until the guidance, perhaps just started again, says how things are

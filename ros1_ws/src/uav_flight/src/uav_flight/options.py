@@ -7,7 +7,7 @@ from collections.abc import Mapping, Sequence
 from typing import Any
 
 from alula.common.network import free_port
-from alula.live.spec import RequestError
+from alula.runtime.live.spec import RequestError
 from uav_flight.autopilot import check_body_port, check_connection, read_sensors
 from uav_simulator.errors import ConfigError
 from uav_simulator.imperfections import parse_imperfections

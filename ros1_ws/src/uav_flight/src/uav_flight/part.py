@@ -13,8 +13,8 @@ from typing import Any
 from alula.common.faults import parse_fault
 from alula.common.network import udp_ports_of
 from alula.common.scenarios import Scenario, load_scenario
-from alula.live.part import Clock, Consequence, RunPart
-from alula.live.spec import RequestError, RunSpec
+from alula.runtime.live.part import Clock, Consequence, RunPart
+from alula.runtime.live.spec import RequestError, RunSpec
 from uav_flight.autopilot import LISTENS, body_port, command_of_ardupilot, read_connection
 from uav_flight.options import Options, add_options, read_options
 from uav_simulator.errors import ConfigError

@@ -10,7 +10,7 @@ from actionlib_msgs.msg import GoalID
 from nav_msgs.msg import Odometry
 
 if TYPE_CHECKING:
-    from alula.live.part import Clock
+    from alula.runtime.live.part import Clock
 
 SERVERS = ("move_base", "follow_corridor", "creep", "dock", "localize")
 STANDS_M_S, STANDS_RAD_S = 0.01, 0.02

@@ -5,15 +5,15 @@ from __future__ import annotations
 from collections.abc import Mapping
 from typing import TYPE_CHECKING, Any
 
-from alula.live.part import Consequence, RunPart
-from alula.live.spec import RequestError
+from alula.runtime.live.part import Consequence, RunPart
+from alula.runtime.live.spec import RequestError
 
 if TYPE_CHECKING:
     from argparse import ArgumentParser, Namespace
 
     from alula.common.scenarios import Scenario
-    from alula.live.part import Clock
-    from alula.live.spec import RunSpec
+    from alula.runtime.live.part import Clock
+    from alula.runtime.live.spec import RunSpec
 
 MAX_RATE = 1000.0
 

@@ -9,7 +9,7 @@ from typing import Any, Protocol
 
 from alula.common.robots import find_robot
 from alula.common.scenarios import Scenario
-from alula.live.spec import RunSpec
+from alula.runtime.live.spec import RunSpec
 
 
 class Consequence(Enum):

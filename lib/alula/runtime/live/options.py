@@ -13,8 +13,8 @@ from collections.abc import Mapping, Sequence
 from dataclasses import asdict, dataclass
 from pathlib import Path
 
-from alula.live.part import RunPart
-from alula.live.spec import RequestError
+from alula.runtime.live.part import RunPart
+from alula.runtime.live.spec import RequestError
 
 FLAG = "--options"
 TIMEOUT_S = 120.0  # wall clock; it may have to set up what has changed
