@@ -20,7 +20,7 @@ from alula.common.record import DATA, DECISIONS, FILE, MISSION, Entry, RecordWri
 from alula.common.scenarios import load_scenario
 from alula.missions.director import Outcome
 from alula.missions.mocked import MockedMission
-from alula.missions.plan import plan_of
+from alula.missions.scenario import plan_of
 from alula.mock import MockSkill, load_behaviour
 from alula.records.models import robot_skillsets
 from alula_flight.replay import main

@@ -5,8 +5,8 @@ from __future__ import annotations
 import sys
 from pathlib import Path
 
-from alula.missions.filed.part import NO_PART
-from alula.missions.filed.plan import plan_of_file
+from alula.missions.mission_file import plan_of_file
+from alula.missions.part import NO_PART
 from skillset_ros2.mission_node import run_mission
 
 ENDLESS = """

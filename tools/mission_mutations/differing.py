@@ -8,7 +8,7 @@ from dataclasses import replace
 from itertools import islice
 from pathlib import Path
 
-from alula.missions.filed.part import MissionPart
+from alula.missions.part import MissionPart
 from alula.model.model import Skillset
 from alula.prove.mission.play import Played, play
 from alula.prove.mission.regions import Regions

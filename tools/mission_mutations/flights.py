@@ -13,7 +13,7 @@ from alula.campaign.mocked_scenarios import load_mocked_scenario
 from alula.campaign.plan import Campaign, PlannedRun
 from alula.campaign.rows import came_back
 from alula.missions.director import Outcome
-from alula.missions.filed.plan import plan_of_file
+from alula.missions.mission_file import plan_of_file
 from alula.missions.mocked import MockedMission
 from alula.missions.plan import InputError, MissionPlan
 from alula.model.model import Skillset

@@ -13,7 +13,7 @@ from alula.language.check.findings import check
 from alula.language.errors import Diagnostic
 from alula.language.messages import NO_MESSAGES, Messages
 from alula.missions.check.findings import findings_of
-from alula.missions.filed.part import MissionPart
+from alula.missions.part import MissionPart
 from alula.missions.plan import InputError
 from alula.model.model import Skillset
 from alula.prove import prove

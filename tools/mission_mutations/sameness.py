@@ -19,9 +19,9 @@ from dataclasses import dataclass
 from functools import cached_property
 from pathlib import Path
 
-from alula.missions.filed.nodes import Needs
-from alula.missions.filed.plan import READY
-from alula.missions.filed.skills import SkillNode
+from alula.missions.mission_file import READY
+from alula.missions.nodes import Needs
+from alula.missions.skills import SkillNode
 from alula.prove.mission.accepted import DESCRIPTION
 from alula.prove.mission.oracle import Answer, Question
 from alula.prove.mission.reading import scripts_of

@@ -11,7 +11,7 @@ from alula.common.scenarios import load_scenario
 from alula.language.load import load_robot
 from alula.missions.director import Outcome
 from alula.missions.mocked import MockedMission
-from alula.missions.plan import inputs_of, plan_of
+from alula.missions.scenario import inputs_of, plan_of
 from alula.mock import load_behaviour
 
 ROOT = Path(__file__).resolve().parents[1]

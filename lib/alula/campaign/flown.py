@@ -9,7 +9,7 @@ from collections.abc import Mapping, Sequence
 from dataclasses import asdict, dataclass, field
 from typing import Any
 
-from alula.missions.filed.skills import SkillNode
+from alula.missions.skills import SkillNode
 from alula.missions.treeview import path_of
 from alula.records.tree import Path
 from alula.runtime.handle import SkillHandle

@@ -13,7 +13,8 @@ from alula.common.robots import RobotError, find_robot
 from alula.common.scenarios import Scenario, ScenarioError, load_scenario
 from alula.missions.director import End
 from alula.missions.mocked import MockedMission
-from alula.missions.plan import InputError, Inputs, MissionPlan, inputs_of, plan_of
+from alula.missions.plan import InputError, Inputs, MissionPlan
+from alula.missions.scenario import inputs_of, plan_of
 from alula.mock import Behaviour
 from alula.model.model import Skillset
 from alula.records.errors import AnalysisError

@@ -8,7 +8,7 @@ from fnmatch import fnmatchcase
 
 from alula.common.robots import RobotError, find_robot
 from alula.common.scenarios import Scenario
-from alula.missions.filed.part import NO_PART
+from alula.missions.part import NO_PART
 from alula.missions.plan import InputError
 from alula.missions.treeview import path_of
 from alula.model.breaking import can_break

@@ -14,7 +14,7 @@ from alula.language.errors import Diagnostic, Severity, has_errors
 from alula.language.messages import NO_MESSAGES, Messages, messages_of
 from alula.language.models import ModelFile
 from alula.missions.check.findings import findings_of
-from alula.missions.filed.part import NO_PART, MissionPart
+from alula.missions.part import NO_PART, MissionPart
 from alula.model.model import Skillset
 from alula.model.span import Span
 from alula.records.causes.fault_file import load_effects

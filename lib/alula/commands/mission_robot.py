@@ -8,7 +8,7 @@ from alula.common.robots import RobotError, RobotFolder
 from alula.language.errors import has_errors
 from alula.language.fleet import in_fleet
 from alula.language.models import check_files, models_in
-from alula.missions.filed.part import NO_PART, MissionPart
+from alula.missions.part import NO_PART, MissionPart
 from alula.model.model import Skillset
 
 

@@ -15,7 +15,8 @@ from alula.commands.mission_robot import models_of, part_of
 from alula.common.files import write_text
 from alula.common.robots import FAULTS, RobotError, RobotFolder, find_robot
 from alula.common.scenarios import ScenarioError, load_scenario, scenario_names
-from alula.missions.plan import InputError, Inputs, inputs_of
+from alula.missions.plan import InputError, Inputs
+from alula.missions.scenario import inputs_of
 from alula.mock import load_behaviour
 from alula.model.model import Skillset
 from alula.odds.errors import OddsError

@@ -16,8 +16,8 @@ from alula.common.robots import RobotError, RobotFolder, find_robot
 from alula.language.errors import LanguageError, has_errors
 from alula.language.fleet import load_models
 from alula.language.models import ModelFile, check_files, models_in
-from alula.missions.filed.palette import mission_palette
-from alula.missions.filed.part import NO_PART
+from alula.missions.palette import mission_palette
+from alula.missions.part import NO_PART
 from alula.trees.groot.tree_xml import model_xml
 from alula.trees.palette import NodeType
 from alula.trees.standard import standard_palette

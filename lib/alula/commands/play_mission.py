@@ -15,7 +15,7 @@ from alula.common.run_log import note_mocked
 from alula.console.page import write_report
 from alula.language.errors import has_errors
 from alula.missions.director import Outcome
-from alula.missions.filed.part import NO_PART
+from alula.missions.part import NO_PART
 from alula.prove.mission.run import MissionFinding
 from alula.runtime.live.spec import RequestError
 

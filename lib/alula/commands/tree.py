@@ -16,7 +16,7 @@ from alula.common.files import write_text
 from alula.common.robots import RobotError, find_robot
 from alula.missions.check.mission import palette_for
 from alula.missions.drawing import draw, drawn_as_text
-from alula.missions.filed.part import NO_PART
+from alula.missions.part import NO_PART
 from alula.trees.answers import Answers, AnswersError, StepClock, read_answers, scripted_tree, ticks
 from alula.trees.errors import TreeError
 from alula.trees.palette import Palette

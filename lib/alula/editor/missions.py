@@ -15,10 +15,10 @@ from alula.language.messages import FieldError, messages_of
 from alula.language.models import ModelFile, check_files, models_in
 from alula.missions.check.findings import findings_of
 from alula.missions.check.skills import Skills
-from alula.missions.filed.palette import mission_palette
-from alula.missions.filed.part import NO_PART, MissionPart
-from alula.missions.filed.world import FUNCTIONS
+from alula.missions.palette import mission_palette
+from alula.missions.part import NO_PART, MissionPart
 from alula.missions.skill_types import SUCCESS_PORT
+from alula.missions.world import FUNCTIONS
 from alula.model.model import ResultKind, Skill, Skillset
 from alula.trees.palette import NodeType
 from alula.trees.reading import POSTCONDITIONS, PRECONDITIONS

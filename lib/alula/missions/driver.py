@@ -5,13 +5,13 @@ from __future__ import annotations
 from collections.abc import Callable, Mapping
 
 from alula.missions.director import START_TIMEOUT_S, Director, End
-from alula.missions.filed.watched import watched
 from alula.missions.leaves import skill_leaf
 from alula.missions.pausing import PauseRefusedError
 from alula.missions.plan import MissionPlan
 from alula.missions.record import MissionRecord
 from alula.missions.skillset import Client, Clock
 from alula.missions.treeview import path_of
+from alula.missions.watched import watched
 from alula.runtime.core.events import EngineEvent
 
 TICK_PERIOD_S = 0.1

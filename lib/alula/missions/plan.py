@@ -1,4 +1,4 @@
-"""What a runner has to know of a mission to run it, over whatever middleware; a scenario's plan and inputs."""
+"""What a runner has to know of a mission to run it, over whatever middleware."""
 
 from __future__ import annotations
 
@@ -6,8 +6,6 @@ from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field
 from typing import Any
 
-from alula.common.robots import find_robot, wrong_world
-from alula.common.scenarios import Scenario
 from alula.missions.blackboard import Blackboard
 from alula.missions.director import Mission
 from alula.missions.skillset import Client, Clock
@@ -55,35 +53,3 @@ class MissionPlan:
 
 class InputError(Exception):
     """The inputs of a mission can't be used; the message says what is wrong and where."""
-
-
-def plan_of(scenario: Scenario, inputs: Inputs) -> MissionPlan:
-    """Return a scenario's plan for these inputs; raises RobotError where there is no robot or none of its nodes, and InputError."""
-    from alula.missions.filed.scenario import plan_of_mission_file  # which needs this module
-    from alula.missions.serving import serving_plan  # so does this one
-
-    if not scenario.mission:
-        return serving_plan(scenario)
-    if not scenario.mission.endswith(".xml"):
-        raise InputError(f"the mission {scenario.mission} is no file of a tree; name one: missions/NAME.xml")
-    return plan_of_mission_file(find_robot().root / scenario.mission, scenario, inputs)
-
-
-def inputs_of(scenario: Scenario, world: str = "") -> Inputs:
-    """Return a mission's inputs from a world (name or file), that of the scenario unless another is given.
-
-    The robot's part ``inputs`` reads them from the world's file; a robot without that part has none.
-
-    Raises:
-        RobotError, InputError: there is no such world, or it can't be used.
-    """
-    robot = find_robot()
-    read = robot.part("inputs")
-    name = world or scenario.world
-    if read is None or not name:
-        return {}
-    path = robot.world(name)
-    if not path.is_file():
-        raise InputError(wrong_world(robot, name))
-    inputs: Inputs = read(path)
-    return inputs

@@ -14,9 +14,9 @@ from alula.language.messages import Messages, fields_of, messages_of
 from alula.language.models import ModelFile, check_texts
 from alula.missions.check.findings import findings_of
 from alula.missions.director import End, Outcome
-from alula.missions.filed.part import NO_PART
-from alula.missions.filed.plan import plan_of_file
+from alula.missions.mission_file import plan_of_file
 from alula.missions.mocked import MockedMission
+from alula.missions.part import NO_PART
 from alula.mock import load_behaviour
 from alula.model.ros_types import RosType
 from alula.trees.script import parse

@@ -96,7 +96,7 @@ def test_models_that_change_are_read_again(folder):
 OWN = """
 import pathlib
 
-from alula.missions.filed.part import MissionPart
+from alula.missions.part import MissionPart
 from alula.trees.node import SyncAction
 
 pathlib.Path(__file__).with_name("imported").touch()

@@ -8,11 +8,11 @@ pytest.importorskip("py_trees")
 
 from alula.language.models import ModelFile, check_texts
 from alula.missions.blackboard import Blackboard
-from alula.missions.filed.palette import mission_palette
-from alula.missions.filed.part import NO_PART
-from alula.missions.filed.skills import Crew
-from alula.missions.filed.world import World
+from alula.missions.palette import mission_palette
+from alula.missions.part import NO_PART
 from alula.missions.pending import PendingInterrupts
+from alula.missions.skills import Crew
+from alula.missions.world import World
 from alula.model.execution_state import ExecutionState
 from alula.runtime.handle import SkillHandle
 from alula.trees.factory import make_tree

@@ -12,9 +12,9 @@ from alula.common import run_log
 from alula.common.record import read_record
 from alula.language.models import ModelFile, check_texts
 from alula.missions.director import Outcome
-from alula.missions.filed.part import NO_PART
-from alula.missions.filed.plan import plan_of_file
+from alula.missions.mission_file import plan_of_file
 from alula.missions.mocked import MockedMission
+from alula.missions.part import NO_PART
 from alula.mock import load_behaviour
 
 MODEL = """

@@ -14,7 +14,7 @@ from test_missions_runs import ROOT, everything, robots, shown
 from alula.commands.mission_robot import models_of, part_of
 from alula.common.robots import find_robot
 from alula.missions.check.page import whole
-from alula.missions.filed.part import NO_PART
+from alula.missions.part import NO_PART
 from alula.prove.limits import Deadline
 from alula.prove.mission.ahead import Looking
 from alula.prove.mission.managers import Failures

@@ -19,9 +19,9 @@ from alula.language.models import ModelFile, check_texts
 from alula.missions.blackboard import Blackboard
 from alula.missions.check.page import whole
 from alula.missions.director import Outcome
-from alula.missions.filed.part import NO_PART
-from alula.missions.filed.world import World
+from alula.missions.part import NO_PART
 from alula.missions.pending import PendingInterrupts
+from alula.missions.world import World
 from alula.model.model import Skillset
 from alula.prove.mission.fitting import agree, told
 from alula.prove.mission.measured import Conditions, Kind, Measurements

@@ -15,9 +15,9 @@ from alula.common.robots import find_robot
 from alula.language.models import ModelFile, check_texts
 from alula.missions.check.page import whole
 from alula.missions.director import Outcome
-from alula.missions.filed.part import NO_PART, MissionPart
-from alula.missions.filed.plan import plan_of_file
+from alula.missions.mission_file import plan_of_file
 from alula.missions.mocked import MockedMission
+from alula.missions.part import NO_PART, MissionPart
 from alula.mock import Behaviour
 from alula.model.model import Skillset
 from alula.prove.mission.page import ROBOT

@@ -36,7 +36,7 @@ skillset arm {
 """
 
 NODES = """
-from alula.missions.filed.part import MissionPart
+from alula.missions.part import MissionPart
 from alula.trees.nodes.leaves import AlwaysSuccess
 
 PART = MissionPart((("arm.Choose", AlwaysSuccess),))

@@ -14,7 +14,7 @@ from alula.language.examples import RUNS, examples
 from alula.language.models import ModelFile, check_texts
 from alula.missions.check.page import whole
 from alula.missions.director import Outcome
-from alula.missions.filed.part import NO_PART
+from alula.missions.part import NO_PART
 from alula.prove.limits import Deadline, OutOfTimeError
 from alula.prove.mission.answers import Answers
 from alula.prove.mission.page import ROBOT

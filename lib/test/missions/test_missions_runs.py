@@ -25,8 +25,8 @@ from alula.language.examples import RUNS, examples
 from alula.language.models import ModelFile, check_texts
 from alula.missions.check.page import whole
 from alula.missions.driver import MissionDriver
-from alula.missions.filed.part import NO_PART, MissionPart
-from alula.missions.filed.plan import plan_of_file
+from alula.missions.mission_file import plan_of_file
+from alula.missions.part import NO_PART, MissionPart
 from alula.missions.skillset import MissionClient
 from alula.model.model import Skillset
 from alula.prove.limits import Deadline, OutOfTimeError

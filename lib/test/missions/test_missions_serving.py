@@ -10,7 +10,7 @@ from alula.campaign.mocked_scenarios import load_mocked_scenario
 from alula.common.scenarios import Scenario
 from alula.missions.director import EXIT_CODES, Outcome
 from alula.missions.driver import MissionDriver
-from alula.missions.plan import plan_of
+from alula.missions.scenario import plan_of
 from alula.records.errors import AnalysisError
 
 

@@ -12,7 +12,7 @@ pytest.importorskip("py_trees")
 
 from test_missions_wanted import FAULTS, TREE, TREES, proved, read, skillsets, written
 
-from alula.missions.filed.part import NO_PART
+from alula.missions.part import NO_PART
 from alula.prove.limits import Deadline, OutOfTimeError
 from alula.prove.mission.ending import Ending
 from alula.prove.mission.holding import held

@@ -18,7 +18,7 @@ from alula.language.models import ModelFile, check_texts
 from alula.language.syntax.cursor import Cursor
 from alula.language.syntax.properties import read_mission_property
 from alula.missions.check.page import whole
-from alula.missions.filed.part import NO_PART
+from alula.missions.part import NO_PART
 from alula.model.model import Property, Skillset
 from alula.prove.limits import Deadline
 from alula.prove.mission.conditions import Faults, faults_shown, true_in

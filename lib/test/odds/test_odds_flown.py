@@ -15,9 +15,9 @@ from alula.commands.odds import steps_of
 from alula.common.robots import find_robot
 from alula.language.models import check_files, models_in
 from alula.missions.director import Outcome
-from alula.missions.filed.part import NO_PART
-from alula.missions.filed.plan import plan_of_file
+from alula.missions.mission_file import plan_of_file
 from alula.missions.mocked import MockedMission
+from alula.missions.part import NO_PART
 from alula.mock import Behaviour, Ending, Rule
 from alula.odds.figures import Figures
 from alula.odds.graph import explore

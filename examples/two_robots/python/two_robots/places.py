@@ -7,7 +7,7 @@ from pathlib import Path
 
 import yaml
 
-from alula.missions.filed.part import MissionPart
+from alula.missions.part import MissionPart
 from alula.missions.plan import InputError, Inputs
 from alula.trees.errors import TickError
 from alula.trees.node import SyncAction, Wiring

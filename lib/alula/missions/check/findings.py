@@ -11,7 +11,7 @@ from alula.language.errors import Diagnostic, Severity
 from alula.language.messages import NO_MESSAGES, Messages
 from alula.language.models import ModelFile
 from alula.missions.check.mission import check_mission
-from alula.missions.filed.part import NO_PART, MissionPart
+from alula.missions.part import NO_PART, MissionPart
 from alula.model.model import Skillset
 from alula.model.span import Span
 from alula.trees.errors import FileError, Place, Problem

@@ -9,8 +9,8 @@ from alula.language.messages import NO_MESSAGES, Messages
 from alula.missions.check.names import NameRules
 from alula.missions.check.rules import SkillRules
 from alula.missions.check.skills import Skills, SkillTraits
-from alula.missions.filed.palette import mission_palette
-from alula.missions.filed.part import NO_PART, MissionPart
+from alula.missions.palette import mission_palette
+from alula.missions.part import NO_PART, MissionPart
 from alula.model.model import Skillset
 from alula.trees import nav2
 from alula.trees.check.checking import check

@@ -9,7 +9,7 @@ from dataclasses import dataclass
 from alula.common.suggestions import nearest, quoted
 from alula.language.messages import FieldError
 from alula.missions.check.skills import Skills
-from alula.missions.filed.world import FUNCTIONS
+from alula.missions.world import FUNCTIONS
 from alula.model.ros_types import PRIMITIVES
 from alula.trees.check.checking import Whole
 from alula.trees.check.problems import in_value

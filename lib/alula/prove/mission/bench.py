@@ -22,7 +22,7 @@ from pathlib import Path
 
 from alula.commands.mission_robot import models_of, part_of
 from alula.common.robots import find_robot
-from alula.missions.filed.part import NO_PART, MissionPart
+from alula.missions.part import NO_PART, MissionPart
 from alula.model.expressions import ResourceIs
 from alula.model.model import (
     Assignment,

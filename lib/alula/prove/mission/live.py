@@ -10,9 +10,9 @@ from collections.abc import Callable, Hashable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from typing import NamedTuple
 
-from alula.missions.filed.nodes import RetryAfter, Until
-from alula.missions.filed.skills import SkillNode
+from alula.missions.nodes import RetryAfter, Until
 from alula.missions.skill_types import OUTCOME_PORT
+from alula.missions.skills import SkillNode
 from alula.prove.mission.ahead import AT_ONCE, IN_TURN, RUNS, Looking
 from alula.prove.mission.reading import ANOTHER, OUTCOME, scripts_of
 from alula.trees.node import Action, Node, pointer

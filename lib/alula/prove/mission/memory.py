@@ -9,7 +9,7 @@ from operator import ne
 from typing import NamedTuple
 
 from alula.missions.director import Director, DirectorMemory, End, Outcome
-from alula.missions.filed.skills import SkillNode
+from alula.missions.skills import SkillNode
 from alula.model.model import Skillset
 from alula.prove.mission.ahead import RUNS, Ahead, Looking
 from alula.prove.mission.live import Live, Liveness, Place, leaf_place

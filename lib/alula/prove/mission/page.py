@@ -16,7 +16,7 @@ from alula.language.errors import Diagnostic
 from alula.language.examples import RUNS, Example, examples
 from alula.language.models import ModelFile, check_texts
 from alula.missions.check.page import whole
-from alula.missions.filed.part import NO_PART
+from alula.missions.part import NO_PART
 from alula.prove.mission.prover import prove_mission
 
 NAME = "mission-proofs.md"

@@ -14,11 +14,11 @@ from pathlib import Path
 
 from alula.missions.director import START_TIMEOUT_S, End, Outcome
 from alula.missions.driver import MissionDriver
-from alula.missions.filed.part import MissionPart
-from alula.missions.filed.plan import plan_of_file
-from alula.missions.filed.skills import SkillNode
+from alula.missions.mission_file import plan_of_file
+from alula.missions.part import MissionPart
 from alula.missions.pausing import PauseRefusedError
 from alula.missions.record import MissionRecord
+from alula.missions.skills import SkillNode
 from alula.missions.skillset import MissionClient
 from alula.model.execution_state import ExecutionState
 from alula.prove.mission.acting import Function, HeldMiddleware

@@ -8,7 +8,7 @@ from dataclasses import dataclass, field, replace
 from pathlib import Path
 
 from alula.language.errors import Diagnostic, Severity
-from alula.missions.filed.part import MissionPart
+from alula.missions.part import MissionPart
 from alula.missions.plan import InputError
 from alula.model.model import Skillset
 from alula.model.span import Span

@@ -7,8 +7,8 @@ from collections.abc import Iterable, Iterator, Mapping
 from dataclasses import dataclass, field
 from typing import NamedTuple
 
-from alula.missions.filed.plan import DEGRADED, STOPPING
-from alula.missions.filed.world import FUNCTIONS
+from alula.missions.mission_file import DEGRADED, STOPPING
+from alula.missions.world import FUNCTIONS
 from alula.prove.mission.oracle import Oracle
 from alula.prove.mission.unknown import UNKNOWN, UnknownNumber, UnknownText
 from alula.trees.document import Element

@@ -7,10 +7,10 @@ from collections.abc import Collection, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field
 
 from alula.missions.blackboard import Blackboard, Failure
-from alula.missions.filed.part import MissionPart
-from alula.missions.filed.skills import SkillNode
+from alula.missions.part import MissionPart
 from alula.missions.pending import PendingInterrupts
 from alula.missions.skill_types import type_of
+from alula.missions.skills import SkillNode
 from alula.model.execution_state import ExecutionState
 from alula.model.model import Skillset
 from alula.prove.mission.measured import Conditions, Measurements

@@ -22,8 +22,8 @@ from collections.abc import Iterator, Mapping, Sequence
 from pathlib import Path
 
 from alula.missions.director import Director, Outcome
-from alula.missions.filed.part import MissionPart
-from alula.missions.filed.plan import STOP_HERE, FiledMission, plan_of_file
+from alula.missions.mission_file import STOP_HERE, FiledMission, plan_of_file
+from alula.missions.part import MissionPart
 from alula.missions.plan import InputError, Inputs
 from alula.missions.skill_types import OUTCOME_PORT
 from alula.model.execution_state import ExecutionState

@@ -13,7 +13,7 @@ from typing import NamedTuple
 from py_trees.behaviour import Behaviour
 
 from alula.missions.director import Director
-from alula.missions.filed.plan import FiledMission
+from alula.missions.mission_file import FiledMission
 from alula.prove.mission.measured import of_data
 from alula.prove.mission.memory import Body, Keeper, TreeMemory
 from alula.prove.mission.oracle import Answer, Asked, Oracle, Question, UndecidedError, View

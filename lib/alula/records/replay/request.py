@@ -13,8 +13,8 @@ from alula.common.scenarios import ScenarioError, load_scenario
 from alula.common.suggestions import nearest
 from alula.language.errors import LanguageError
 from alula.language.load import load_skillset
-from alula.missions.filed.scenario import plan_of_mission_file
-from alula.missions.plan import InputError, Inputs, MissionPlan, plan_of
+from alula.missions.plan import InputError, Inputs, MissionPlan
+from alula.missions.scenario import plan_of, plan_of_mission_file
 from alula.mock import Behaviour
 from alula.model.model import Skillset
 from alula.records.errors import AnalysisError

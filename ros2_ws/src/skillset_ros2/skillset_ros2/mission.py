@@ -17,7 +17,8 @@ import rclpy.utilities
 from alula.common.robots import RobotError
 from alula.common.scenarios import ScenarioError, load_scenario
 from alula.missions.director import EXIT_CODES, Outcome
-from alula.missions.plan import InputError, inputs_of, plan_of
+from alula.missions.plan import InputError
+from alula.missions.scenario import inputs_of, plan_of
 from skillset_ros2.mission_node import run_mission
 
 

@@ -12,7 +12,8 @@ import pytest
 from alula.campaign.mocked_scenarios import load_mocked_scenario
 from alula.common.robots import find_robot
 from alula.missions.director import Outcome
-from alula.missions.plan import InputError, inputs_of, plan_of
+from alula.missions.plan import InputError
+from alula.missions.scenario import inputs_of, plan_of
 
 
 def test_a_file_tells_its_parameters_and_what_is_told_of_it():

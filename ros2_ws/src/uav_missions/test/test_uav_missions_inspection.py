@@ -13,7 +13,7 @@ from alula.common.faults import FaultRequest, parse_fault
 from alula.common.scenarios import load_scenario
 from alula.missions.director import Outcome
 from alula.missions.mocked import MockedMission
-from alula.missions.plan import plan_of
+from alula.missions.scenario import plan_of
 from alula.mock import load_behaviour
 from alula.records.models import robot_skillsets
 from alula.runtime.core import ExecutionEvent

@@ -19,7 +19,7 @@ from alula.common.record import BLACKBOARD, DECISIONS, EVENTS, MISSION, REPORTS,
 from alula.common.scenarios import load_scenario
 from alula.missions.director import Outcome
 from alula.missions.mocked import MockedMission
-from alula.missions.plan import plan_of
+from alula.missions.scenario import plan_of
 from alula.mock import load_behaviour
 from alula.records.models import robot_skillsets
 from alula.runtime.core import ExecutionEvent

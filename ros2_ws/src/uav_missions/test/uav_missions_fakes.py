@@ -9,7 +9,8 @@ from dataclasses import dataclass, field
 from alula.common.scenarios import load_scenario
 from alula.missions.blackboard import Blackboard
 from alula.missions.director import Mission
-from alula.missions.plan import MissionPlan, plan_of
+from alula.missions.plan import MissionPlan
+from alula.missions.scenario import plan_of
 from alula.model.execution_state import ExecutionState as State
 from alula.runtime.handle import SkillHandle
 from alula.runtime.waiting import Pending

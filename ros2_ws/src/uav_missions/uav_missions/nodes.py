@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 
-from alula.missions.filed.part import MissionPart
+from alula.missions.part import MissionPart
 from alula.trees.errors import TickError
 from alula.trees.node import Condition, SyncAction
 from alula.trees.palette import input_port, output_port

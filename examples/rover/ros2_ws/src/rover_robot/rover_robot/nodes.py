@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from typing import Any, ClassVar
 
-from alula.missions.filed.part import MissionPart
+from alula.missions.part import MissionPart
 from alula.trees.errors import TickError
 from alula.trees.node import SyncAction
 from alula.trees.palette import Port, input_port, output_port

@@ -16,14 +16,14 @@ from py_trees.behaviours import Success
 
 from alula.missions.blackboard import Blackboard
 from alula.missions.conditions import Condition, answers
-from alula.missions.filed.nodes import Needs
-from alula.missions.filed.palette import mission_palette
-from alula.missions.filed.part import MissionPart
-from alula.missions.filed.skills import Crew, SkillNode
-from alula.missions.filed.world import World, asked_data, states_of
+from alula.missions.nodes import Needs
+from alula.missions.palette import mission_palette
+from alula.missions.part import MissionPart
 from alula.missions.pending import PendingInterrupts
 from alula.missions.plan import InputError, Inputs, MissionPlan
+from alula.missions.skills import Crew, SkillNode
 from alula.missions.skillset import Client, Clock
+from alula.missions.world import World, asked_data, states_of
 from alula.model.model import Skillset
 from alula.trees.blackboard import Blackboard as TreeBoard
 from alula.trees.errors import TreeError

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from alula.missions.director import Mission
-from alula.missions.filed.plan import FiledMission
+from alula.missions.mission_file import FiledMission
 from alula.missions.record import STOP_LOG, MissionRecord
 from alula.missions.skillset import Clock
 from alula.trees.groot.address import Address, ServerError

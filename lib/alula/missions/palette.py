@@ -5,10 +5,10 @@ from __future__ import annotations
 from collections.abc import Sequence
 
 from alula.missions.blackboard import Blackboard
-from alula.missions.filed.nodes import mission_nodes
-from alula.missions.filed.part import MissionPart
-from alula.missions.filed.skills import Crew, robot_nodes
+from alula.missions.nodes import mission_nodes
+from alula.missions.part import MissionPart
 from alula.missions.pending import PendingInterrupts
+from alula.missions.skills import Crew, robot_nodes
 from alula.model.model import Skillset
 from alula.trees.palette import Palette
 from alula.trees.standard import standard_palette

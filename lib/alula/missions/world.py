@@ -7,7 +7,7 @@ from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import dataclass
 
 from alula.missions.blackboard import Blackboard
-from alula.missions.filed.skills import SkillNode
+from alula.missions.skills import SkillNode
 from alula.missions.skillset import Client
 from alula.model.conditions import value_in
 from alula.model.model import Skillset

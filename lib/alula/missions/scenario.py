@@ -1,17 +1,47 @@
-"""The plan of a mission's file with the robot's models and nodes."""
+"""A scenario's plan, of its mission's file with the robot's models and nodes, and its inputs."""
 
 from __future__ import annotations
 
 from dataclasses import replace
 from pathlib import Path
 
-from alula.common.robots import RobotFolder, find_robot, fleet_name
+from alula.common.robots import RobotFolder, find_robot, fleet_name, wrong_world
 from alula.common.scenarios import Scenario
 from alula.language.errors import LanguageError
 from alula.language.fleet import load_models
-from alula.missions.filed.part import NO_PART
-from alula.missions.filed.plan import plan_of_file
+from alula.missions.mission_file import plan_of_file
+from alula.missions.part import NO_PART
 from alula.missions.plan import InputError, Inputs, MissionPlan
+from alula.missions.serving import serving_plan
+
+
+def plan_of(scenario: Scenario, inputs: Inputs) -> MissionPlan:
+    """Return a scenario's plan for these inputs; raises RobotError where there is no robot or none of its nodes, and InputError."""
+    if not scenario.mission:
+        return serving_plan(scenario)
+    if not scenario.mission.endswith(".xml"):
+        raise InputError(f"the mission {scenario.mission} is no file of a tree; name one: missions/NAME.xml")
+    return plan_of_mission_file(find_robot().root / scenario.mission, scenario, inputs)
+
+
+def inputs_of(scenario: Scenario, world: str = "") -> Inputs:
+    """Return a mission's inputs from a world (name or file), that of the scenario unless another is given.
+
+    The robot's part ``inputs`` reads them from the world's file; a robot without that part has none.
+
+    Raises:
+        RobotError, InputError: there is no such world, or it can't be used.
+    """
+    robot = find_robot()
+    read = robot.part("inputs")
+    name = world or scenario.world
+    if read is None or not name:
+        return {}
+    path = robot.world(name)
+    if not path.is_file():
+        raise InputError(wrong_world(robot, name))
+    inputs: Inputs = read(path)
+    return inputs
 
 
 def plan_of_mission_file(path: Path, scenario: Scenario, inputs: Inputs) -> MissionPlan:
