@@ -24,7 +24,7 @@ PAGE = ("lib/alula/console/page", "lib/alula/editor")
 """Programs of pages: every word counts, as no reader can tell which of them are shown."""
 GENERATED = {"lib/alula/generate"}
 """Texts of the library that become code of a robot, which imports ROS."""
-EXAMPLES = {"lib/alula/missions/check/page.py", "lib/alula/prove/mission/page.py", "lib/alula/prove/bench.py"}
+EXAMPLES = {"lib/alula/check/page.py", "lib/alula/prove/mission/page.py", "lib/alula/prove/bench.py"}
 """Whole models that documents and benches show."""
 TYPES = "lib/alula/model/ros_types.py"
 """What types of models are called in ROS: names as data."""

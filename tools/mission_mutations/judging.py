@@ -9,10 +9,10 @@ from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import asdict, dataclass
 from pathlib import Path
 
+from alula.check.findings import findings_of
 from alula.language.check.findings import check
 from alula.language.errors import Diagnostic
 from alula.language.messages import NO_MESSAGES, Messages
-from alula.missions.check.findings import findings_of
 from alula.missions.part import MissionPart
 from alula.missions.plan import InputError
 from alula.model.model import Skillset

@@ -8,12 +8,12 @@ from dataclasses import replace
 from functools import partial
 from pathlib import Path
 
+from alula.check.findings import findings_of
 from alula.commands.mission_robot import models_of, part_of
 from alula.common.robots import FAULTS, RobotError, find_robot
 from alula.language.errors import Diagnostic, Severity, has_errors
 from alula.language.messages import NO_MESSAGES, Messages, messages_of
 from alula.language.models import ModelFile
-from alula.missions.check.findings import findings_of
 from alula.missions.part import NO_PART, MissionPart
 from alula.model.model import Skillset
 from alula.model.span import Span

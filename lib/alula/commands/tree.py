@@ -11,10 +11,10 @@ import sys
 from collections.abc import Sequence
 from pathlib import Path
 
+from alula.check.mission import palette_for
 from alula.commands.mission_robot import models_of, part_of
 from alula.common.files import write_text
 from alula.common.robots import RobotError, find_robot
-from alula.missions.check.mission import palette_for
 from alula.missions.drawing import draw, drawn_as_text
 from alula.missions.part import NO_PART
 from alula.trees.answers import Answers, AnswersError, StepClock, read_answers, scripted_tree, ticks

@@ -8,13 +8,13 @@ from contextlib import suppress
 from dataclasses import replace
 from pathlib import Path
 
+from alula.check.findings import findings_of
+from alula.check.skills import Skills
 from alula.common.robots import RobotError, find_robot
 from alula.editor.completion import Completion, Place
 from alula.language.errors import Diagnostic, Severity
 from alula.language.messages import FieldError, messages_of
 from alula.language.models import ModelFile, check_files, models_in
-from alula.missions.check.findings import findings_of
-from alula.missions.check.skills import Skills
 from alula.missions.palette import mission_palette
 from alula.missions.part import NO_PART, MissionPart
 from alula.missions.skill_types import SUCCESS_PORT

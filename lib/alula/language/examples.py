@@ -30,6 +30,6 @@ def examples(package: str) -> Mapping[str, Example]:
 
 LANGUAGE = "alula.language"
 PROOFS = "alula.prove"
-MISSIONS = "alula.missions.check"
+MISSIONS = "alula.check"
 RUNS = "alula.prove.mission"
 """The packages that have examples. Proofs and missions are named only: nothing here imports them."""

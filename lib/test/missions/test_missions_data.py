@@ -8,11 +8,11 @@ import pytest
 
 pytest.importorskip("py_trees")
 
+from alula.check.findings import findings_of
 from alula.common.record import DATA, TREE, read_record
 from alula.common.robots import load_robot_folder
 from alula.language.messages import Messages, fields_of, messages_of
 from alula.language.models import ModelFile, check_texts
-from alula.missions.check.findings import findings_of
 from alula.missions.director import End, Outcome
 from alula.missions.mission_file import plan_of_file
 from alula.missions.mocked import MockedMission

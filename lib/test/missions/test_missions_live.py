@@ -11,9 +11,9 @@ pytest.importorskip("z3")
 
 from test_missions_runs import ROOT, everything, robots, shown
 
+from alula.check.page import whole
 from alula.commands.mission_robot import models_of, part_of
 from alula.common.robots import find_robot
-from alula.missions.check.page import whole
 from alula.missions.part import NO_PART
 from alula.prove.limits import Deadline
 from alula.prove.mission.ahead import Looking

@@ -13,11 +13,11 @@ import pytest
 pytest.importorskip("z3")
 pytest.importorskip("py_trees")
 
+from alula.check.page import whole
 from alula.common.record import DATA as DATA_TOPIC
 from alula.common.record import read_record
 from alula.language.models import ModelFile, check_texts
 from alula.missions.blackboard import Blackboard
-from alula.missions.check.page import whole
 from alula.missions.director import Outcome
 from alula.missions.part import NO_PART
 from alula.missions.pending import PendingInterrupts

@@ -11,9 +11,9 @@ from pathlib import Path
 import pytest
 
 from alula.campaign.plan import load_campaign
+from alula.check.page import whole
 from alula.common.robots import find_robot
 from alula.language.models import ModelFile, check_texts
-from alula.missions.check.page import whole
 from alula.missions.director import Outcome
 from alula.missions.mission_file import plan_of_file
 from alula.missions.mocked import MockedMission

@@ -7,12 +7,12 @@ from pathlib import Path
 
 import pytest
 
+from alula.check.page import whole
 from alula.commands.check_missions import faults_of
 from alula.commands.mission_robot import models_of, part_of
 from alula.common.robots import find_robot
 from alula.language.examples import RUNS, examples
 from alula.language.models import ModelFile, check_texts
-from alula.missions.check.page import whole
 from alula.missions.director import Outcome
 from alula.missions.part import NO_PART
 from alula.prove.limits import Deadline, OutOfTimeError

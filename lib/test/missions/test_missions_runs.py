@@ -17,13 +17,13 @@ import pytest
 pytest.importorskip("z3")
 pytest.importorskip("py_trees")
 
+from alula.check.page import whole
 from alula.commands.check_missions import faults_of
 from alula.commands.mission_robot import models_of, part_of
 from alula.common.robots import find_robot
 from alula.language.codes import RUN_CODES
 from alula.language.examples import RUNS, examples
 from alula.language.models import ModelFile, check_texts
-from alula.missions.check.page import whole
 from alula.missions.driver import MissionDriver
 from alula.missions.mission_file import plan_of_file
 from alula.missions.part import NO_PART, MissionPart

@@ -12,12 +12,12 @@ import pytest
 pytest.importorskip("z3")
 pytest.importorskip("py_trees")
 
+from alula.check.page import whole
 from alula.language.errors import Diagnostic, has_errors
 from alula.language.lexer import Source
 from alula.language.models import ModelFile, check_texts
 from alula.language.syntax.cursor import Cursor
 from alula.language.syntax.properties import read_mission_property
-from alula.missions.check.page import whole
 from alula.missions.part import NO_PART
 from alula.model.model import Property, Skillset
 from alula.prove.limits import Deadline

@@ -10,12 +10,12 @@ import tempfile
 from collections.abc import Iterator
 from pathlib import Path
 
+from alula.check.page import whole
 from alula.common.files import write_text
 from alula.language.codes import RUN_CODES
 from alula.language.errors import Diagnostic
 from alula.language.examples import RUNS, Example, examples
 from alula.language.models import ModelFile, check_texts
-from alula.missions.check.page import whole
 from alula.missions.part import NO_PART
 from alula.prove.mission.prover import prove_mission
 

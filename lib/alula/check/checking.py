@@ -7,12 +7,12 @@ from contextlib import suppress
 from dataclasses import dataclass, field
 from itertools import islice
 
-from alula.trees.check import entries
-from alula.trees.check.problems import of_element
-from alula.trees.check.reach import Reach, never_reached, several_run, unreached, waits_in_vain
-from alula.trees.check.scripts import Scripts, after, before, within
-from alula.trees.check.sites import Site, expand
-from alula.trees.check.traits import Traits
+from alula.check import entries
+from alula.check.problems import of_element
+from alula.check.reach import Reach, never_reached, several_run, unreached, waits_in_vain
+from alula.check.scripts import Scripts, after, before, within
+from alula.check.sites import Site, expand
+from alula.check.traits import Traits
 from alula.trees.errors import Problem
 from alula.trees.palette import Direction, Palette
 from alula.trees.reading import TreeFiles, type_name

@@ -6,17 +6,17 @@ import re
 from collections.abc import Iterator
 from dataclasses import dataclass
 
+from alula.check.checking import Whole
+from alula.check.problems import of_element, of_value
+from alula.check.reach import BRANCHES, IN_TURN, is_parallel
+from alula.check.resources import clash
+from alula.check.sites import Site
+from alula.check.skills import Skills, named_results
+from alula.check.traits import F
 from alula.common.suggestions import nearest, quoted
-from alula.missions.check.resources import clash
-from alula.missions.check.skills import Skills, named_results
 from alula.missions.skill_types import OUTCOME_PORT, SUCCESS_PORT
 from alula.model.model import Skill
 from alula.model.units import KIND_OF_UNIT, UNIT_IN_SI
-from alula.trees.check.checking import Whole
-from alula.trees.check.problems import of_element, of_value
-from alula.trees.check.reach import BRANCHES, IN_TURN, is_parallel
-from alula.trees.check.sites import Site
-from alula.trees.check.traits import F
 from alula.trees.document import Attribute
 from alula.trees.errors import Problem
 

@@ -5,9 +5,9 @@ from __future__ import annotations
 from collections.abc import Callable, Iterator
 from itertools import pairwise
 
-from alula.trees.check.problems import of_element
-from alula.trees.check.sites import Site
-from alula.trees.check.traits import ENDS, F, K, S, Traits
+from alula.check.problems import of_element
+from alula.check.sites import Site
+from alula.check.traits import ENDS, F, K, S, Traits
 from alula.trees.errors import Problem
 from alula.trees.palette import Category
 

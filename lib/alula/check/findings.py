@@ -7,10 +7,10 @@ from collections.abc import Sequence
 from dataclasses import replace
 from pathlib import Path
 
+from alula.check.mission import check_mission
 from alula.language.errors import Diagnostic, Severity
 from alula.language.messages import NO_MESSAGES, Messages
 from alula.language.models import ModelFile
-from alula.missions.check.mission import check_mission
 from alula.missions.part import NO_PART, MissionPart
 from alula.model.model import Skillset
 from alula.model.span import Span

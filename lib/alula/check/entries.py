@@ -5,11 +5,11 @@ from __future__ import annotations
 from collections.abc import Collection, Iterator
 from dataclasses import dataclass, replace
 
+from alula.check import scripts
+from alula.check.problems import in_value, of_value
+from alula.check.sites import Board, Key, Site
+from alula.check.traits import Traits
 from alula.common.suggestions import nearest
-from alula.trees.check import scripts
-from alula.trees.check.problems import in_value, of_value
-from alula.trees.check.sites import Board, Key, Site
-from alula.trees.check.traits import Traits
 from alula.trees.document import Attribute
 from alula.trees.errors import Problem
 from alula.trees.node import pointer

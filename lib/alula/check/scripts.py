@@ -4,8 +4,8 @@ from __future__ import annotations
 
 from collections.abc import Iterator
 
-from alula.trees.check.problems import in_value
-from alula.trees.check.sites import Site
+from alula.check.problems import in_value
+from alula.check.sites import Site
 from alula.trees.document import Attribute
 from alula.trees.errors import Problem
 from alula.trees.reading import POSTCONDITIONS, PRECONDITIONS

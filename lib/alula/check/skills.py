@@ -5,11 +5,11 @@ from __future__ import annotations
 from collections.abc import Collection, Iterable, Mapping
 from functools import cached_property
 
+from alula.check.sites import Site
+from alula.check.traits import F, PlainTraits, S
 from alula.language.messages import NO_MESSAGES, Messages
 from alula.missions.skill_types import SEPARATOR, SUCCESS_PORT
 from alula.model.model import ResultKind, Skill, Skillset
-from alula.trees.check.sites import Site
-from alula.trees.check.traits import F, PlainTraits, S
 from alula.trees.node import pointer
 
 

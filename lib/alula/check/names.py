@@ -6,14 +6,14 @@ from collections.abc import Iterator
 from contextlib import suppress
 from dataclasses import dataclass
 
+from alula.check.checking import Whole
+from alula.check.problems import in_value
+from alula.check.scripts import after, before, within
+from alula.check.skills import Skills
 from alula.common.suggestions import nearest, quoted
 from alula.language.messages import FieldError
-from alula.missions.check.skills import Skills
 from alula.missions.world import FUNCTIONS
 from alula.model.ros_types import PRIMITIVES
-from alula.trees.check.checking import Whole
-from alula.trees.check.problems import in_value
-from alula.trees.check.scripts import after, before, within
 from alula.trees.document import Attribute
 from alula.trees.errors import Problem
 from alula.trees.script.syntax import Assignment, Call, Comparison, Literal, Name, Node, walk

@@ -5,15 +5,15 @@ from __future__ import annotations
 from collections.abc import Sequence
 from pathlib import Path
 
+from alula.check.checking import check
+from alula.check.names import NameRules
+from alula.check.rules import SkillRules
+from alula.check.skills import Skills, SkillTraits
 from alula.language.messages import NO_MESSAGES, Messages
-from alula.missions.check.names import NameRules
-from alula.missions.check.rules import SkillRules
-from alula.missions.check.skills import Skills, SkillTraits
 from alula.missions.palette import mission_palette
 from alula.missions.part import NO_PART, MissionPart
 from alula.model.model import Skillset
 from alula.trees import nav2
-from alula.trees.check.checking import check
 from alula.trees.errors import FileError, Problem
 from alula.trees.palette import Palette
 from alula.trees.reading import TreeFiles, read_models, read_text

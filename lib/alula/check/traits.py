@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Collection
 from typing import Protocol
 
-from alula.trees.check.sites import Site
+from alula.check.sites import Site
 from alula.trees.node import Action
 from alula.trees.palette import Category
 
