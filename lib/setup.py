@@ -17,7 +17,7 @@ setup(
         "alula": ["py.typed"],
         "alula.console": ["page/*"],
         "alula.language": ["examples.yaml"],
-        "alula.prove": ["examples.yaml"],
+        "alula.prove.skillset": ["examples.yaml"],
         "alula.generate.scaffold": ["robot/**/*.in"],
     },
     data_files=[("share/ament_index/resource_index/packages", ["resource/alula"]), ("share/alula", ["package.xml"])],

@@ -29,7 +29,7 @@ def examples(package: str) -> Mapping[str, Example]:
 
 
 LANGUAGE = "alula.language"
-PROOFS = "alula.prove"
+PROOFS = "alula.prove.skillset"
 MISSIONS = "alula.check"
 RUNS = "alula.prove.mission"
 """The packages that have examples. Proofs and missions are named only: nothing here imports them."""

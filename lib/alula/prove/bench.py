@@ -33,7 +33,7 @@ from alula.model.model import (
     Skillset,
     Transition,
 )
-from alula.prove.prover import prove
+from alula.prove.skillset.prover import prove
 
 ALL_ONE_BY_ONE = 10**9
 SPARSE_RESOURCES = 60

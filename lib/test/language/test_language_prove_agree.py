@@ -14,16 +14,16 @@ from alula.model import semantics
 from alula.model.conditions import holds
 from alula.model.expressions import TRUE, ResourceIs
 from alula.model.model import Invariant, Property, PropertyKind, Resource, Result, Skill, Skillset, Transition
-from alula.prove import sets as sets_module
-from alula.prove.abstract import without_data
-from alula.prove.encoding import encode
-from alula.prove.explicit import search as one_by_one
-from alula.prove.explore import explore
 from alula.prove.limits import Deadline
-from alula.prove.local import local_checks
-from alula.prove.sets import Sets
-from alula.prove.steps import World
-from alula.prove.symbolic import search as by_sets
+from alula.prove.skillset import sets as sets_module
+from alula.prove.skillset.abstract import without_data
+from alula.prove.skillset.encoding import encode
+from alula.prove.skillset.explicit import search as one_by_one
+from alula.prove.skillset.explore import explore
+from alula.prove.skillset.local import local_checks
+from alula.prove.skillset.sets import Sets
+from alula.prove.skillset.steps import World
+from alula.prove.skillset.symbolic import search as by_sets
 from alula.runtime.core import SkillsetEngine
 from alula.runtime.hooks import SkillHooks
 

@@ -26,7 +26,8 @@ from alula.model.model import (
     Skillset,
     Transition,
 )
-from alula.prove import bench, limits, prove, sets
+from alula.prove import bench, limits, prove
+from alula.prove.skillset import sets
 
 BOTH = pytest.mark.parametrize("most", [2000, 0], ids=["one by one", "as sets"])
 GOTO = """

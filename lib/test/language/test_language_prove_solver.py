@@ -9,7 +9,7 @@ import pytest
 from alula.model.expressions import And, Comparison, DataIs, Expression, Implies, Not, Or
 from alula.model.model import Data, Skillset
 from alula.prove.limits import Deadline
-from alula.prove.solver import Solver
+from alula.prove.skillset.solver import Solver
 
 MODEL = Skillset("any", data=(Data("d", "float64"), Data("e", "float64"), Data("n", "int32")))
 ANY_TIME = Deadline.after(1e6)

@@ -12,9 +12,9 @@ from alula.model.conditions import data_of, judge, whatever_the_data
 from alula.model.execution_state import ExecutionState
 from alula.model.model import ResultKind, Skill, Skillset
 from alula.model.situation import Change, Entered, Running, Situation, Step
-from alula.prove.abstract import Abstraction, Breaker, without_data
 from alula.prove.limits import Deadline
 from alula.prove.mission.state import Ending, Event, Execution, Kind, Managers
+from alula.prove.skillset.abstract import Abstraction, Breaker, without_data
 
 NOT_VALIDATED = ExecutionState.NOT_VALIDATED.value
 End = tuple[str, str]

@@ -13,9 +13,9 @@ from functools import lru_cache
 from alula.model.conditions import data_of
 from alula.model.expressions import And, Expression, Not, ResourceIs
 from alula.model.model import Resource, Skill, Skillset, Transition
-from alula.prove.abstract import Abstraction
 from alula.prove.limits import Deadline
 from alula.prove.mission.managers import searched
+from alula.prove.skillset.abstract import Abstraction
 
 AS_WANTED = "as_wanted"
 """Data say what every condition asks for."""

@@ -8,10 +8,10 @@ from dataclasses import dataclass, replace
 from alula.language.errors import Diagnostic, Severity
 from alula.language.outside import Arrow, opened, untaken
 from alula.model.model import Skillset
-from alula.prove import explicit, few, symbolic
-from alula.prove.abstract import Abstraction, without_data
 from alula.prove.limits import Deadline, OutOfTimeError
-from alula.prove.local import Suspect, local_checks
+from alula.prove.skillset import explicit, few, symbolic
+from alula.prove.skillset.abstract import Abstraction, without_data
+from alula.prove.skillset.local import Suspect, local_checks
 
 MOST_SITUATIONS = 2000
 """More situations than this are not looked at one by one, but as sets; see ``bench``."""

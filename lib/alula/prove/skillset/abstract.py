@@ -16,7 +16,7 @@ from alula.model.conditions import whatever_the_data
 from alula.model.expressions import TRUE, And, Atom, Constant, DataIs, Expression, Implies, Not, Or, ResourceIs, atoms
 from alula.model.model import Event, Invariant, Precondition, Skill, Skillset
 from alula.prove.limits import Deadline
-from alula.prove.solver import Solver
+from alula.prove.skillset.solver import Solver
 
 
 @dataclass(frozen=True)

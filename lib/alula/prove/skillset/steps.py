@@ -17,7 +17,7 @@ from alula.model.errors import EffectError
 from alula.model.execution_state import ExecutionState
 from alula.model.model import Effect, Skill, Skillset
 from alula.model.situation import Entered, Running, Situation, Step
-from alula.prove.abstract import Abstraction, Breaker
+from alula.prove.skillset.abstract import Abstraction, Breaker
 
 Key = tuple[str, ...]
 """What fails: ``("effect" | "post", kind, names...)`` or ``("after start", skill, invariant)``, as in ``local.Suspect``."""

@@ -7,7 +7,7 @@ from collections.abc import Callable, Iterable, Mapping, Sequence
 from alula.language.counterexamples import Path, Value
 from alula.model.execution_state import ExecutionState
 from alula.model.situation import Change, Entered, Running, Step
-from alula.prove.steps import Key, Move
+from alula.prove.skillset.steps import Key, Move
 
 Name = Callable[[Running], str]
 """How an execution is called: ``goto``, or ``goto (execution 2)`` where several run."""

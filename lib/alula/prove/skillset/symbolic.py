@@ -10,16 +10,16 @@ from alula.language.counterexamples import Counterexample
 from alula.language.errors import Diagnostic, Severity
 from alula.model.expressions import Constant
 from alula.model.model import Property, PropertyKind, Skill, Skillset
-from alula.prove import counterexample, reachable
-from alula.prove.abstract import Abstraction
-from alula.prove.diagrams import Encoded
-from alula.prove.encoding import encode
 from alula.prove.limits import Deadline, OutOfTimeError
-from alula.prove.local import Suspect
-from alula.prove.properties import failed, lasso, true_in
-from alula.prove.sets import Sets
-from alula.prove.steps import Key, World
-from alula.prove.walk import MOST_IN_A_LOOP, Walker
+from alula.prove.skillset import counterexample, reachable
+from alula.prove.skillset.abstract import Abstraction
+from alula.prove.skillset.diagrams import Encoded
+from alula.prove.skillset.encoding import encode
+from alula.prove.skillset.local import Suspect
+from alula.prove.skillset.properties import failed, lasso, true_in
+from alula.prove.skillset.sets import Sets
+from alula.prove.skillset.steps import Key, World
+from alula.prove.skillset.walk import MOST_IN_A_LOOP, Walker
 
 
 def search(

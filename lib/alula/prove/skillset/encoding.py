@@ -15,9 +15,9 @@ from dd import cudd
 
 from alula.model.expressions import Expression, ResourceIs, atoms
 from alula.model.model import Effect, Event, Resource, Skill, Skillset
-from alula.prove.abstract import Abstraction, Breaker
-from alula.prove.diagrams import ENDED, Encoded, Update, Within, bits, broken_name, runs_name
 from alula.prove.limits import Deadline
+from alula.prove.skillset.abstract import Abstraction, Breaker
+from alula.prove.skillset.diagrams import ENDED, Encoded, Update, Within, bits, broken_name, runs_name
 
 
 def encode(abstraction: Abstraction, copies: int, deadline: Deadline) -> Encoded:

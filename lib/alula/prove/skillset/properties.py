@@ -17,9 +17,9 @@ from alula.language.counterexamples import Counterexample
 from alula.language.errors import Diagnostic, Severity
 from alula.model.expressions import And, Constant, Expression, Implies, Not, Or, ResourceIs, SkillRuns
 from alula.model.model import Property, PropertyKind
-from alula.prove import counterexample
-from alula.prove.explore import Edge, Graph
-from alula.prove.steps import State, World
+from alula.prove.skillset import counterexample
+from alula.prove.skillset.explore import Edge, Graph
+from alula.prove.skillset.steps import State, World
 
 
 def check_property(graph: Graph, wanted: Property, unknown: Collection[int] = ()) -> Diagnostic | None:

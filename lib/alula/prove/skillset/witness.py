@@ -9,7 +9,7 @@ from alula.language.counterexamples import Path, Values
 from alula.model.expressions import DataIs, Expression, Not, atoms
 from alula.model.model import Invariant, Skillset
 from alula.prove.limits import OutOfTimeError
-from alula.prove.solver import Solver
+from alula.prove.skillset.solver import Solver
 
 States = Mapping[str, str]
 

@@ -14,8 +14,8 @@ from itertools import pairwise
 from typing import Any
 
 from alula.model.model import Effect, Skill
-from alula.prove.diagrams import Encoded, Update, bits, runs_name
 from alula.prove.limits import Deadline
+from alula.prove.skillset.diagrams import Encoded, Update, bits, runs_name
 
 MOST_NODES = 100
 """For each variable. What makes a set's diagram larger is left out of it."""

@@ -18,7 +18,7 @@ from alula.model.expressions import TRUE, DataIs, Expression, ResourceIs, atoms
 from alula.model.model import NO_EFFECT, Effect, Event, Invariant, Result, ResultKind, Skill, Skillset
 from alula.model.span import NOWHERE, Span
 from alula.prove.limits import Deadline
-from alula.prove.solver import Solver
+from alula.prove.skillset.solver import Solver
 
 EFFECT_HINT = "a change must be an arrow from the state that the resource is in, unless it is in the wanted state already"
 

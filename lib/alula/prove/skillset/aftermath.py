@@ -12,8 +12,8 @@ from typing import Any
 
 from alula.model.expressions import ResourceIs, atoms
 from alula.model.model import Skill
-from alula.prove.bound import Bound
-from alula.prove.diagrams import Encoded, Update
+from alula.prove.skillset.bound import Bound
+from alula.prove.skillset.diagrams import Encoded, Update
 
 
 @dataclass(frozen=True)

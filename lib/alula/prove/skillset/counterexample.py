@@ -9,9 +9,9 @@ from __future__ import annotations
 from collections.abc import Iterable, Sequence
 
 from alula.language.counterexamples import Counterexample
-from alula.prove.explore import Edge, Graph
-from alula.prove.replay import Replay
-from alula.prove.steps import Key, Move, State, World
+from alula.prove.skillset.explore import Edge, Graph
+from alula.prove.skillset.replay import Replay
+from alula.prove.skillset.steps import Key, Move, State, World
 
 
 def of_way(graph: Graph, way: Sequence[Edge], last: Move | None = None, fault: Key = ()) -> Counterexample:

@@ -9,10 +9,10 @@ from alula.language.counterexamples import Counterexample
 from alula.language.errors import Diagnostic, Severity
 from alula.model.model import Skill, Skillset
 from alula.model.span import Span
-from alula.prove import counterexample
-from alula.prove.explore import Graph
-from alula.prove.local import Suspect
-from alula.prove.steps import Key, State
+from alula.prove.skillset import counterexample
+from alula.prove.skillset.explore import Graph
+from alula.prove.skillset.local import Suspect
+from alula.prove.skillset.steps import Key, State
 
 MANY = 6
 """More states of one resource than this are not listed one by one."""

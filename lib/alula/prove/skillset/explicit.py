@@ -4,13 +4,13 @@ from __future__ import annotations
 
 from alula.language.errors import Diagnostic
 from alula.model.model import Skillset
-from alula.prove.abstract import Abstraction
-from alula.prove.explore import explore
 from alula.prove.limits import Deadline
-from alula.prove.local import Suspect
-from alula.prove.properties import check_property
-from alula.prove.reachable import check_graph, crowded, decide
-from alula.prove.steps import World
+from alula.prove.skillset.abstract import Abstraction
+from alula.prove.skillset.explore import explore
+from alula.prove.skillset.local import Suspect
+from alula.prove.skillset.properties import check_property
+from alula.prove.skillset.reachable import check_graph, crowded, decide
+from alula.prove.skillset.steps import World
 
 
 def search(

@@ -9,9 +9,9 @@ from collections import deque
 from collections.abc import Iterator
 from typing import Any
 
-from alula.prove.explore import Edge, Graph
-from alula.prove.sets import Sets
-from alula.prove.steps import Key, Move, State, World
+from alula.prove.skillset.explore import Edge, Graph
+from alula.prove.skillset.sets import Sets
+from alula.prove.skillset.steps import Key, Move, State, World
 
 MOST_IN_A_LOOP = 500
 

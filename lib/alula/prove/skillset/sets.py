@@ -6,11 +6,11 @@ import heapq
 from collections.abc import Iterable, Iterator
 from typing import Any
 
-from alula.prove.aftermath import Aftermath, Group, Step
-from alula.prove.bound import Bound
-from alula.prove.diagrams import ENDED, Encoded, Update, Within, runs_name
 from alula.prove.limits import Deadline
-from alula.prove.steps import State
+from alula.prove.skillset.aftermath import Aftermath, Group, Step
+from alula.prove.skillset.bound import Bound
+from alula.prove.skillset.diagrams import ENDED, Encoded, Update, Within, runs_name
+from alula.prove.skillset.steps import State
 
 MANY_NODES = 200_000
 """From here on CUDD may look for a better order of the variables; below, its looking costs more than it gains (see ``bench``)."""

@@ -6,7 +6,7 @@ from collections import deque
 from dataclasses import dataclass, field
 
 from alula.prove.limits import Deadline
-from alula.prove.steps import Key, Move, State, World
+from alula.prove.skillset.steps import Key, Move, State, World
 
 
 @dataclass(frozen=True)

@@ -24,9 +24,9 @@ from alula.model.execution_state import ExecutionState
 from alula.model.expressions import Expression, Not
 from alula.model.model import Invariant, Skill
 from alula.model.situation import Change, Entered, Running, Situation, Step
-from alula.prove import words
-from alula.prove.steps import Key, Move, State, World
-from alula.prove.witness import States, Wish, Witness, data_atoms, fallen
+from alula.prove.skillset import words
+from alula.prove.skillset.steps import Key, Move, State, World
+from alula.prove.skillset.witness import States, Wish, Witness, data_atoms, fallen
 
 _KINDS: Mapping[str, StepKind] = {
     "extern": StepKind.EXTERN,
