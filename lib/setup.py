@@ -16,8 +16,6 @@ setup(
     package_data={
         "alula": ["py.typed"],
         "alula.console": ["page/*"],
-        "alula.language": ["examples.yaml"],
-        "alula.prove.skillset": ["examples.yaml"],
         "alula.generate.scaffold": ["robot/**/*.in"],
     },
     data_files=[("share/ament_index/resource_index/packages", ["resource/alula"]), ("share/alula", ["package.xml"])],

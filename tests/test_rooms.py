@@ -24,8 +24,6 @@ PAGE = ("lib/alula/console/page", "lib/alula/editor")
 """Programs of pages: every word counts, as no reader can tell which of them are shown."""
 GENERATED = {"lib/alula/generate"}
 """Texts of the library that become code of a robot, which imports ROS."""
-EXAMPLES = {"lib/alula/check/page.py", "lib/alula/prove/mission/page.py", "lib/alula/prove/bench.py"}
-"""Whole models that documents and benches show."""
 TYPES = "lib/alula/model/ros_types.py"
 """What types of models are called in ROS: names as data."""
 RULES = {
@@ -93,7 +91,7 @@ def test_no_room_knows_what_stands_on_it(room: str) -> None:
     found = [
         f"{path}:{line}: {match[0]}"
         for path in modules(room)
-        if not {str(one.relative_to(ALULA_ROOT)) for one in (path, path.parent)} & {*GENERATED, *EXAMPLES, TYPES}
+        if not {str(one.relative_to(ALULA_ROOT)) for one in (path, path.parent)} & {*GENERATED, TYPES}
         for line, name in names_in(path.read_text(encoding="utf-8"))
         for match in forbidden.finditer(name)
         if match[1] not in CONTRACT

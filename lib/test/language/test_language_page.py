@@ -10,12 +10,12 @@ import pytest
 from alula.language import paper, rl
 from alula.language.check import check
 from alula.language.codes import CODES, MISSION_CODES, PROOF_CODES, RUN_CODES
-from alula.language.examples import LANGUAGE, examples
 from alula.language.models import ModelFile, check_texts
 from alula.language.syntax.quantities import SECONDS
 from alula.model.json_form import to_json
 from alula.model.model import NO_EFFECT
 from alula.model.units import UNIT_IN_SI
+from finding_pages.examples import LANGUAGE, examples
 
 PAGE = next(p / "skillsets" / "LANGUAGE.md" for p in Path(__file__).resolve().parents if (p / "skillsets").is_dir()).read_text()
 PAPER = [paper.parse(f"skillset page {{ {text} }}") for text in re.findall(r"```skill\n(.*?)```", PAGE, re.DOTALL)]

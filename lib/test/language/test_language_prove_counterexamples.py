@@ -26,8 +26,9 @@ from alula.model.model import (
     Skillset,
     Transition,
 )
-from alula.prove import bench, limits, prove
+from alula.prove import limits, prove
 from alula.prove.skillset import sets
+from prove_bench import skillsets as bench
 
 BOTH = pytest.mark.parametrize("most", [2000, 0], ids=["one by one", "as sets"])
 GOTO = """

@@ -9,11 +9,11 @@ import pytest
 
 from alula.model.expressions import And, Not, ResourceIs, SkillRuns
 from alula.model.model import Property, PropertyKind, Skillset
-from alula.prove.bench import neighbours, sparse, tools
 from alula.prove.limits import Deadline
 from alula.prove.skillset import few
 from alula.prove.skillset.abstract import without_data
 from alula.prove.skillset.prover import prove
+from prove_bench.skillsets import neighbours, sparse, tools
 
 HANGS_S = 600.0
 ALL_ONE_BY_ONE = 10**6

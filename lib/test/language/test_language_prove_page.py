@@ -9,12 +9,12 @@ import pytest
 from alula.commands.check import main
 from alula.language.codes import PROOF_CODES
 from alula.language.errors import Severity, has_errors
-from alula.language.examples import PROOFS, examples
 from alula.language.models import check_files
 from alula.language.notation import Notation, read
 from alula.language.printer import print_file
 from alula.prove import prove
-from alula.prove.page import PAGES, page
+from finding_pages.examples import PROOFS, examples
+from finding_pages.skillsets import PAGES, page
 
 FOLDER = next(p / "skillsets" for p in Path(__file__).resolve().parents if (p / "skillsets" / "PROOFS.md").exists())
 EXAMPLES = examples(PROOFS)
@@ -32,7 +32,7 @@ def proved(tmp_path, text, **options):
 
 @pytest.mark.parametrize("name", PAGES)
 def test_the_pages_are_written_of_rules_and_examples(name):
-    """Mend with `python -m alula.prove.page skillsets`."""
+    """Mend with `python -m finding_pages.skillsets skillsets`."""
     text = (FOLDER / name).read_text()
     assert text == page(text, PAGES[name]())
 

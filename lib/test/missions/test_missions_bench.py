@@ -10,8 +10,8 @@ import pytest
 pytest.importorskip("z3")
 pytest.importorskip("py_trees")
 
-from alula.prove.mission import bench
-from alula.prove.mission.growth import picture
+from prove_bench import missions as bench
+from prove_bench.growth import picture
 
 ROOT = Path(__file__).resolve().parents[3]
 A_DAY_S = 86400.0

@@ -9,12 +9,12 @@ from pathlib import Path
 import pytest
 
 from alula.check.findings import findings_of
-from alula.check.page import NAME, ROBOT, found_in, page, whole
 from alula.commands.check import main
 from alula.language.codes import MISSION_CODES
 from alula.language.errors import Severity
-from alula.language.examples import MISSIONS, examples
 from alula.language.models import ModelFile, check_texts
+from finding_pages.examples import MISSIONS, examples
+from finding_pages.mission_checks import NAME, ROBOT, found_in, page, whole
 
 EXAMPLES = examples(MISSIONS)
 PAGE = next(p / "docs" / NAME for p in Path(__file__).resolve().parents if (p / "docs" / NAME).is_file())
@@ -96,7 +96,7 @@ def test_broken_and_mended_mission(code):
 
 
 def test_the_page_is_written_of_rules_and_examples():
-    """Mend with `python -m alula.check.page docs`."""
+    """Mend with `python -m finding_pages.mission_checks docs`."""
     assert PAGE.read_text() == page(PAGE.read_text())
 
 

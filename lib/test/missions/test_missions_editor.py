@@ -5,10 +5,10 @@ from __future__ import annotations
 import pytest
 from test_language_server import Editor
 
-from alula.check.page import ROBOT, whole
 from alula.editor.completion import Place
 from alula.editor.missions import Missions
 from alula.language.errors import Severity
+from finding_pages.mission_checks import ROBOT, whole
 
 
 @pytest.fixture

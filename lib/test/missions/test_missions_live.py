@@ -11,7 +11,6 @@ pytest.importorskip("z3")
 
 from test_missions_runs import ROOT, everything, robots, shown
 
-from alula.check.page import whole
 from alula.commands.mission_robot import models_of, part_of
 from alula.common.robots import find_robot
 from alula.missions.part import NO_PART
@@ -21,6 +20,7 @@ from alula.prove.mission.managers import Failures
 from alula.prove.mission.prover import prove_mission
 from alula.prove.mission.regions import Regions
 from alula.prove.mission.system import System
+from finding_pages.mission_checks import whole
 
 QUIET = Failures(hooks=False, refusals=False, aborts=False)
 LEAVES = (

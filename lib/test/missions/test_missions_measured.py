@@ -13,7 +13,6 @@ import pytest
 pytest.importorskip("z3")
 pytest.importorskip("py_trees")
 
-from alula.check.page import whole
 from alula.common.record import DATA as DATA_TOPIC
 from alula.common.record import read_record
 from alula.language.models import ModelFile, check_texts
@@ -31,6 +30,7 @@ from alula.prove.mission.prover import Proved, prove_mission
 from alula.prove.mission.run import MissionFinding
 from alula.trees.script import parse
 from alula.trees.script.scope import Unknown
+from finding_pages.mission_checks import whole
 
 MODEL = """
 type Battery

@@ -11,7 +11,6 @@ from pathlib import Path
 import pytest
 
 from alula.campaign.plan import load_campaign
-from alula.check.page import whole
 from alula.common.robots import find_robot
 from alula.language.models import ModelFile, check_texts
 from alula.missions.director import Outcome
@@ -20,7 +19,6 @@ from alula.missions.mocked import MockedMission
 from alula.missions.part import NO_PART, MissionPart
 from alula.mock import Behaviour
 from alula.model.model import Skillset
-from alula.prove.mission.page import ROBOT
 from alula.prove.mission.prover import LOOKED_AT
 from alula.prove.mission.state import State
 from alula.prove.mission.system import System
@@ -29,6 +27,8 @@ from alula.trees.node import SyncAction
 from alula.trees.palette import output_port
 from alula.trees.status import Answer
 from alula.trees.values import INT
+from finding_pages.mission_checks import whole
+from finding_pages.mission_proofs import ROBOT
 from mission_mutations import __main__ as study
 from mission_mutations import models, trees
 from mission_mutations.flights import NOTHING, OTHERWISE, REFUSED, WRONG, Flights

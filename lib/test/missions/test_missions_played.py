@@ -7,23 +7,23 @@ from pathlib import Path
 
 import pytest
 
-from alula.check.page import whole
 from alula.commands.check_missions import faults_of
 from alula.commands.mission_robot import models_of, part_of
 from alula.common.robots import find_robot
-from alula.language.examples import RUNS, examples
 from alula.language.models import ModelFile, check_texts
 from alula.missions.director import Outcome
 from alula.missions.part import NO_PART
 from alula.prove.limits import Deadline, OutOfTimeError
 from alula.prove.mission.answers import Answers
-from alula.prove.mission.page import ROBOT
 from alula.prove.mission.play import play
 from alula.prove.mission.prover import LOOKED_AT, prove_mission, prove_within
 from alula.prove.mission.regions import Regions
 from alula.prove.mission.run import MissionFinding, MissionRun
 from alula.prove.mission.state import Kind
 from alula.prove.mission.system import System
+from finding_pages.examples import RUNS, examples
+from finding_pages.mission_checks import whole
+from finding_pages.mission_proofs import ROBOT
 
 ROOT = Path(__file__).resolve().parents[3]
 EXAMPLES = examples(RUNS)

@@ -17,12 +17,10 @@ import pytest
 pytest.importorskip("z3")
 pytest.importorskip("py_trees")
 
-from alula.check.page import whole
 from alula.commands.check_missions import faults_of
 from alula.commands.mission_robot import models_of, part_of
 from alula.common.robots import find_robot
 from alula.language.codes import RUN_CODES
-from alula.language.examples import RUNS, examples
 from alula.language.models import ModelFile, check_texts
 from alula.missions.driver import MissionDriver
 from alula.missions.mission_file import plan_of_file
@@ -35,7 +33,6 @@ from alula.prove.mission.answers import Answers
 from alula.prove.mission.findings import findings
 from alula.prove.mission.managers import Failures
 from alula.prove.mission.oracle import UndecidedError
-from alula.prove.mission.page import NAME, ROBOT, found_in, page
 from alula.prove.mission.prover import Proved, prove_mission, prove_within
 from alula.prove.mission.regions import Regions
 from alula.prove.mission.state import State
@@ -47,6 +44,9 @@ from alula.trees.node import Condition, SyncAction
 from alula.trees.palette import input_port, output_port
 from alula.trees.status import FAILURE, RUNNING, SUCCESS, Answer
 from alula.trees.values import ANY, INT, STRING
+from finding_pages.examples import RUNS, examples
+from finding_pages.mission_checks import whole
+from finding_pages.mission_proofs import NAME, ROBOT, found_in, page
 
 ROOT = Path(__file__).resolve().parents[3]
 DOCS = ROOT / "docs"
@@ -152,7 +152,7 @@ def test_an_example_has_its_finding_and_its_cure_has_none(code: str) -> None:
 
 
 def test_the_page_is_written_from_the_examples() -> None:
-    """Mend with `python -m alula.prove.mission.page docs`."""
+    """Mend with `python -m finding_pages.mission_proofs docs`."""
     text = (DOCS / NAME).read_text(encoding="utf-8")
     assert page(text) == text
 

@@ -12,7 +12,6 @@ import pytest
 pytest.importorskip("z3")
 pytest.importorskip("py_trees")
 
-from alula.check.page import whole
 from alula.language.errors import Diagnostic, has_errors
 from alula.language.lexer import Source
 from alula.language.models import ModelFile, check_texts
@@ -24,13 +23,14 @@ from alula.prove.limits import Deadline
 from alula.prove.mission.conditions import Faults, faults_shown, true_in
 from alula.prove.mission.holding import held
 from alula.prove.mission.managers import Failures
-from alula.prove.mission.page import ROBOT
 from alula.prove.mission.play import play
 from alula.prove.mission.prover import LOOKED_AT, Proved, prove_mission
 from alula.prove.mission.regions import Regions
 from alula.prove.mission.run import MissionFinding
 from alula.prove.mission.state import State
 from alula.prove.mission.system import System
+from finding_pages.mission_checks import whole
+from finding_pages.mission_proofs import ROBOT
 
 TREE = "<Sequence><drone.lift/><drone.hover/></Sequence><drone.land/>"
 WAITS = '<Sequence name="up"><drone.lift/><WaitFor name="ours" if="drone.control == OURS"/></Sequence><drone.land/>'

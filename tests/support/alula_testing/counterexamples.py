@@ -5,10 +5,10 @@ from __future__ import annotations
 from pathlib import Path
 
 from alula.language.errors import Diagnostic
-from alula.language.examples import PROOFS, examples
 from alula.language.models import check_files
 from alula.model.model import Skillset
 from alula.prove import prove
+from finding_pages.examples import PROOFS, examples
 
 EXAMPLES = {code: example.broken for code, example in examples(PROOFS).items() if example.broken}
 DATA = """

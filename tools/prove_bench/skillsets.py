@@ -151,7 +151,7 @@ def _sizes(text: str) -> list[int]:
 
 def _all(sizes: Sequence[int], timeout_s: float) -> Iterator[dict[str, object]]:
     """Yield a row for each size, each measured in a process of its own; a method that stops is not tried with more."""
-    program = [sys.executable, "-m", "alula.prove.bench", "--timeout", str(timeout_s), "--one"]
+    program = [sys.executable, "-m", "prove_bench.skillsets", "--timeout", str(timeout_s), "--one"]
     for family in FAMILIES:
         for method in METHODS:
             for size in sizes:

@@ -1,6 +1,6 @@
 """Writes the findings of `skillsets/LANGUAGE.md` and `skillsets/PROOFS.md`: what stands below the line that begins with MARK.
 
-    python -m alula.prove.page skillsets
+    python -m finding_pages.skillsets skillsets
 
 The pages' text above that line is written by hand. Meanings come from `alula.language.codes`, examples from `examples.yaml` beside
 the rules, and what `check` prints of an example is what it prints.
@@ -16,9 +16,9 @@ from pathlib import Path
 from alula.common.files import write_text
 from alula.language.codes import CODES, PROOF_CODES
 from alula.language.errors import Diagnostic
-from alula.language.examples import LANGUAGE, PROOFS, Example, examples
 from alula.language.models import ModelFile, check_texts
 from alula.prove import prove
+from finding_pages.examples import LANGUAGE, PROOFS, Example, examples
 
 MARK = "<!-- Below this line: written by"
 
@@ -34,7 +34,7 @@ def main() -> int:
 def page(text: str, findings: str) -> str:
     """Return a page with its findings replaced."""
     above, _, _ = text.partition(MARK)
-    return f"{above}{MARK} `python -m alula.prove.page skillsets`, from the rules and their examples. -->\n\n{findings}"
+    return f"{above}{MARK} `python -m finding_pages.skillsets skillsets`, from the rules and their examples. -->\n\n{findings}"
 
 
 def language_findings() -> str:

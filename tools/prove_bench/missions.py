@@ -40,10 +40,10 @@ from alula.model.model import (
 from alula.prove.limits import Deadline, OutOfTimeError
 from alula.prove.mission.answers import Answers
 from alula.prove.mission.findings import findings
-from alula.prove.mission.growth import picture
 from alula.prove.mission.prover import LOOKED_AT
 from alula.prove.mission.regions import Regions
 from alula.prove.mission.system import System
+from prove_bench.growth import picture
 
 COMMAND = "alula bench missions"
 MAIN = "main_tree_to_execute="
@@ -219,7 +219,7 @@ def _all(robots: Sequence[Path], timeout_s: float) -> Iterator[dict[str, object]
 
 
 def _apart(family: str, size: str, timeout_s: float) -> dict[str, object]:
-    program = [sys.executable, "-m", "alula.prove.mission.bench", "--timeout", str(timeout_s), "--one", family, size]
+    program = [sys.executable, "-m", "prove_bench.missions", "--timeout", str(timeout_s), "--one", family, size]
     done = subprocess.run(program, check=True, stdout=subprocess.PIPE, text=True)
     row: dict[str, object] = json.loads(done.stdout)
     return row

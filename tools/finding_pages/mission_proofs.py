@@ -1,6 +1,6 @@
 """Writes the findings of docs/mission-proofs.md: what stands below the line that begins with MARK.
 
-python -m alula.prove.mission.page docs
+python -m finding_pages.mission_proofs docs
 """
 
 from __future__ import annotations
@@ -10,14 +10,14 @@ import tempfile
 from collections.abc import Iterator
 from pathlib import Path
 
-from alula.check.page import whole
 from alula.common.files import write_text
 from alula.language.codes import RUN_CODES
 from alula.language.errors import Diagnostic
-from alula.language.examples import RUNS, Example, examples
 from alula.language.models import ModelFile, check_texts
 from alula.missions.part import NO_PART
 from alula.prove.mission.prover import prove_mission
+from finding_pages.examples import RUNS, Example, examples
+from finding_pages.mission_checks import whole
 
 NAME = "mission-proofs.md"
 MARK = "<!-- Below this line: written by"
@@ -69,7 +69,7 @@ def page(text: str) -> str:
     above, _, _ = text.partition(MARK)
     known = examples(RUNS)
     sections = (line for code, meaning in RUN_CODES.items() for line in _section(code, meaning, known[code]))
-    return "\n".join([f"{above}{MARK} `python -m alula.prove.mission.page docs`, from the rules and their examples. -->\n", *sections])
+    return "\n".join([f"{above}{MARK} `python -m finding_pages.mission_proofs docs`, from the rules and their examples. -->\n", *sections])
 
 
 def found_in(text: str) -> list[Diagnostic]:

@@ -1,4 +1,4 @@
-"""The examples of findings: beside the rules of a package, its `examples.yaml` has a broken and a mended model of each code."""
+"""The examples of findings: `examples.yaml` beside the rules of a package has a broken and a mended model of each code."""
 
 from __future__ import annotations
 
@@ -32,4 +32,4 @@ LANGUAGE = "alula.language"
 PROOFS = "alula.prove.skillset"
 MISSIONS = "alula.check"
 RUNS = "alula.prove.mission"
-"""The packages that have examples. Proofs and missions are named only: nothing here imports them."""
+"""The packages that have examples."""

@@ -1,6 +1,6 @@
 """Writes the findings of docs/mission-checks.md: what stands below the line that begins with MARK.
 
-python -m alula.check.page docs
+python -m finding_pages.mission_checks docs
 """
 
 from __future__ import annotations
@@ -13,8 +13,8 @@ from alula.check.findings import findings_of
 from alula.common.files import write_text
 from alula.language.codes import MISSION_CODES
 from alula.language.errors import Diagnostic
-from alula.language.examples import MISSIONS, Example, examples
 from alula.language.models import ModelFile, check_texts
+from finding_pages.examples import MISSIONS, Example, examples
 
 NAME = "mission-checks.md"
 MARK = "<!-- Below this line: written by"
@@ -61,7 +61,7 @@ def page(text: str) -> str:
     above, _, _ = text.partition(MARK)
     known = examples(MISSIONS)
     sections = (line for code, meaning in MISSION_CODES.items() for line in _section(code, meaning, known[code]))
-    head = f"{MARK} `python -m alula.check.page docs`, from the rules and their examples. -->"
+    head = f"{MARK} `python -m finding_pages.mission_checks docs`, from the rules and their examples. -->"
     return "\n".join([f"{above}{head}\n", *sections])
 
 

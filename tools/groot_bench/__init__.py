@@ -1,0 +1,1 @@
+"""What it costs a mission that its tree is watched by Groot2."""
