@@ -3,4 +3,4 @@
 import sys
 from pathlib import Path
 
-sys.path.extend(str(room) for room in sorted(Path(__file__).parent.iterdir()) if room.is_dir())
+sys.path.extend(sorted({str(module.parent) for module in Path(__file__).parent.glob("*/**/*.py")}))

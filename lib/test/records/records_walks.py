@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import random
 
-from language_prove_models import VALUES
+from prove_models import VALUES
 
 from alula.runtime.core import SkillsetEngine
 from alula_testing.recorder import Recorder

@@ -8,7 +8,7 @@ from dataclasses import replace
 import pytest
 from hypothesis import HealthCheck, given, settings
 from hypothesis import strategies as st
-from language_prove_models import skillsets
+from prove_models import skillsets
 from records_walks import Walk
 
 from alula.model.execution_state import ExecutionState as S

@@ -7,7 +7,7 @@ import json
 from dataclasses import replace
 
 import pytest
-from test_language_prove_page import FOLDER, proved
+from test_prove_page import FOLDER, proved
 
 from alula.language.load import check_file
 from alula.model.expressions import Comparison, DataIs, ResourceIs, SkillRuns

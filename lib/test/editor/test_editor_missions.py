@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import pytest
-from test_language_server import Editor
+from test_editor_server import Editor
 
 from alula.editor.completion import Place
 from alula.editor.missions import Missions

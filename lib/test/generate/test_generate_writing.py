@@ -6,7 +6,7 @@ import shutil
 from pathlib import Path
 
 import pytest
-from language_rover import SKILL
+from generate_rover import SKILL
 
 from alula.generate import robot_files
 from alula.generate.__main__ import main

@@ -25,7 +25,7 @@ from finding_pages.examples import RUNS, examples
 from finding_pages.mission_checks import whole
 from finding_pages.mission_proofs import ROBOT
 
-ROOT = Path(__file__).resolve().parents[3]
+ROOT = Path(__file__).resolve().parents[4]
 EXAMPLES = examples(RUNS)
 
 

@@ -48,7 +48,7 @@ from finding_pages.examples import RUNS, examples
 from finding_pages.mission_checks import whole
 from finding_pages.mission_proofs import NAME, ROBOT, found_in, page
 
-ROOT = Path(__file__).resolve().parents[3]
+ROOT = Path(__file__).resolve().parents[4]
 DOCS = ROOT / "docs"
 EXAMPLES = examples(RUNS)
 SHOWN = [code for code, example in EXAMPLES.items() if example.broken]

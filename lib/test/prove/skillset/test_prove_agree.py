@@ -8,7 +8,7 @@ import random
 import pytest
 from hypothesis import HealthCheck, given, settings
 from hypothesis import strategies as st
-from language_prove_models import VALUES, skillsets, sparse_skillsets
+from prove_models import VALUES, skillsets, sparse_skillsets
 
 from alula.model import semantics
 from alula.model.conditions import holds

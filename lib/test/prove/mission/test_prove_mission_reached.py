@@ -11,7 +11,7 @@ import pytest
 
 pytest.importorskip("z3")
 
-from test_missions_runs import PART, PICKED, robots, tree, with_visit
+from test_prove_mission_runs import PART, PICKED, robots, tree, with_visit
 
 from alula.prove.mission.managers import Failures
 from alula.prove.mission.play import LeftError, _Player

@@ -13,7 +13,7 @@ pytest.importorskip("py_trees")
 from prove_bench import missions as bench
 from prove_bench.growth import picture
 
-ROOT = Path(__file__).resolve().parents[3]
+ROOT = Path(__file__).resolve().parents[4]
 A_DAY_S = 86400.0
 
 

@@ -9,7 +9,7 @@ import pytest
 
 pytest.importorskip("z3")
 
-from test_missions_runs import ROOT, everything, robots, shown
+from test_prove_mission_runs import ROOT, everything, robots, shown
 
 from alula.commands.mission_robot import models_of, part_of
 from alula.common.robots import find_robot

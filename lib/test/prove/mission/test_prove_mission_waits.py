@@ -10,7 +10,7 @@ import pytest
 pytest.importorskip("z3")
 pytest.importorskip("py_trees")
 
-from test_missions_wanted import FAULTS, TREE, TREES, proved, read, skillsets, written
+from test_prove_mission_wanted import FAULTS, TREE, TREES, proved, read, skillsets, written
 
 from alula.missions.part import NO_PART
 from alula.prove.limits import Deadline, OutOfTimeError

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import pytest
-from language_rover import BINDINGS, SKILL, TYPES
+from generate_rover import BINDINGS, SKILL, TYPES
 
 from alula.generate import robot_files
 from alula.language.load import load_robot

@@ -8,7 +8,7 @@ import shutil
 from pathlib import Path
 
 import pytest
-from records_mocks import fly_recorded
+from campaign_mocks import fly_recorded
 
 from alula.campaign.plan import SIMULATOR, PlannedRun, load_campaign
 from alula.campaign.rows import rows_of

@@ -11,7 +11,7 @@ from collections import Counter
 from dataclasses import asdict
 
 import pytest
-from records_mocks import fly_recorded
+from campaign_mocks import fly_recorded
 
 from alula.campaign.__main__ import main
 from alula.campaign.coverage import cover, is_troubled, processes
