@@ -40,6 +40,43 @@ RULES = {
     "flight": rf"{DRONE}|{DRONE_WORDS}",
 }
 
+LIBRARY = ALULA_ROOT / "lib/alula"
+ROOMS = {
+    # The core path.
+    "model": "",
+    "common": "",
+    "language": "common model",
+    "generate": "language model",
+    "runtime": "common model",
+    "mock": "common model runtime",
+    "trees": "common",
+    "missions": "common mock model runtime trees",
+    "check": "common language missions model trees",
+    "records": "common language missions mock model runtime",
+    "report": "common model records runtime",
+    # What stands on it.
+    "prove": "common language missions model runtime trees",
+    "odds": "common missions model prove records",
+    "campaign": "common missions mock model prove records runtime trees",
+    "console": "common model records report runtime",
+    "editor": "check common language missions model prove trees",
+    # On top; nobody imports them.
+    "commands": "campaign check common console language missions mock model odds prove records report runtime trees",
+    "cli": "campaign check commands common console editor generate",
+}
+"""The rooms of the library from below, each with those that it may import."""
+WRONG = {
+    "alula.missions.scenario -> alula.language.errors",
+    "alula.missions.scenario -> alula.language.fleet",
+    "alula.missions.skill_types -> alula.language.syntax.elements",
+    "alula.report.making -> alula.console.entries",
+    "alula.report.making -> alula.console.page",
+    "alula.runtime.counterexample_play -> alula.language.counterexamples",
+    "alula.runtime.counterexample_play -> alula.language.outside",
+    "alula.trees.groot.values -> alula.runtime.plain",
+}
+"""What doesn't fit the table yet. This list only gets shorter."""
+
 
 def texts() -> Iterator[tuple[Path, str]]:
     """Yield each text below, but for tests."""
@@ -111,6 +148,42 @@ def test_no_page_knows_the_drone() -> None:
         if match[1] not in CONTRACT
     ]
     assert not found, "\n".join(found)
+
+
+def rooms_named(path: Path) -> Iterator[str]:
+    """Yield the modules of the library that one of its modules names; ``alula`` itself where it imports the library's face."""
+    for node in ast.walk(ast.parse(path.read_text(encoding="utf-8"))):
+        if isinstance(node, ast.ImportFrom) and node.module == "alula":
+            yield from (f"alula.{alias.name}" if alias.name in ROOMS else "alula" for alias in node.names)
+    if str(path.parent.relative_to(ALULA_ROOT)) in GENERATED:  # its strings name what a robot's code imports
+        yield from (name for _, name in names_in(path.read_text(encoding="utf-8")) if re.fullmatch(r"alula(\.\w+)+", name))
+    else:
+        for _, name in names_in(path.read_text(encoding="utf-8")):
+            yield from (found[0] for found in re.finditer(r"(?<![\w./])alula\.(\w+)(\.\w+)*", name) if found[1] in ROOMS)
+
+
+def room_of(name: str) -> str:
+    """Return the room of a module of the library; empty: the library's face."""
+    return name.partition(".")[2].partition(".")[0]
+
+
+def test_every_arrow_between_rooms_of_the_library_is_in_the_table() -> None:
+    found = set()
+    for path in modules("lib/alula"):
+        name = ".".join(path.relative_to(LIBRARY.parent).with_suffix("").parts).removesuffix(".__init__")
+        if not (room := room_of(name)):
+            continue  # the library's face looks into all rooms
+        assert room in ROOMS, f"{path}: the room {room} has no row in ROOMS"
+        allowed = {room, *ROOMS[room].split()}
+        found |= {f"{name} -> {other}" for other in rooms_named(path) if room_of(other) not in allowed}
+    assert not found - WRONG, "not in ROOMS:\n" + "\n".join(sorted(found - WRONG))
+    assert not WRONG - found, "these are gone, take them out of WRONG:\n" + "\n".join(sorted(WRONG - found))
+
+
+def test_the_table_of_rooms_points_down() -> None:
+    """Each room may import only such as stand before it: so there is no circle among rooms."""
+    names = list(ROOMS)
+    assert not {(name, other) for at, name in enumerate(names) for other in ROOMS[name].split() if other not in names[:at]}
 
 
 def test_the_engine_needs_no_parser() -> None:
