@@ -8,6 +8,7 @@ from enum import Enum
 from typing import Protocol
 
 from py_trees.behaviour import Behaviour
+from py_trees.behaviours import Failure
 from py_trees.common import Status
 
 from alula.missions.blackboard import Blackboard
@@ -162,7 +163,7 @@ class Director:
             return "the mission is over already"
         if self.start_s is None:
             return "the mission has not started"
-        return "the robot is being stopped already" if self._stop is not None or self._mission.stopping else ""
+        return "the robot is being stopped already" if self._stops else ""
 
     def pause(self) -> str:
         """Tick the tree no more until `resume`, and have the skills that can hold hold; return what was asked for, in words.
@@ -198,18 +199,26 @@ class Director:
         if self.start_s is None:
             self.end = End(Outcome.ABORTED, reason)
             return "the mission does not start"
-        if self._stop is not None or self._mission.stopping:
+        if self._stops:
             return "the robot is being stopped already"
         self._leave(reason)
         return "the robot stops where it is"
 
-    def broken(self, reason: str) -> None:
-        """Leave a tree that has raised an error: the mission's, also on its way to rest, for what stops the robot; that one for good."""
-        if self._stop is None:
-            self._leave(reason)
+    def broken(self, reason: str, *, ticked: bool = True) -> None:
+        """Leave a tree that has raised an error: the mission's, also on its way to rest, for what stops the robot; that one for good.
+
+        A mission that has not started moves nothing: it could not start. ``ticked`` False: no node has raised, but what records or
+        shows the mission; what stops the robot goes on then.
+        """
+        if self.end is not None:
             return
-        self._abort_reason = "; then ".join([self._abort_reason, reason, *halted(self._stop)])
-        self._phase = self._settle
+        if self.start_s is None:
+            self.end = End(Outcome.NOT_STARTED, reason)
+        elif self._stop is None:
+            self._leave(reason)
+        elif ticked:
+            self._abort_reason = "; then ".join([self._abort_reason, reason, *halted(self._stop)])
+            self._phase = self._settle
 
     def conditions(self) -> list[Condition]:
         """Return what the mission needs to start; nothing once it has started, or is over."""
@@ -229,10 +238,22 @@ class Director:
         stop = self._stop_watch.look()
         return NodeView("aborted mission", "sequence", stop.status, self._abort_reason, "", (tree, stop))
 
+    @property
+    def _stops(self) -> bool:
+        try:
+            return self._stop is not None or self._mission.stopping
+        except Exception:  # noqa: BLE001 - a mission that can't tell may be stopped once more; one that can't be stopped may not be
+            return False
+
     def _leave(self, reason: str) -> None:
         self._pause = None
-        self._abort_reason = "; then ".join([reason, *halted(self._mission.root)])
-        self._stop = self._mission.stop_here()
+        said = [reason, *halted(self._mission.root)]
+        try:
+            self._stop = self._mission.stop_here()
+        except Exception as error:  # noqa: BLE001 - whatever keeps it from being made, the mission has to end
+            said.append(f"what stops the robot can't be made: {type(error).__name__}: {error}")
+            self._stop = Failure("stop_here")
+        self._abort_reason = "; then ".join(said)
         self._stop_watch = TreeWatch(self._stop)
         self._phase = self._halt
 

@@ -3,11 +3,12 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping
+from typing import TypeVar
 
 from alula.missions.director import START_TIMEOUT_S, Director, End
 from alula.missions.leaves import skill_leaf
 from alula.missions.pausing import PauseRefusedError
-from alula.missions.plan import MissionPlan
+from alula.missions.plan import InputError, MissionPlan
 from alula.missions.record import MissionRecord
 from alula.missions.skillset import Client, Clock
 from alula.missions.treeview import path_of
@@ -16,6 +17,7 @@ from alula.runtime.core.events import EngineEvent
 
 TICK_PERIOD_S = 0.1
 Job = Callable[[], None]
+T = TypeVar("T")
 MakeClient = Callable[[str, Job], Client]
 """Makes a skillset's client of its name, and of what has the tree ticked."""
 
@@ -43,6 +45,7 @@ class MissionDriver:
         groot: ``HOST:PORT`` where viewers find the tree of a mission that is a file; empty: nowhere.
 
     Raises:
+        InputError: the mission can't be made.
         ServerError: the tree can't be shown to viewers.
     """
 
@@ -69,8 +72,14 @@ class MissionDriver:
         self._soon = soon
         self._say = say
         self._aborts: list[str] = []
+        self._problems: list[str] = []
         clients = {name: client(name, self.wake) for name in plan.skillsets}
-        mission, self.blackboard = plan.make(clients, clock_ns, parameters)
+        try:
+            mission, self.blackboard = plan.make(clients, clock_ns, parameters)
+        except InputError:
+            raise
+        except Exception as error:  # also a robot's own nodes are made here
+            raise InputError(f"the mission can't be made: {type(error).__name__}: {error}") from error
         self.leaves = [(leaf, path_of(node)) for node in mission.root.iterate() if (leaf := skill_leaf(node)) is not None]
         self._watched = watched(mission, clock_ns, record, groot)
         self.director = Director(mission, self.blackboard, start_timeout_s=start_timeout_s, serves=plan.serves)
@@ -101,23 +110,44 @@ class MissionDriver:
             self.abort(self._aborts.pop())
             self._aborts.clear()
         if self.record is not None:
-            self.record.tick(self.director)
+            self.record.tick(self._guarded(self.director.conditions) or [])
+        self._guarded(self.director.step)
+        self._note_step()
+
+    def show(self, act: Job) -> None:
+        """Do what shows the mission; where it raises, the mission is aborted as by an error of its tree."""
         try:
-            self.director.step()
+            act()
+        except Exception as error:  # noqa: BLE001 - whatever breaks, the robot has to come to rest
+            self._unaccounted(f"the mission can't be shown: {type(error).__name__}: {error}")
+
+    def _guarded(self, act: Callable[[], T]) -> T | None:
+        """Do what asks the tree; where it raises, the tree is left."""
+        try:
+            return act()
         except Exception as error:  # noqa: BLE001 - whatever breaks in a tree, the robot has to come to rest
             reason = f"the tree raised {type(error).__name__}: {error}"
             self._say(reason)
             self.director.broken(reason)
-        self._note_step()
+            return None
+
+    def _unaccounted(self, reason: str) -> None:
+        """Leave the tree of a mission that can't be recorded or shown; once, as what raises may do so at each tick."""
+        if not self._problems:
+            self._problems.append(reason)
+            self._say(reason)
+            self.director.broken(reason, ticked=False)
 
     def _note_step(self) -> None:
         if self._watched is not None:
-            self._watched.commit()
+            self.show(self._watched.commit)
         held = self.director.news_of_pause()
         if self.record is not None:
             if held:
                 self.record.told("paused", held)
             self.record.outcome_of_tick(self.director)
+            if self.record.failure:
+                self._unaccounted(self.record.failure)
         elif self.remembers:
             self.director.remember()
 
@@ -175,7 +205,8 @@ class MissionDriver:
 
     def finish(self, end: End) -> None:
         """Write what is left to write, and show the tree no more."""
-        problems = [] if self._watched is None else self._watched.close()
+        if self._watched is not None:
+            self.show(self._watched.close)
         if self.record is not None:
-            self.record.problems += problems
+            self.record.problems += self._problems + ([] if self._watched is None else self._watched.problems)
             self.record.finish(end, self.director, self._clock_ns() / 1e9)

@@ -2,13 +2,16 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping, Sequence
+from functools import wraps
 from pathlib import Path
+from typing import Concatenate, ParamSpec
 
 from alula.common import run_log
 from alula.common.files import write_text
 from alula.common.record import BLACKBOARD, DATA, DECISIONS, EVENTS, FILE, MISSION, OPERATOR, REPORTS, TICKS, TREE, RecordWriter
 from alula.common.robots import RobotError, find_robot
+from alula.missions.conditions import Condition
 from alula.missions.director import Director, End, Outcome
 from alula.missions.drawing import draw
 from alula.missions.plan import MissionPlan
@@ -21,16 +24,33 @@ from alula.trees.view import NodeView
 
 TREE_LOG, STOP_LOG = "mission.btlog", "stop_here.btlog"
 """Of a mission that is a file, and of what brought the robot to rest after it was left."""
+P = ParamSpec("P")
+
+
+def _kept(method: Callable[Concatenate[MissionRecord, P], None]) -> Callable[Concatenate[MissionRecord, P], None]:
+    """Have a method of a record note what it raises: whoever tells of an event or a decision has to go on."""
+
+    @wraps(method)
+    def kept(self: MissionRecord, /, *args: P.args, **kwargs: P.kwargs) -> None:
+        try:
+            method(self, *args, **kwargs)
+        except Exception as error:  # noqa: BLE001 - values of robots, of any kind
+            self.failure = self.failure or f"the mission can't be recorded: {type(error).__name__}: {error}"
+
+    return kept
 
 
 class MissionRecord:
     """Writes ``skills.mcap`` and ``mission.btlog`` on the way, ``tree.svg`` at the end.
 
-    A folder that can't be written to any more ends the record and not the mission; ``problems`` says so.
+    A folder that can't be written to any more ends the record and not the mission; ``problems`` says so. Nothing raises here: what can't
+    be written, whatever the reason, is told by ``failure``, upon which the mission's driver has the robot come to rest.
     """
 
     def __init__(self, out: Path, plan: MissionPlan, clock_ns: Clock, parameters: Mapping[str, float]) -> None:
         self.problems: list[str] = []
+        self.failure = ""
+        """What first kept something from being recorded, other than the folder; empty: nothing did."""
         self._out = out
         self._plan = plan
         self._clock_ns = clock_ns
@@ -57,6 +77,7 @@ class MissionRecord:
 
     # --- what the mission comes to know ------------------------------------------------------------------------------
 
+    @_kept
     def event(self, event: EngineEvent) -> None:
         """Write an event of a skillset."""
         self._writer.write(EVENTS, event.stamp_ns, event_record(event))
@@ -65,12 +86,14 @@ class MissionRecord:
         elif self._departure_s is None and self._departure == (event.resource, event.from_state):
             self._departure_s = event.stamp_s
 
+    @_kept
     def report(self, skillset: str, handle: SkillHandle) -> None:
         """Write what the tree is told of an execution."""
         told = {"skillset": skillset, "skill": handle.skill, "id": handle.id, "state": handle.state.value, "progress": handle.progress}
         told |= {"result": handle.result, "message": handle.message, "outputs": to_plain(handle.outputs)}
         self._write(REPORTS, told)
 
+    @_kept
     def sample(self, skillset: str, data: str, value: object, stamp_ns: int | None) -> None:
         """Write a value of a data; ``stamp_ns`` None: it is not known when it came, so it is now."""
         stamp_ns = self._clock_ns() if stamp_ns is None else stamp_ns
@@ -88,6 +111,7 @@ class MissionRecord:
         """Write that the mission is told from outside to stop; to be called before it does."""
         self.told("abort", reason)
 
+    @_kept
     def told(self, command: str, reason: str) -> None:
         """Write what the mission is told from outside (``abort``, ``pause``, ``resume``) before it obeys, and what came of it (``paused``).
 
@@ -97,18 +121,20 @@ class MissionRecord:
 
     # --- what the mission does ---------------------------------------------------------------------------------------
 
-    def tick(self, director: Director) -> None:
-        """Write that the tree is ticked now; to be called before it is."""
-        conditions = director.conditions()
+    @_kept
+    def tick(self, conditions: Sequence[Condition]) -> None:
+        """Write that the tree is ticked now, and what the mission needs to start, before it has; to be called before it is."""
         known = {"conditions": [[one.needed, one.unmet] for one in conditions]} if conditions else {}
         self._write(TICKS, {"unmet": [one.unmet for one in conditions if one.unmet], **known})
 
+    @_kept
     def decision(self, kind: str, skillset: str, skill: str, execution_id: str, inputs: Mapping[str, object]) -> None:
         """Write a request of the tree."""
         self._decisions += 1
         what: dict[str, object] = {"number": self._decisions, "kind": kind, "skillset": skillset, "skill": skill, "id": execution_id}
         self._write(DECISIONS, {**what, "inputs": to_plain(inputs)})
 
+    @_kept
     def outcome_of_tick(self, director: Director) -> None:
         """Write what a tick has changed in the tree and on the blackboard."""
         view = director.view()
@@ -123,16 +149,23 @@ class MissionRecord:
 
     def finish(self, end: End, director: Director, end_s: float) -> None:
         """Write what is left to write."""
-        view = director.view()
-        title = f"Mission {self._plan.scenario}: {end.outcome.value.replace('_', ' ')}"
-        try:
-            write_text(self._out / "tree.svg", draw(view, title))
-        except OSError as error:
-            self.problems.append(f"the tree could not be written: {error.strerror or error}")
+        self._draw(end, director)
         self._write_mission(end, director.start_s, end_s)
         self._writer.close()
 
     # --- inside ------------------------------------------------------------------------------------------------------
+
+    @_kept
+    def _ask_facts(self, facts: dict[str, object]) -> None:
+        facts |= to_plain(self._plan.facts())
+
+    @_kept
+    def _draw(self, end: End, director: Director) -> None:
+        title = f"Mission {self._plan.scenario}: {end.outcome.value.replace('_', ' ')}"
+        try:
+            write_text(self._out / "tree.svg", draw(director.view(), title))
+        except OSError as error:
+            self.problems.append(f"the tree could not be written: {error.strerror or error}")
 
     def _write(self, topic: str, content: Mapping[str, object]) -> None:
         self._writer.write(topic, self._clock_ns(), content)
@@ -140,6 +173,10 @@ class MissionRecord:
     def _write_mission(self, end: End, start_s: float | None, end_s: float | None) -> None:
         if self._writer.error and self._writer.error not in self.problems:
             self.problems.append(self._writer.error)
+        facts: dict[str, object] = {}
+        self._ask_facts(facts)
+        if self.failure and self.failure not in self.problems:
+            self.problems.append(self.failure)
         content = {
             "scenario": self._plan.scenario,
             "outcome": end.outcome.value,
@@ -148,9 +185,9 @@ class MissionRecord:
             "lift_off_s": self._departure_s,
             "end_s": end_s,
             "parameters": self._parameters,
-            "inputs": self._plan.inputs,
+            "inputs": to_plain(self._plan.inputs),
             "problems": self.problems,
-            **self._plan.facts(),
+            **facts,
         }
         self._write(MISSION, content)
         if self._writer.error:

@@ -20,7 +20,8 @@ class WatchedTree:
     def __init__(self, mission: FiledMission, clock_ns: Clock, record: MissionRecord | None, groot: str) -> None:
         self._clock_us = lambda: clock_ns() // 1000
         self._record = record
-        self._problems: list[str] = []
+        self.problems: list[str] = []
+        """What went wrong with logs and viewers."""
         self._watch = Watch(mission.tree, self._clock_us)
         self._server = None
         if groot:
@@ -37,14 +38,20 @@ class WatchedTree:
         """Hand on what a step has changed."""
         self._watch.commit()
 
-    def close(self) -> list[str]:
-        """End both; return what went wrong with logs."""
+    def close(self) -> None:
+        """End both."""
         if self._server is not None:
             self._server.close()
         self._close_watch()
-        return self._problems
 
     def _follow(self, stop: Tree) -> None:
+        """Show what stops the robot from now on; it has to be ticked, whether it can be shown or not."""
+        try:
+            self._show(stop)
+        except Exception as error:  # noqa: BLE001 - whatever breaks here, the robot has to come to rest
+            self.problems.append(f"what stops the robot can't be shown: {type(error).__name__}: {error}")
+
+    def _show(self, stop: Tree) -> None:
         self._close_watch()
         self._watch = Watch(stop, self._clock_us)
         if self._record is not None:
@@ -55,7 +62,7 @@ class WatchedTree:
     def _close_watch(self) -> None:
         problem = self._watch.close()
         if problem:
-            self._problems.append(problem)
+            self.problems.append(problem)
 
 
 def watched(mission: Mission, clock_ns: Clock, record: MissionRecord | None, groot: str) -> WatchedTree | None:

@@ -9,18 +9,21 @@ import pytest
 
 pytest.importorskip("py_trees")
 
+from hypothesis import given
+from hypothesis import strategies as st
 from py_trees.behaviour import Behaviour
-from py_trees.behaviours import Success
 from py_trees.common import Status
 
-from alula.common.record import OPERATOR, TICKS, TREE, read_record
+from alula.common.record import EVENTS, MISSION, OPERATOR, TICKS, TREE, read_record
 from alula.missions.blackboard import Blackboard
-from alula.missions.director import Outcome
+from alula.missions.conditions import Condition
+from alula.missions.director import End, Outcome
 from alula.missions.driver import MissionDriver
 from alula.missions.pausing import PauseRefusedError
 from alula.missions.pending import PendingInterrupts
-from alula.missions.plan import MissionPlan
+from alula.missions.plan import InputError, MissionPlan
 from alula.missions.record import MissionRecord
+from alula.runtime.core.events import TransitionEvent
 
 
 class Clock:
@@ -32,19 +35,56 @@ class Clock:
 
 
 class Tree:
-    """A mission that goes on until the test has it end or break."""
+    """A mission that goes on until the test has it end or break; what is in ``raises`` raises, and ``stops`` tells how it is stopped."""
 
-    degraded = stopping = False
+    degraded = False
 
     def __init__(self) -> None:
-        self.status, self.broken = Status.RUNNING, False
+        self.status, self.broken, self.ready = Status.RUNNING, False, True
+        self.raises: set[str] = set()
+        self.stops: list[Stop] = []
         self.root: Behaviour = Root(self)
 
+    @property
+    def stopping(self) -> bool:
+        self.may_raise("stopping")
+        return False
+
     def conditions(self) -> list:
-        return []
+        self.may_raise("conditions")
+        return [Condition("the robot is ready", "" if self.ready else "it is not")]
 
     def stop_here(self) -> Behaviour:
-        return Success("stands")
+        self.may_raise("stop_here")
+        self.stops.append(Stop())
+        return self.stops[-1]
+
+    def facts(self) -> dict:
+        self.may_raise("facts")
+        return {}
+
+    def may_raise(self, what: str) -> None:
+        if what in self.raises:
+            raise ZeroDivisionError(f"no {what}")
+
+
+class Stop(Behaviour):
+    """Takes three ticks to bring the robot to rest."""
+
+    def __init__(self) -> None:
+        super().__init__("stop_here")
+        self.ticks = 0
+
+    def update(self) -> Status:
+        self.ticks += 1
+        return Status.RUNNING if self.ticks < 3 else Status.SUCCESS
+
+
+class Unwritable:
+    """What nobody can make text of."""
+
+    def __str__(self) -> str:
+        raise ZeroDivisionError("no text")
 
 
 class Root(Behaviour):
@@ -61,15 +101,17 @@ class Root(Behaviour):
 class Host:
     """Has jobs done when the test says so."""
 
-    def __init__(self, out: Path) -> None:
+    def __init__(self, out: Path, *, recorded: bool = True) -> None:
         self.clock, self.tree, self.jobs, self.said = Clock(), Tree(), list[Callable[[], None]](), list[str]()
         self.out = out
+        self.entries: dict[str, object] = {}
 
         def make(_clients: Mapping, _clock: object, _values: Mapping) -> tuple[Tree, Blackboard]:
-            return self.tree, Blackboard(clock_ns=self.clock.ns, pending=PendingInterrupts(self.clock.ns))
+            pending = PendingInterrupts(self.clock.ns)
+            return self.tree, Blackboard(clock_ns=self.clock.ns, pending=pending, entries=lambda: self.entries)
 
-        plan = MissionPlan("patrol", (), make)
-        record = MissionRecord(out, plan, self.clock.ns, {})
+        plan = MissionPlan("patrol", (), make, facts=self.tree.facts)
+        record = MissionRecord(out, plan, self.clock.ns, {}) if recorded else None
         client = lambda _name, _wake: None  # noqa: E731
         self.driver = MissionDriver(plan, client, self.clock.ns, {}, record=record, soon=self.jobs.append, say=self.said.append)
 
@@ -103,7 +145,7 @@ def test_several_events_at_a_moment_make_one_tick(host: Host) -> None:
 def test_a_tree_that_raises_brings_the_robot_to_rest_and_is_told(host: Host) -> None:
     host.wake(2)
     host.tree.broken = True
-    for _ in range(4):
+    for _ in range(6):
         host.wake()
     assert host.driver.end is not None
     assert (host.driver.end.outcome, host.driver.end.reason) == (Outcome.ABORTED, "the tree raised ZeroDivisionError: no such way")
@@ -114,7 +156,7 @@ def test_a_signals_abort_is_obeyed_by_the_next_tick_and_written_before_it(host: 
     host.wake()
     host.driver.ask_abort("told to end by SIGINT")
     assert host.written(OPERATOR) == []
-    for _ in range(4):
+    for _ in range(6):
         host.wake()
     assert host.written(OPERATOR) == [{"command": "abort", "by": "mission", "reason": "told to end by SIGINT"}]
     assert host.driver.end is not None
@@ -155,3 +197,129 @@ def test_regular_ticks_end_with_the_mission(host: Host) -> None:
     assert host.driver.end is not None
     assert host.driver.end.outcome is Outcome.ACCOMPLISHED
     assert waiting == []
+
+
+# --- whatever raises -----------------------------------------------------------------------------------------------------
+
+
+def spoil_root(host: Host) -> None:
+    host.tree.broken = True
+
+
+def spoil_entry(host: Host) -> None:
+    host.entries["odd"] = Unwritable()
+
+
+def spoil_message(host: Host) -> None:
+    host.tree.root.feedback_message = Unwritable()
+
+
+def spoil_event(host: Host) -> None:
+    host.driver.event(TransitionEvent(1, host.clock.now_ns, "wheels", Unwritable(), "USED", "extern"))  # type: ignore[arg-type]
+
+
+def spoil_page(host: Host) -> None:
+    host.driver.show(lambda: host.tree.may_raise("page"))
+
+
+def raising(name: str) -> Callable[[Host], None]:
+    return lambda host: host.tree.raises.add(name)
+
+
+SPOILS = {
+    "root": spoil_root,
+    "entry": spoil_entry,
+    "message": spoil_message,
+    "event": spoil_event,
+    "page": spoil_page,
+    "stopping": raising("stopping"),
+    "stop_here": raising("stop_here"),
+    "facts": raising("facts"),
+    "conditions": raising("conditions"),
+}
+ASK_ONLY_AT_THE_END = {"stopping", "stop_here", "facts"}
+
+
+def ended(host: Host) -> End:
+    for _ in range(10):
+        host.wake()
+    assert host.driver.end is not None
+    host.driver.finish(host.driver.end)
+    return host.driver.end
+
+
+@pytest.mark.parametrize(
+    ("what", "recorded"), [*((what, True) for what in ("root", "entry", "message", "event", "page")), ("root", False), ("page", False)]
+)
+def test_whatever_is_raised_under_way_ends_aborted_with_the_robot_at_rest(what: str, recorded: bool, tmp_path: Path) -> None:  # noqa: FBT001
+    host = Host(tmp_path, recorded=recorded)
+    host.wake()
+    host.wake()
+    host.tree.raises.add("page")
+    SPOILS[what](host)
+    assert ended(host).outcome is Outcome.ABORTED
+    assert [stop.ticks for stop in host.tree.stops] == [3]
+    assert len(host.said) == 1, "told once, however often it is raised"
+    if recorded:
+        assert host.written(MISSION)[-1]["outcome"] == "aborted"
+
+
+@pytest.mark.parametrize("recorded", [True, False])
+def test_what_is_raised_before_the_start_is_a_mission_that_could_not_start(recorded: bool, tmp_path: Path) -> None:  # noqa: FBT001
+    host = Host(tmp_path, recorded=recorded)
+    host.tree.raises.add("conditions")
+    end = ended(host)
+    assert (end.outcome, end.reason) == (Outcome.NOT_STARTED, "the tree raised ZeroDivisionError: no conditions")
+    assert host.tree.stops == []
+    if recorded:
+        assert host.written(TICKS) == [{"unmet": []}]
+        assert host.written(MISSION)[-1]["outcome"] == "not_started"
+
+
+def test_a_record_that_fails_before_the_start_keeps_the_mission_from_it(host: Host) -> None:
+    host.tree.ready = False
+    host.wake()
+    spoil_entry(host)
+    assert ended(host).outcome is Outcome.NOT_STARTED
+    assert host.tree.stops == []
+
+
+@pytest.mark.parametrize("what", sorted(ASK_ONLY_AT_THE_END))
+def test_an_abort_ends_whatever_raises_on_the_way(what: str, host: Host) -> None:
+    host.wake()
+    host.wake()
+    SPOILS[what](host)
+    host.driver.abort("aborted by the operator")
+    end = ended(host)
+    assert end.outcome is Outcome.ABORTED
+    assert end.reason.startswith("aborted by the operator")
+    assert [stop.ticks for stop in host.tree.stops] == ([] if what == "stop_here" else [3])
+    assert host.written(MISSION)[-1]["reason"] == end.reason
+
+
+@given(spoils=st.lists(st.tuples(st.integers(0, 8), st.sampled_from(sorted(SPOILS))), max_size=4), abort_at=st.integers(0, 8))
+def test_a_mission_ends_and_is_told_whatever_raises_when(spoils: list[tuple[int, str]], abort_at: int, tmp_path_factory) -> None:
+    host = Host(tmp_path_factory.mktemp("run"))
+    started = False
+    for tick in range(9):
+        for _, what in (one for one in spoils if one[0] == tick):
+            SPOILS[what](host)
+        if tick == abort_at:
+            host.driver.abort("told to end")
+        host.wake()
+        started = started or host.driver.director.start_s is not None
+    end = ended(host)
+    assert (end.outcome is Outcome.NOT_STARTED or end.reason == "told to end") or started
+    assert started or host.tree.stops == []
+    assert len(host.tree.stops) <= 1
+    assert host.written(MISSION)[-1]["outcome"] == end.outcome.value
+    assert host.written(EVENTS) == []
+
+
+def test_a_mission_that_can_not_be_made_is_refused_in_a_line(tmp_path: Path) -> None:
+    def make(*_: object) -> tuple[Tree, Blackboard]:
+        raise ZeroDivisionError("no such node")
+
+    with pytest.raises(InputError, match="the mission can't be made: ZeroDivisionError: no such node"):
+        MissionDriver(MissionPlan("patrol", (), make), lambda _name, _wake: None, Clock().ns, {})  # type: ignore[arg-type,return-value]
+    assert not list(tmp_path.iterdir())

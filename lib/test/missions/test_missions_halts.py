@@ -124,3 +124,14 @@ def test_without_a_tree_that_stops_an_abort_interrupts_what_runs(tmp_path: Path)
     flown = Flown(tmp_path, "<rover.drive/>", "", abort=True)
     assert (flown.end.outcome, flown.end.reason) == (Outcome.ABORTED, "told to end")
     assert flown.mission.open_executions == []
+
+
+READY = """<BehaviorTree ID="ready"><Needs name="it is free" if="rover.wheels == FREE ? zz == 1 : false"/></BehaviorTree>"""
+
+
+def test_what_the_mission_needs_and_can_not_be_asked_moves_nothing(tmp_path: Path) -> None:
+    flown = Flown(tmp_path, "<rover.drive/>", READY + STOP)
+    assert flown.end.outcome is Outcome.NOT_STARTED
+    assert "zz" in flown.end.reason
+    assert flown.mission.events == []
+    assert flown.written["outcome"] == "not_started"

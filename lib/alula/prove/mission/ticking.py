@@ -162,7 +162,7 @@ class Ticker:
         except Exception as error:
             if self._keeper.unknown or self._body.robot.measurements.any:
                 raise UndecidedError(str(error)) from error
-            director.abort(f"the tree raised {type(error).__name__}: {error}")
+            director.broken(f"the tree raised {type(error).__name__}: {error}")
 
     def _keep(self, memory: int, act: str, asked: Sequence[Asked], outcome: Outcome) -> None:
         if not asked:

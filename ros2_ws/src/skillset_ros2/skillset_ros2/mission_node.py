@@ -93,7 +93,7 @@ class MissionNode(Node):  # type: ignore[misc]  # rclpy is not typed
         if self.driver.due or self.driver.abort_asked:
             self.driver.tick()
             self._beat()
-            self._publish_tree()
+            self.driver.show(self._publish_tree)
         elif self._fleet_clock is not None and time.monotonic() - self._beat_s > BEAT_S:
             self._fleet_clock.look()
             # A robot may have to wait long for another one; it would take a mission that says nothing for one that hangs.
@@ -101,7 +101,7 @@ class MissionNode(Node):  # type: ignore[misc]  # rclpy is not typed
 
     def finish(self, end: End) -> None:
         """Write what is left to write."""
-        self._publish_tree()
+        self.driver.show(self._publish_tree)
         self.driver.finish(end)
         for problem in self._record.problems:
             self.get_logger().error(problem)
