@@ -8,6 +8,7 @@ from dataclasses import dataclass, field
 from itertools import islice
 
 from alula.check import entries
+from alula.check.entries import Writers
 from alula.check.problems import of_element
 from alula.check.reach import Reach, never_reached, several_run, unreached, waits_in_vain
 from alula.check.scripts import Scripts, after, before, within
@@ -38,15 +39,35 @@ class Whole:
     scripts: Scripts
     reach: Reach
     traits: Traits
-    given: Collection[str] = field(default_factory=tuple)
-    """Entries of the main tree's blackboard that are written before it starts."""
+    given: Collection[str] | None = None
+    """Entries of its blackboard that are written before it starts; None: who starts it, and with which entries, is not in the files."""
+    others: Writers = field(default_factory=dict)
+    """What the main tree writes on the blackboard of another one."""
+    begins_late: bool = False
+    """It may begin before or after the main tree has written them."""
     foreign: bool = False
 
 
 Rule = Callable[[Whole], Iterable[Problem]]
 
 
-def check(files: TreeFiles, palette: Palette, traits: Traits, rules: Iterable[Rule] = (), *, foreign: bool = False) -> list[Problem]:
+@dataclass(frozen=True)
+class Beside:
+    """Trees that stand on the main tree's blackboard, if the files have them: ``before`` it begins, and ``later``, at any moment of it."""
+
+    before: tuple[str, ...] = ()
+    later: tuple[str, ...] = ()
+
+
+def check(
+    files: TreeFiles,
+    palette: Palette,
+    traits: Traits,
+    rules: Iterable[Rule] = (),
+    *,
+    beside: Beside = Beside(),
+    foreign: bool = False,
+) -> list[Problem]:
     """Return what is wrong with the files, each thing once, in the order of the source; ``rules`` are more than those of trees alone.
 
     The blackboard of a ``foreign`` mission may be filled from outside with what no file tells of.
@@ -61,25 +82,31 @@ def check(files: TreeFiles, palette: Palette, traits: Traits, rules: Iterable[Ru
     with suppress(_Enough):
         verify(files, palette, report)
     if files.main in files.trees and not any(problem.code in ENDLESS for problem in found):
-        found += _whole(files, palette, traits, (*RULES, *rules), foreign=foreign)
+        found += _wholes(files, palette, traits, (*RULES, *rules), beside, foreign=foreign)
     places: dict[tuple[object, ...], Problem] = {}
     for problem in found:
         places.setdefault((problem.code, problem.place, problem.message), problem)
     return sorted(places.values(), key=lambda one: (one.place.path != files.path, one.place.path, one.place.line, one.place.column))
 
 
-def _whole(files: TreeFiles, palette: Palette, traits: Traits, rules: Iterable[Rule], *, foreign: bool) -> list[Problem]:
+def _wholes(
+    files: TreeFiles, palette: Palette, traits: Traits, rules: Iterable[Rule], beside: Beside, *, foreign: bool
+) -> Iterator[Problem]:
     model = files.models.get(files.main)
-    programs, reach, found = Scripts(), Reach(traits), list[Problem]()
-    for name in (files.main, *_others(files)):
+    programs, reach = Scripts(), Reach(traits)
+    given, others = tuple(model.ports) if model else (), Writers()
+    # A tree of these is ticked by itself, also where the main one has it as a subtree, over other entries then.
+    started = [name for name in (*beside.before, *beside.later) if name in files.trees and name != files.main]
+    for name in dict.fromkeys((files.main, *started, *_others(files))):
         root = expand(files, palette, name)
         if root is None:
             continue
-        whole = Whole(root, programs, reach, traits, tuple(model.ports) if model else (), foreign)
-        # Who starts another tree than the main one, and with which entries, is not in the files.
-        asked = [rule for rule in rules if name == files.main or rule is not _entries]
-        found += [problem for rule in asked for problem in islice(rule(whole), MOST)]
-    return found
+        known = given if name == files.main or name in started else None
+        whole = Whole(root, programs, reach, traits, known, others, name in beside.later, foreign)
+        for rule in rules:
+            yield from islice(rule(whole), MOST)
+        if name == files.main:
+            others = entries.written(root, entries.Uses(programs, traits))
 
 
 def _others(files: TreeFiles) -> list[str]:
@@ -120,7 +147,8 @@ def _several_run(whole: Whole) -> Iterator[Problem]:
 
 def _entries(whole: Whole) -> Iterator[Problem]:
     uses = entries.Uses(whole.scripts, whole.traits)
-    yield from entries.read_too_early(whole.root, uses, whole.given, foreign=whole.foreign)
+    if whole.given is not None:
+        yield from entries.read_too_early(whole.root, uses, whole.given, whole.others, late=whole.begins_late, foreign=whole.foreign)
     yield from entries.mismatched(whole.root, uses)
 
 

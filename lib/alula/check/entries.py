@@ -166,16 +166,33 @@ def _constants(site: Site) -> Iterator[Use]:
                 yield Use((child.board.number, attribute.name), attribute.name, True, attribute)
 
 
-def read_too_early(root: Site, uses: Uses, given: Collection[str], *, foreign: bool) -> Iterator[Problem]:
-    """Yield each reading of an entry that nothing can have written by then; ``given``: what the main tree's blackboard has at the start."""
-    written = {root.board.key(name) for name in given}
-    later = {use.key: use for use in reversed(list(uses.of(root))) if use.write}
+Writers = dict[Key, Use]
+"""What writes entries first, by entry."""
+
+
+def written(root: Site, uses: Uses) -> Writers:
+    """Return what first writes each entry of the blackboard that a tree itself stands on."""
+    return {key: use for key, use in _written_in(root, uses).items() if key[0] == root.board.number}
+
+
+def _written_in(root: Site, uses: Uses) -> Writers:
+    return {use.key: use for use in reversed(list(uses.of(root))) if use.write}
+
+
+def read_too_early(root: Site, uses: Uses, given: Collection[str], others: Writers, *, late: bool, foreign: bool) -> Iterator[Problem]:
+    """Yield each reading of an entry that nothing can have written by then.
+
+    ``given`` is what the blackboard has at the start, ``others`` what another tree writes on it: after this one has begun, or, with
+    ``late``, perhaps before.
+    """
+    by_then = {root.board.key(name) for name in given}
+    later = {**others, **_written_in(root, uses)}
     names = sorted({use.name for use in later.values()} | set(given))
 
     def visit(site: Site) -> Iterator[Problem]:
         yield from judged(uses.before(site))
         if site.kind in _AT_ONCE:
-            written.update(use.key for child in site.children for use in uses.of(child) if use.write)
+            by_then.update(use.key for child in site.children for use in uses.of(child) if use.write)
         for child in site.children:
             yield from visit(child)
         yield from judged(uses.after(site))
@@ -183,14 +200,22 @@ def read_too_early(root: Site, uses: Uses, given: Collection[str], *, foreign: b
     def judged(found: list[Use]) -> Iterator[Problem]:
         for use in found:
             if use.write:
-                written.add(use.key)
-            elif use.key not in written:
-                written.add(use.key)  # one finding for an entry is enough
+                by_then.add(use.key)
+            elif use.key not in by_then:
+                by_then.add(use.key)  # one finding for an entry is enough
+                if late and use.key in others:
+                    yield replace(_perhaps_unwritten(use, others[use.key]), warning=True)
+                    continue
                 problem = _unwritten(use, later.get(use.key), names)
                 outside = foreign and use.key not in later and use.key[0] == root.board.number
                 yield replace(problem, warning=outside)
 
     yield from visit(root)
+
+
+def _perhaps_unwritten(use: Use, writer: Use) -> Problem:
+    message = f"`{use.name}` is read, and this tree may begin before line {writer.attribute.place.line} has written it"
+    return use.problem("ALU607", message, "have it from the start: an output port of the main tree's model, with a default")
 
 
 def _unwritten(use: Use, writer: Use | None, names: list[str]) -> Problem:

@@ -5,11 +5,12 @@ from __future__ import annotations
 from collections.abc import Sequence
 from pathlib import Path
 
-from alula.check.checking import check
+from alula.check.checking import Beside, check
 from alula.check.names import NameRules
 from alula.check.rules import SkillRules
 from alula.check.skills import Skills, SkillTraits
 from alula.language.messages import NO_MESSAGES, Messages
+from alula.missions.mission_file import READY, STOP_HERE
 from alula.missions.palette import mission_palette
 from alula.missions.part import NO_PART, MissionPart
 from alula.model.model import Skillset
@@ -17,6 +18,8 @@ from alula.trees import nav2
 from alula.trees.errors import FileError, Problem
 from alula.trees.palette import Palette
 from alula.trees.reading import TreeFiles, read_models, read_text
+
+BESIDE = Beside(before=(READY,), later=(STOP_HERE,))
 
 
 def check_mission(
@@ -40,7 +43,7 @@ def check_mission(
     rules = SkillRules(skills)
     known = palette_for(files, skillsets, palettes, part)
     own = (rules.units, rules.results, rules.resources, NameRules(skills).names)
-    found += check(files, known, SkillTraits(skills), own, foreign=bool(palettes))
+    found += check(files, known, SkillTraits(skills), own, beside=BESIDE, foreign=bool(palettes))
     endless = [problem for problem in found if problem.code.startswith("ALU0")]
     if endless:
         raise FileError(endless[0])

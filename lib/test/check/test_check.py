@@ -302,3 +302,35 @@ def test_decorators_that_run_a_child_again_take_several_ticks(again, robot):
 def test_what_waits_does_not_fail(robot):
     found = findings_of("mission.xml", whole('<Fallback><WaitFor if="1"/><AlwaysSuccess/></Fallback>').encode(), robot)
     assert "ALU610" in [one.code for one in found]
+
+
+BESIDE = (
+    # What the mission needs is asked before it begins, of what it is given alone.
+    ("<AlwaysSuccess/>", "ready", '<Needs if="drone.flight == IN_AIR ? zz == 1 : false" otherwise="\'no\'"/>', [("ALU607", "zz", "error")]),
+    ('<Script code="zz := 1"/>', "ready", '<Needs if="zz == 1" otherwise="\'no\'"/>', [("ALU607", "zz", "error")]),
+    ("<AlwaysSuccess/>", "ready", '<Needs if="time &gt; 1" otherwise="\'no\'"/>', []),
+    ("<AlwaysSuccess/>", "ready", '<Sequence><SubTree ID="in" x="{time}"/></Sequence>', []),
+    ("<AlwaysSuccess/>", "ready", '<Sequence><SubTree ID="in"/></Sequence>', [("ALU607", "x", "error")]),
+    # What stops the robot may begin at any moment.
+    ("<AlwaysSuccess/>", "stop_here", '<ScriptCondition code="zz == 1"/>', [("ALU607", "zz", "error")]),
+    ('<Script code="zz := 1"/>', "stop_here", '<ScriptCondition code="zz == 1"/>', [("ALU607", "zz", "warning")]),
+    ('<Script code="zz := 1"/>', "stop_here", '<Script code="zz := 2; y := zz"/>', []),
+    ("<AlwaysSuccess/>", "stop_here", '<Script code="zz := time"/>', []),
+    # One that is also a subtree of the main tree is ticked by itself all the same.
+    ('<SubTree ID="stop_here" zz="1"/>', "stop_here", '<ScriptCondition code="zz == 1"/>', [("ALU607", "zz", "error")]),
+    ('<SubTree ID="ready" zz="1"/>', "ready", '<Needs if="zz == 1" otherwise="\'no\'"/>', [("ALU607", "zz", "error")]),
+    # Of another tree nobody knows who starts it; its types are looked at.
+    ("<AlwaysSuccess/>", "other", '<Script code="a := zz"/>', []),
+    ("<AlwaysSuccess/>", "other", '<Sequence><Script code="a := 1"/><Script code="a := \'b\'"/></Sequence>', [("ALU608", "a", "error")]),
+)
+
+
+@pytest.mark.parametrize(("main", "name", "body", "expected"), BESIDE)
+def test_trees_beside_the_main_one_are_checked_like_it(main, name, body, expected, robot):
+    text = f"""<root BTCPP_format="4" main_tree_to_execute="m"><BehaviorTree ID="m">{main}</BehaviorTree>
+  <BehaviorTree ID="{name}">{body}</BehaviorTree>
+  <BehaviorTree ID="in"><Needs if="x &gt; 1" otherwise="'no'"/></BehaviorTree>
+  <TreeNodesModel><SubTree ID="m"><input_port name="time" type="double"/></SubTree></TreeNodesModel></root>"""
+    found = findings_of("mission.xml", text.encode(), robot)
+    shown = [one.source_line[one.span.column - 1 : one.span.end_column - 1] for one in found]
+    assert [(one.code, text, one.severity.value) for one, text in zip(found, shown, strict=True)] == expected
