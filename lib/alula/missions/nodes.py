@@ -2,7 +2,10 @@
 
 from __future__ import annotations
 
+import math
+
 from alula.missions.blackboard import Blackboard
+from alula.trees.errors import TickError
 from alula.trees.node import Action, Condition, Decorator, Script, SyncAction, Wiring
 from alula.trees.palette import Palette, input_port
 from alula.trees.status import FAILURE, IDLE, RUNNING, SKIPPED, SUCCESS, Answer
@@ -10,6 +13,8 @@ from alula.trees.values import DOUBLE, INT, STRING
 
 IF = input_port("if", STRING, doc="a script that says yes or no")
 SECOND_NS = 1e9
+FOR_EVER = -1
+"""A count that is none."""
 
 
 def asked(node: Action | Condition | Decorator, port: str = "if") -> Script:
@@ -120,11 +125,15 @@ class Until(Decorator):
 
 
 class RetryAfter(Decorator):
-    """Gives its child another chance some time after a failure, when a condition holds then."""
+    """Gives its child another chance some time after a failure, when a condition holds then.
 
+    ``attempts`` counts as ``num_attempts`` of RetryUntilSuccessful: with 0 or less it fails at once, but -1 is for ever.
+    """
+
+    port = "attempts"
     ports = (
         IF,
-        input_port("attempts", INT, "2", "how many chances it has in all"),
+        input_port(port, INT, "2", "how many chances it has in all; -1: any number"),
         input_port("wait", DOUBLE, "0", "how long after the failure", unit="s"),
     )
 
@@ -139,8 +148,11 @@ class RetryAfter(Decorator):
     def update(self) -> Answer:
         """Wait for the next chance, or follow the child."""
         if self.status is IDLE:
-            self._left, self._again_ns, self.feedback_message = self.number("attempts"), None, ""
+            attempts = self.number(self.port)
+            self._left, self._again_ns, self.feedback_message = attempts if attempts >= FOR_EVER else 0, None, ""
         self.become(RUNNING)
+        if not self._left:
+            return FAILURE
         if self._again_ns is not None and self.now_ns < self._again_ns:
             return RUNNING
         self._again_ns = None
@@ -148,7 +160,8 @@ class RetryAfter(Decorator):
         if answer is not FAILURE:
             return answer
         self.reset_children()
-        self._left -= 1
+        if self._left != FOR_EVER:
+            self._left -= 1
         if not self._script.holds() or not self._left:  # a search of all runs need not count where there is none
             return FAILURE
         wait_ns = seconds_ns(self, "wait")
@@ -190,9 +203,11 @@ class NoteReason(SyncAction):
 
 
 def seconds_ns(node: Action | Decorator, port: str) -> int:
-    """Return a port that is a time in seconds."""
+    """Return a port that is a time in seconds; raises TickError where it is no number."""
     value = node.get(port)
-    return int(value * SECOND_NS) if isinstance(value, float) else 0
+    if not isinstance(value, float) or not math.isfinite(value):
+        raise TickError(f"{node.place()}: the port '{port}' is {value}, no time in seconds")
+    return int(value * SECOND_NS)
 
 
 def mission_nodes(memory: Blackboard) -> Palette:

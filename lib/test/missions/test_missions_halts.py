@@ -135,3 +135,32 @@ def test_what_the_mission_needs_and_can_not_be_asked_moves_nothing(tmp_path: Pat
     assert "zz" in flown.end.reason
     assert flown.mission.events == []
     assert flown.written["outcome"] == "not_started"
+
+
+ATTEMPTS = (-3, -1, 0, 1, 2, 5)
+
+
+@pytest.mark.parametrize("by_entry", [False, True])
+@pytest.mark.parametrize("attempts", ATTEMPTS)
+def test_attempts_count_as_those_of_retry_until_successful(attempts: int, by_entry: bool, tmp_path: Path) -> None:  # noqa: FBT001
+    """A skill that always ends without success is asked for so often; -1: until it is aborted."""
+    leaf = '<rover.look success="NEVER" name="look at it"/>'
+    began = {}
+    for tag, port in (("RetryAfter", "attempts"), ("RetryUntilSuccessful", "num_attempts")):
+        retry = f'<{tag} {port}="{"{n}" if by_entry else attempts}">{leaf}</{tag}>'
+        (tmp_path / tag).mkdir()
+        flown = Flown(tmp_path / tag, f'<Sequence><Script code="n := {attempts}"/>{retry}</Sequence>', abort=attempts == -1)
+        assert flown.end.outcome is (Outcome.ABORTED if attempts == -1 else Outcome.GIVEN_UP)
+        began[tag] = sum(path[-1:] == ("look at it",) for path in flown.mission.places.values())
+    if attempts == -1:
+        assert min(began.values()) > 1
+    else:
+        assert set(began.values()) == {max(attempts, 0)}
+
+
+@pytest.mark.parametrize("wait", ["nan", "inf", "-inf"])
+def test_a_time_that_is_none_is_told_with_its_place(wait: str, tmp_path: Path) -> None:
+    retry = '<RetryAfter if="1" wait="{w}"><AlwaysFailure/></RetryAfter>'
+    flown = Flown(tmp_path, f"<Sequence><Script code=\"w := '{wait}'\"/>{retry}</Sequence>")
+    assert flown.end.outcome is Outcome.ABORTED
+    assert "'wait'" in flown.end.reason

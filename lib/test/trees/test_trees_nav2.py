@@ -192,3 +192,19 @@ def test_a_path_that_grows_near_the_goal_is_told():
         rig.tree.blackboard.set("path", path)
         assert rig.tick() == [answer]
     assert issubclass(PathLongerOnApproach, object)
+
+
+@pytest.mark.parametrize(
+    "body",
+    [
+        '<RecoveryNode number_of_retries="-1"><a/><a/></RecoveryNode>',
+        '<Sequence><Script code="at := -2"/><PersistentSequence current_child_idx="{at}"><a/></PersistentSequence></Sequence>',
+    ],
+)
+def test_a_count_below_zero_is_refused_with_its_place(body):
+    with pytest.raises(TreeError, match=r"<text>:1:.*, and has to be 0 or more"):
+        told(body, 1, a="S")
+
+
+def test_no_retries_is_one_try():
+    assert told('<RecoveryNode number_of_retries="0"><a/><b/></RecoveryNode>', 1, a="F", b="S") == ["F sa"]

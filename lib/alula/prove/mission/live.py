@@ -154,7 +154,7 @@ class Liveness:
                 written |= self._at_once(child)
             return found
         found |= self._again(node, ends)
-        if kind in COUNTED and not node.wiring.ports.get(COUNTED[kind], "").strip().lstrip("-").strip("0").isdigit():
+        if kind in COUNTED and not _at_least_once(node.wiring.ports.get(COUNTED[kind], "")):
             found |= ends.any  # perhaps no child is ticked at all
         return found | ends.halted if kind is Delay else found
 
@@ -376,8 +376,14 @@ def _one_of(part: Part) -> tuple[list[Name] | None, frozenset[str]]:
     return None, frozenset()
 
 
-COUNTED = {Repeat: Repeat.port, RetryUntilSuccessful: RetryUntilSuccessful.port}
-ONE_CHILD = frozenset({SubTree, Inverter, ForceSuccess, ForceFailure, Delay, Timeout, Until, RetryAfter, KeepRunningUntilFailure, *COUNTED})
+def _at_least_once(count: str) -> bool:
+    """Tell whether a port's text is a count with which the child is ticked; an entry may be any."""
+    text = count.strip()
+    return text == "-1" or (text.isdecimal() and int(text) > 0)
+
+
+COUNTED = {Repeat: Repeat.port, RetryUntilSuccessful: RetryUntilSuccessful.port, RetryAfter: RetryAfter.port}
+ONE_CHILD = frozenset({SubTree, Inverter, ForceSuccess, ForceFailure, Delay, Timeout, Until, KeepRunningUntilFailure, *COUNTED})
 """Nodes whose child's ends are known to lead on to their own, or to the child again."""
 
 

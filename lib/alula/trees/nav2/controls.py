@@ -42,6 +42,14 @@ class PipelineSequence(Control):
         return answer
 
 
+def natural(node: Control, port: str) -> int:
+    """Return the value of an input that counts something; raises TickError where it is less than 0, of which Nav2 has no meaning."""
+    value = node.number(port)
+    if value < 0:
+        raise TickError(f"{node.place()}: the port '{port}' is {value}, and has to be 0 or more")
+    return value
+
+
 class RecoveryNode(Control):
     """Ticks its first child; when that fails the second one, and then the first one again, so many times."""
 
@@ -58,7 +66,7 @@ class RecoveryNode(Control):
     def update(self) -> Answer:
         """Tick the child whose turn it is, and go on with the other one as long as none runs."""
         self.become(RUNNING)
-        most = self.number("number_of_retries")
+        most = natural(self, "number_of_retries")
         while self._retries <= most:
             answer = self._recover() if self._recovers else self._try(last=self._retries >= most)
             if answer is not None:
@@ -160,7 +168,7 @@ class PersistentSequence(Control):
 
     def update(self) -> Answer:
         """Tick from the current child on."""
-        index = self.number("current_child_idx")
+        index = natural(self, "current_child_idx")
         self.become(RUNNING)
         while index < len(self.children):
             answer = self.children[index].execute()

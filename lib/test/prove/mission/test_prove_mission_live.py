@@ -103,6 +103,20 @@ def test_an_entry_that_is_forgotten_decides_nothing(seed: int, tmp_path: Path, m
     assert short == kept
 
 
+@pytest.mark.parametrize("count", ["-2", "0", "1", "-1"])
+@pytest.mark.parametrize("node", ["Repeat num_cycles", "RetryUntilSuccessful num_attempts", 'RetryAfter if="1" attempts'])
+def test_what_a_child_writes_that_may_not_be_ticked_is_remembered(
+    node: str, count: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    tag = node.split(maxsplit=1)[0]
+    again = f'<ForceSuccess><{node}="{count}"><Sequence><Script code="a := \'x\'"/><drone.lift/></Sequence></{tag}></ForceSuccess>'
+    asked = "<Fallback><ScriptCondition code=\"a == 'x' || a == 'DONE'\"/><drone.land/></Fallback>"
+    path = written(tmp_path, f"{ONCE}{again}{asked}")
+    short = shown(path, QUIET)
+    monkeypatch.setattr(Looking, "ahead", everything)
+    assert short == shown(path, QUIET) is not None
+
+
 def memories(folder: Path, inside: str) -> int:
     regions = Regions(System.read(written(folder, inside), robots(), NO_PART, QUIET), Deadline.after(1e6))
     regions.explore()
