@@ -16,7 +16,8 @@ from alula.runtime.core.errors import SkillRuntimeError
 from alula.runtime.core.events import EngineEvent, ExecutionEvent
 from alula.runtime.core.execution import Execution
 from alula.runtime.core.hook_calls import HookOutcome, Then
-from alula.runtime.hook_processes.place import Snapshot, admit, hang_up, pipe_key, snapshot
+from alula.runtime.core.sanitize import error_line
+from alula.runtime.hook_processes.place import Snapshot, admit, hang_up, opened, pipe_key, sealed, snapshot
 
 ENDED = "its process has ended"
 ASKED = {"terminate", "fail", "interrupted", "set_outputs"}
@@ -109,6 +110,10 @@ class RemoteHooks:
         except (EOFError, OSError):
             pipe.close()
             return
+        except Exception as error:  # noqa: BLE001 - unpickling raises anything
+            self._on_error(f"what a process said at the pipe of the hooks can't be read: {error_line(error)}")
+            pipe.close()
+            return
         process = _SkillProcess(pipe, frozenset(written), self._ask)
         with self._changed:
             before = self._processes.get(skill)
@@ -116,14 +121,14 @@ class RemoteHooks:
             self._changed.notify_all()
         if before is not None:
             before.close()
-        process.read()
+        why = process.read()
         with self._changed:
             if self._processes.get(skill) is process:
                 del self._processes[skill]
-        self._lost(skill, process)
+        self._lost(skill, process, why)
 
-    def _lost(self, skill: str, process: _SkillProcess) -> None:
-        gone = f"the manager of {skill} has gone: {ENDED}"
+    def _lost(self, skill: str, process: _SkillProcess, why: str) -> None:
+        gone = f"the manager of {skill} has gone: {why}"
         if self._engine is not None and not self._over:
             for execution in self._engine.executions:
                 if execution.skill == skill:
@@ -158,27 +163,57 @@ class _SkillProcess:
             if gone is None:
                 self._waiting[number] = then
         if gone is None:
-            self._send(("call", number, hook, execution))
-        else:
+            try:
+                self._send(("call", number, hook, sealed(execution)))
+            except Exception as error:  # noqa: BLE001 - of pickle, for whatever a caller hands over
+                with self._lock:
+                    unanswered = self._waiting.pop(number, None) is not None
+                gone = HookOutcome(error=f"its inputs can't be sent: {error_line(error)}") if unanswered else None
+        if gone is not None:
             then(gone)
 
     def tell(self, execution: Snapshot) -> None:
         """Send what has become of an execution."""
         self._send(("event", execution))
 
-    def read(self) -> None:
-        """Take what comes until the process ends."""
+    def read(self) -> str:
+        """Take what comes until the process ends, or sends what can't be read; return why."""
         while True:
             try:
                 kind, number, *rest = self._pipe.recv()
             except (EOFError, OSError):
-                return
-            if kind == "answer":
-                then = self._waiting.pop(number, None)
-                if then is not None:
-                    then(rest[0])
-            else:
-                self._send(("reply", number, self._ask(rest[0], rest[1])))
+                return ENDED
+            except Exception as error:  # noqa: BLE001 - unpickling raises anything
+                return self._refuse(error)
+            try:
+                if kind == "answer":
+                    self._answered(number, *rest)
+                else:
+                    self._send(("reply", number, self._asked(*rest)))
+            except Exception as error:  # noqa: BLE001 - it is not made as messages are
+                return self._refuse(error)
+
+    def _refuse(self, error: Exception) -> str:
+        self.close()  # upon which the process gives up its executions, too, and makes another pipe
+        return f"what it sent can't be read: {error_line(error)}"
+
+    def _answered(self, number: int, content: bytes) -> None:
+        then = self._waiting.pop(number, None)
+        if then is None:
+            return
+        try:
+            answer = opened(content)
+        except Exception as error:  # noqa: BLE001 - unpickling raises anything
+            answer = HookOutcome(wrong=f"what its hook returned can't be read: {error_line(error)}")
+        then(answer)
+
+    def _asked(self, method: str, execution_id: str, content: bytes) -> object:
+        try:
+            arguments = opened(content)
+        except Exception as error:  # noqa: BLE001 - unpickling raises anything
+            self._ask("fail", (execution_id, f"what its hook handed over can't be read: {error_line(error)}"))
+            return False
+        return self._ask(method, (execution_id, *arguments))
 
     def give_up(self, answer: HookOutcome) -> None:
         """Answer all calls for a process that has ended, also those that are still on their way here."""

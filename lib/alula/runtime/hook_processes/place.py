@@ -5,6 +5,7 @@ from __future__ import annotations
 import contextlib
 import hashlib
 import os
+import pickle
 import secrets
 import socket
 import stat
@@ -13,6 +14,7 @@ from collections.abc import Callable, Mapping
 from dataclasses import dataclass
 from multiprocessing.connection import Connection, answer_challenge, deliver_challenge
 from pathlib import Path
+from typing import Any
 
 from alula.model.execution_state import ExecutionState
 from alula.runtime.core.errors import SkillRuntimeError
@@ -65,6 +67,19 @@ def admit(pipe: Connection, key: bytes) -> None:
     """
     deliver_challenge(pipe, key)
     answer_challenge(pipe, key)
+
+
+def sealed(value: object) -> bytes:
+    """Return what a robot's code has made as bytes of their own: an end that can't read them still knows which execution they are of.
+
+    Raises what pickle raises, which may be anything.
+    """
+    return pickle.dumps(value)
+
+
+def opened(content: bytes) -> Any:
+    """Return what was sealed; raises what unpickling raises, which may be anything."""
+    return pickle.loads(content)  # noqa: S301 - only from a process that has this user's key
 
 
 def hang_up(pipe: Connection) -> None:

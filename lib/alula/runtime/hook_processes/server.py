@@ -16,7 +16,7 @@ from alula.model.execution_state import ExecutionState
 from alula.runtime.core.execution import Execution
 from alula.runtime.core.hook_calls import HookOutcome, call_hook
 from alula.runtime.core.sanitize import as_text, error_line
-from alula.runtime.hook_processes.place import Snapshot, hang_up, pipe_key
+from alula.runtime.hook_processes.place import Snapshot, hang_up, opened, pipe_key, sealed
 from alula.runtime.hooks import HOOKS, SkillHooks, is_written
 from alula.runtime.workers import Workers
 
@@ -99,7 +99,7 @@ class HookServer:
         number = next(self._numbers)
         arrived, value = self._replies.setdefault(number, (threading.Event(), []))
         try:
-            self._send(("ask", number, method, (execution_id, *arguments)))
+            self._send(("ask", number, method, execution_id, sealed(arguments)))
         except Exception as error:  # noqa: BLE001 - of pickle, for whatever a hook hands over
             return self._ask("fail", execution_id, f"the outcome of {self._skill}'s hook can't be sent: {error_line(error)}")
         arrived.wait(REPLY_S if self._pipe is not None else 0.0)
@@ -140,6 +140,10 @@ class HookServer:
                 kind, *rest = pipe.recv()
             except (EOFError, OSError):
                 return
+            except Exception as error:  # noqa: BLE001 - unpickling raises anything
+                self._on_error(f"what the engine of {self._skillset} sent can't be read: {error_line(error)}")
+                hang_up(pipe)
+                return
             if kind == "call":
                 self._call(*rest)
             elif kind == "event":
@@ -149,9 +153,20 @@ class HookServer:
                 value.append(rest[1])
                 arrived.set()
 
-    def _call(self, number: int, hook: str, told: Snapshot) -> None:
-        execution = self._update(told)
-        self._workers.submit(lambda: self._send(("answer", number, self._answer(execution, hook))))
+    def _call(self, number: int, hook: str, content: bytes) -> None:
+        try:
+            execution = self._update(opened(content))
+        except Exception as error:  # noqa: BLE001 - unpickling raises anything
+            self._send(("answer", number, sealed(HookOutcome(error=f"its inputs can't be read: {error_line(error)}"))))
+            return
+        self._workers.submit(lambda: self._send(("answer", number, self._sealed(self._answer(execution, hook)))))
+
+    @staticmethod
+    def _sealed(answer: HookOutcome) -> bytes:
+        try:
+            return sealed(answer)
+        except Exception as error:  # noqa: BLE001 - of pickle, for whatever a hook returns
+            return sealed(HookOutcome(wrong=f"what its hook returned can't be sent: {error_line(error)}"))
 
     def _answer(self, execution: Execution, hook: str) -> HookOutcome:
         if isinstance(execution.inputs, Mapping):
