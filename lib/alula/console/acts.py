@@ -2,8 +2,11 @@
 
 from __future__ import annotations
 
+import contextlib
 import json
+import os
 import re
+import signal
 import subprocess
 import time
 from collections.abc import Mapping, Sequence
@@ -23,6 +26,7 @@ from alula.runtime.live.options import RunOption, entry, words_of
 from alula.runtime.live.spec import RequestError
 
 START_S = 20.0
+END_S = 5.0
 LOOK_S = 0.05
 MAX_FAULTS = 8
 LIVE, MOCKS = "live", "mocks"
@@ -129,7 +133,8 @@ def _faults(faults: object) -> tuple[str, ...]:
 def start(wanted: WantedRun) -> Path:
     """Start a run and return its folder, as soon as that is there.
 
-    The run is a process of its own that this one does not end: a vehicle in the air must not fall because a page's server ended.
+    The run is a process of its own that this one does not end: a vehicle in the air must not fall because a page's server ended. Only
+    one that has not begun within START_S is ended: whoever is told that it has not started may start another one.
 
     Raises:
         ActError: it does not start; the message is its own.
@@ -140,12 +145,26 @@ def start(wanted: WantedRun) -> Path:
     with said.open("wb") as log:
         process = subprocess.Popen(wanted.words(out), stdin=subprocess.DEVNULL, stdout=log, stderr=log, start_new_session=True)
     end = time.monotonic() + START_S
-    while not (out / "run.json").exists() and time.monotonic() < end:
+    while not (out / "run.json").exists():
+        late = time.monotonic() >= end
+        if late:
+            _end(process)
         if process.poll() is not None:
             words = said.read_text(encoding="utf-8", errors="replace").strip().splitlines()
-            raise ActError(words[-1] if words else f"alula run ended with {process.returncode}")
+            last = words[-1] if words else "it said nothing" if late else f"alula run ended with {process.returncode}"
+            raise ActError(f"the run had not begun after {START_S:g} s and was ended; its last words: {last}" if late else last)
         time.sleep(LOOK_S)
     return out
+
+
+def _end(process: subprocess.Popen[bytes]) -> None:
+    """End a run that prepares itself, with all that it has started."""
+    for one in (signal.SIGTERM, signal.SIGKILL):
+        with contextlib.suppress(ProcessLookupError):
+            os.killpg(process.pid, one)
+        with contextlib.suppress(subprocess.TimeoutExpired):
+            process.wait(END_S)
+            return
 
 
 def everything_off(folder: Path) -> str:

@@ -3,15 +3,18 @@
 from __future__ import annotations
 
 import asyncio
+import itertools
 import json
 import os
 import subprocess
 import sys
 import threading
+import time
 import urllib.error
 import urllib.request
 from collections.abc import Callable
 from pathlib import Path
+from types import SimpleNamespace
 from typing import Any
 
 import pytest
@@ -345,6 +348,23 @@ def test_a_run_that_does_not_start_says_why(make_run: Callable[..., Path], tmp_p
     monkeypatch.setenv("ALULA_ROOT", str(tmp_path))
     with pytest.raises(ActError, match="alula run: all DDS domains are taken"):
         acts.start(WantedRun("mapping", 0, mock=True))
+
+
+def test_a_run_that_does_not_begin_is_ended_and_told(
+    make_run: Callable[..., Path], tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    script = tmp_path / "alula"
+    script.write_text(f"#!/bin/sh\necho $$ > {tmp_path}/pid\necho 'building the skillsets'\nexec sleep 600\n", encoding="utf-8")
+    script.chmod(0o755)
+    monkeypatch.setenv("ALULA_ROOT", str(tmp_path))
+    builds = lambda: any("building" in log.read_text() for log in (tmp_path / "runs").glob(".*.log"))  # noqa: E731
+    asked = itertools.count()  # the first time for when it began
+    clock = SimpleNamespace(monotonic=lambda: 100.0 if next(asked) and builds() else 0.0, sleep=time.sleep)
+    monkeypatch.setattr(acts, "time", clock)
+    with pytest.raises(ActError, match="had not begun after 20 s and was ended; its last words: building the skillsets"):
+        acts.start(WantedRun("mapping", 0, mock=True))
+    with pytest.raises(ProcessLookupError):
+        os.kill(int((tmp_path / "pid").read_text()), 0)
 
 
 def test_only_the_link_to_a_robot_needs_ros() -> None:

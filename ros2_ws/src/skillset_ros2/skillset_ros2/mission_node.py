@@ -32,6 +32,7 @@ from alula.missions.driver import TICK_PERIOD_S, MissionDriver
 from alula.missions.pausing import PauseRefusedError
 from alula.missions.plan import InputError, MissionPlan
 from alula.missions.record import MissionRecord
+from alula.missions.running import run_to_the_end
 from alula.missions.skillset import MissionClient
 from alula.runtime.core.events import EngineEvent
 from alula.trees.groot.address import ServerError
@@ -44,7 +45,6 @@ from skillset_ros2.simulated_time import SimulatedTime
 TURN_S = 0.1  # wall clock; how soon a signal is seen when nothing else happens
 LATCHED = QoSProfile(depth=1, reliability=ReliabilityPolicy.RELIABLE, durability=DurabilityPolicy.TRANSIENT_LOCAL)
 BEAT_S = 1.0  # wall clock; heartbeats of a fleet's mission are repeated so often while its clock stands still
-LAST_EVENTS_S = 2.0  # wall clock to wait for the events of what has ended
 
 
 class MissionNode(Node):  # type: ignore[misc]  # rclpy is not typed
@@ -167,37 +167,19 @@ class MissionNode(Node):  # type: ignore[misc]  # rclpy is not typed
         return response
 
 
-class Standstill:
-    """Notices that the mission clock stands still, on the wall clock."""
-
-    def __init__(self, timeout_s: float) -> None:
-        self._timeout_s = timeout_s
-        self._last = 0.0
-        self._since = time.monotonic()
-
-    def lasts(self, now_s: float) -> bool:
-        """Tell whether the mission clock has stood still for longer than the timeout."""
-        if now_s != self._last:
-            self._last, self._since = now_s, time.monotonic()
-        return time.monotonic() - self._since > self._timeout_s
-
-
 def tick_to_the_end(node: MissionNode, signals: list[signal.Signals]) -> End:
     """Tick until the mission is over; ``signals`` grows when the process is told to end."""
-    executor, driver = NodeExecutor(), node.driver
+    executor = NodeExecutor()
     executor.add_node(node)
-    standstill = Standstill(timeout_s=60.0)
-    while driver.end is None:
+
+    def turn() -> None:
         executor.spin_once(timeout_sec=TURN_S)
         while signals:
-            driver.ask_abort(f"told to end by {signals.pop(0).name}")
-        node.turn()
-        if standstill.lasts(node.now_s):
-            return End(Outcome.NOT_STARTED if driver.director.start_s is None else Outcome.GIVEN_UP, "the mission clock stands still")
-    end_s = time.monotonic() + LAST_EVENTS_S
-    while not driver.settled and time.monotonic() < end_s:
-        executor.spin_once(timeout_sec=TURN_S)
-    return driver.end
+            node.driver.ask_abort(f"told to end by {signals.pop(0).name}")
+        if node.driver.end is None:
+            node.turn()
+
+    return run_to_the_end(node.driver, turn, lambda: node.now_s)
 
 
 def run_mission(plan: MissionPlan, out: Path, arguments: Sequence[str] | None = None) -> int:
