@@ -3,14 +3,13 @@
 from __future__ import annotations
 
 import argparse
-import math
 import sys
 import uuid
 from collections.abc import Mapping, Sequence
 from dataclasses import replace
 from typing import Any
 
-from alula.commands.run_options import check_seed, groot_address, run_folder, run_parser, world_file
+from alula.commands.run_options import check_limit, check_seed, groot_address, run_folder, run_parser, world_file
 from alula.common.faults import FaultError, parse_fault
 from alula.common.network import DOMAINS, NAMESPACE, DomainClaim, free_port
 from alula.common.robots import find_robot, fleet_name
@@ -43,7 +42,6 @@ def parse(arguments: Sequence[str], part: RunPart) -> RunSpec:
     parser.add_argument(
         "--namespace", default="", metavar="NAME", help="put its ROS 2 names below this one: runs with one may share a domain"
     )
-    parser.add_argument("--limit", type=float, default=0.0, metavar="SECONDS", help="end the run after so long, by the mission clock")
     parser.add_argument(
         "--commanded",
         action="store_true",
@@ -82,7 +80,7 @@ def parse(arguments: Sequence[str], part: RunPart) -> RunSpec:
         namespace=read_namespace(given.namespace or (find_robot().name if robots else "")),
         console=given.console,
         monitor=given.monitor,
-        limit_s=read_limit(given.limit),
+        limit_s=check_limit(given.limit),
         commanded=given.commanded,
         members=members,
         groot=groot_address(given.groot),
@@ -124,13 +122,6 @@ def read_domain(number: int | None) -> int:
     if number is not None and number not in DOMAINS:
         raise RequestError(f"--domain {number}: a run has a DDS domain from {DOMAINS[0]} to {DOMAINS[-1]}")
     return number or 0
-
-
-def read_limit(seconds: float) -> float:
-    """Return how long the run may last, 0: without a limit; raises RequestError."""
-    if not 0.0 <= seconds < math.inf:  # also refuses nan
-        raise RequestError(f"--limit {seconds:g}: must be 0 (no limit) or a number of seconds")
-    return seconds
 
 
 def read_namespace(name: str) -> str:

@@ -18,14 +18,14 @@ from collections.abc import Sequence
 from pathlib import Path
 
 from alula.campaign.mocked_scenarios import load_mocked_scenario
-from alula.commands.run_options import check_seed, groot_address, run_folder, run_parser, shown_at, world_file
+from alula.commands.run_options import check_limit, check_seed, groot_address, run_folder, run_parser, shown_at, world_file
 from alula.common.faults import MOCKED, FaultError, FaultRequest, changes_of, parse_fault, spans_of
 from alula.common.robots import RobotError
 from alula.common.run_log import note_mocked
 from alula.common.scenarios import ScenarioError
 from alula.common.signals import Interrupts
 from alula.missions.director import EXIT_CODES, Outcome
-from alula.missions.mocked import MockedMission
+from alula.missions.mocked import LIMIT_S, MockedMission
 from alula.missions.plan import InputError
 from alula.records.conformance import Monitor
 from alula.records.errors import AnalysisError
@@ -59,7 +59,7 @@ def prepare(given: argparse.Namespace) -> tuple[MockedMission, RunSpec]:
     Raises:
         AnalysisError, FaultError, RequestError, RobotError, ScenarioError, InputError: it can't be run; nothing was written.
     """
-    out, seed = run_folder(given.out, given.scenario), check_seed(given.seed)
+    out, seed, limit_s = run_folder(given.out, given.scenario), check_seed(given.seed), check_limit(given.limit)
     flights = load_mocked_scenario(given.scenario, given.behaviour, world=given.world)
     faults = [parse_fault(text) for text in given.fail]
     flights.check(faults)
@@ -71,6 +71,7 @@ def prepare(given: argparse.Namespace) -> tuple[MockedMission, RunSpec]:
         out_dir=str(out),
         run_id=uuid.uuid4().hex,
         seed=seed,
+        limit_s=limit_s,
         faults=tuple(map(str, faults)),
         world=world,
         monitor=given.monitor,
@@ -78,7 +79,9 @@ def prepare(given: argparse.Namespace) -> tuple[MockedMission, RunSpec]:
         own={"mock": True},
     )
     spec.save(out / FILE)
-    return MockedMission(flights.skillsets, flights.behaviour, plan, faults=faults, seed=seed, out=out, groot=groot), spec
+    ends_s = limit_s or LIMIT_S
+    mission = MockedMission(flights.skillsets, flights.behaviour, plan, faults=faults, seed=seed, out=out, groot=groot, limit_s=ends_s)
+    return mission, spec
 
 
 def run(given: argparse.Namespace) -> int:

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import argparse
+import math
 from datetime import datetime, timezone
 from pathlib import Path
 
@@ -26,6 +27,7 @@ def run_parser(about: str) -> argparse.ArgumentParser:
     parser.add_argument("--out", type=Path, help="folder for the results (default: runs/TIME-SCENARIO of the robot)")
     parser.add_argument("--monitor", action="store_true", help="check every event against the models")
     parser.add_argument("--groot", nargs="?", const="", metavar="[HOST:]PORT", help="show the tree to Groot2 and its like (127.0.0.1:1667)")
+    parser.add_argument("--limit", type=float, default=0.0, metavar="SECONDS", help="end the run after so long, by the mission clock")
     parser.add_argument("--mock", action="store_true", help="run over mocks in virtual time: without simulator and ROS, in about a second")
     return parser
 
@@ -35,6 +37,13 @@ def check_seed(seed: int) -> int:
     if not 0 <= seed <= MAX_SEED:
         raise RequestError(f"--seed {seed}: must lie between 0 and {MAX_SEED}")
     return seed
+
+
+def check_limit(seconds: float) -> float:
+    """Return how long the run may last, 0: without a limit; raises RequestError."""
+    if not 0.0 <= seconds < math.inf:  # also refuses nan
+        raise RequestError(f"--limit {seconds:g}: must be 0 (no limit) or a number of seconds")
+    return seconds
 
 
 def world_file(scenario: Scenario, wanted: str) -> str:

@@ -21,7 +21,9 @@ from alula.runtime.local import LocalWorld
 
 LATENCY_S = 0.005
 LIMIT_S = 3600.0
-"""Mission clock after which a mission that goes round in circles is aborted, and after which twice it is left."""
+"""Mission clock after which a mission that goes round in circles is aborted, unless it has another limit."""
+STOP_S = 600.0
+"""Mission clock after which a mission that was aborted is left, whether it has stopped or not."""
 
 
 class Listener(Recorder, Protocol):
@@ -45,6 +47,7 @@ class MockedMission:
         tick_period_s: of the tree, besides the ticks after events; 10 Hz as over ROS 2.
         latency_s: of each message between mission and managers.
         groot: where viewers find the tree, as `MissionDriver` has it; it raises, too, what that does.
+        limit_s: mission clock after which it is aborted, as its record would grow for ever.
         listener: hears of a mission that leaves nothing behind what its record would have told.
     """
 
@@ -60,6 +63,7 @@ class MockedMission:
         tick_period_s: float = TICK_PERIOD_S,
         latency_s: float = LATENCY_S,
         groot: str = "",
+        limit_s: float = LIMIT_S,
         listener: Listener | None = None,
     ) -> None:
         self.world: LocalWorld
@@ -72,6 +76,7 @@ class MockedMission:
         for fault in faults:
             self.robot.fail(fault)
         self._tick_period_s = tick_period_s
+        self._limit_s = limit_s
         clock_ns = lambda: self.world.clock.now_ns  # noqa: E731
         record = self._record = None if out is None else MissionRecord(out, plan, clock_ns, plan.parameters)
         client = lambda name, wake: MissionClient(self.world.client(name), wake, record or listener)  # noqa: E731
@@ -90,9 +95,9 @@ class MockedMission:
         begun = time.perf_counter()
         self._driver.tick_regularly(self.world.clock.after, self._tick_period_s)
         over = lambda: self._driver.end is not None  # noqa: E731
-        if not self.world.run_until(over, timeout_s=LIMIT_S):
-            self._driver.abort(f"not over after {LIMIT_S:g} s")
-            self.world.run_until(over, timeout_s=LIMIT_S)
+        if not self.world.run_until(over, timeout_s=self._limit_s):
+            self._driver.abort(f"its limit of {self._limit_s:g} s is over")
+            self.world.run_until(over, timeout_s=STOP_S)
         self.world.run_for(0.0)
         end = self._driver.end or End(Outcome.ABORTED, "the stop did not end")
         self.wall_s = time.perf_counter() - begun

@@ -14,6 +14,7 @@ import pytest
 from alula.commands import run
 from alula.common import run_log
 from alula.common.record import FILE, read_record
+from alula.missions.mocked import STOP_S
 from alula.report.ends import OPERATOR, ReportedEnd, read_end
 
 
@@ -28,6 +29,8 @@ from alula.report.ends import OPERATOR, ReportedEnd, read_end
         (["mapping", "--mock", "--fail", "imu"], "there is no fault 'imu'"),
         (["mapping", "--mock", "--world", "nowhere"], "there is no world nowhere"),
         (["mapping", "--mock", "--seed", "-1"], "--seed -1"),
+        (["mapping", "--mock", "--limit", "-1"], "--limit -1: must be 0"),
+        (["mapping", "--mock", "--limit", "nan"], "--limit nan: must be 0"),
         (["nosuch", "--mock"], "there is no scenario 'nosuch'"),
     ],
 )
@@ -50,6 +53,15 @@ def test_it_leaves_what_a_live_run_leaves(tmp_path: Path, capsys) -> None:
     told = capsys.readouterr()
     assert "mission accomplished in degraded mode" in told.out
     assert "  perception.zed_status: OK -> BROKEN" in told.err
+
+
+def test_a_limit_ends_it(tmp_path: Path, capsys) -> None:
+    out = tmp_path / "run"
+    assert run.main(["mapping", "--mock", "--limit", "20", "--out", str(out)]) == 1
+    assert "its limit of 20 s is over" in capsys.readouterr().out
+    summary = json.loads((out / "summary.json").read_text())
+    assert summary["outcome"] == "aborted"
+    assert summary["duration_s"] < 20 + STOP_S
 
 
 def test_ctrl_c_is_the_operators(tmp_path: Path) -> None:

@@ -13,7 +13,7 @@ from alula.common.record import read_record
 from alula.language.models import ModelFile, check_texts
 from alula.missions.director import Outcome
 from alula.missions.mission_file import plan_of_file
-from alula.missions.mocked import MockedMission
+from alula.missions.mocked import LIMIT_S, STOP_S, MockedMission
 from alula.missions.part import NO_PART
 from alula.mock import load_behaviour
 
@@ -31,7 +31,7 @@ STOP = '<BehaviorTree ID="stop_here"><rover.look name="stop"/></BehaviorTree>'
 class Flown:
     """A mission over mocks whose main tree has this body; aborted, if it is, at ABORT_S."""
 
-    def __init__(self, folder: Path, body: str, stop: str = STOP, *, abort: bool = False) -> None:
+    def __init__(self, folder: Path, body: str, stop: str = STOP, *, abort: bool = False, limit_s: float = LIMIT_S) -> None:
         (file,) = check_texts([ModelFile("rover.rl", MODEL)])
         assert [one for one in file.findings if one.severity.value == "error"] == []
         text = f'<root BTCPP_format="4" main_tree_to_execute="m"><BehaviorTree ID="m">{body}</BehaviorTree>{stop}</root>'
@@ -40,7 +40,7 @@ class Flown:
         (folder / "run").mkdir()
         plan = plan_of_file(folder / "m.xml", "m", file.skillsets, {}, NO_PART)
         behaviour = load_behaviour([folder / "mock.yaml"], file.skillsets)
-        self.mission = MockedMission(file.skillsets, behaviour, plan, out=folder / "run")
+        self.mission = MockedMission(file.skillsets, behaviour, plan, out=folder / "run", limit_s=limit_s)
         if abort:
             self.mission.world.clock.after(ABORT_S, lambda: self.mission.abort("told to end"))
         self.end = self.mission.run()
@@ -164,3 +164,14 @@ def test_a_time_that_is_none_is_told_with_its_place(wait: str, tmp_path: Path) -
     flown = Flown(tmp_path, f"<Sequence><Script code=\"w := '{wait}'\"/>{retry}</Sequence>")
     assert flown.end.outcome is Outcome.ABORTED
     assert "'wait'" in flown.end.reason
+
+
+@pytest.mark.parametrize("stop", [STOP, '<BehaviorTree ID="stop_here"><WaitFor if="false"/></BehaviorTree>'])
+def test_a_mission_without_end_has_a_limit_and_its_record_with_it(stop: str, tmp_path: Path) -> None:
+    """So has a stop without end."""
+    flown = Flown(tmp_path, '<Repeat num_cycles="-1"><Sleep msec="10"/></Repeat>', stop, limit_s=3.0)
+    assert (flown.end.outcome, flown.end.reason.split(";")[0]) in {
+        (Outcome.ABORTED, "its limit of 3 s is over"),
+        (Outcome.ABORTED, "the stop did not end"),
+    }
+    assert flown.mission.world.now_s < 3.0 + STOP_S + 1.0
