@@ -48,6 +48,8 @@ class Connection:
         self._alive = False
         self._doubted = False
         self._described = ""
+        self._unusable = ""
+        """The managers whose description is of no use here; they are told of once."""
         self._states_heard = ""
         self._asking = False
         self._looking = False
@@ -82,7 +84,7 @@ class Connection:
         if not self._alive:
             self._alive, self.gone = True, False
             self._on_alive()
-        if self._described != instance_id:
+        if instance_id not in {self._described, self._unusable}:
             self._ask(DESCRIBE_S)
         self._look()
 
@@ -106,16 +108,25 @@ class Connection:
 
     def _use(self, instance_id: str, model_json: str) -> None:
         self._asking = self._doubted = False
+        try:
+            self._take(model_json)
+        except Exception as error:  # noqa: BLE001 - of another version, or of types that are not installed here
+            if self._unusable != instance_id:
+                self._unusable = instance_id
+                self._middleware.log(f"the managers of {self._skillset} can't be called: {type(error).__name__}: {error}")
+        else:
+            self._described = instance_id
+        if instance_id != self.instance_id:
+            self._ask(DESCRIBE_S)
+        self._look()
+
+    def _take(self, model_json: str) -> None:
         model = from_json(model_json)
         if model != self.model:
             for skill in model.skills:
                 if skill.name not in self.links:
                     self.links[skill.name] = self._middleware.action(skill.name, self._goals)
             self.model = model
-        self._described = instance_id
-        if instance_id != self.instance_id:
-            self._ask(DESCRIBE_S)
-        self._look()
 
     def _on_silence(self, reason: str) -> None:  # noqa: ARG002 - the reason is of no use to callers
         self._asking = False
@@ -128,7 +139,7 @@ class Connection:
             self._on_gone()
 
     def _ask_again(self) -> None:
-        if self._alive and self._described != self.instance_id:
+        if self._alive and self.instance_id not in {self._described, self._unusable}:
             self._ask(DESCRIBE_S)
 
     def _look(self) -> None:
@@ -147,6 +158,8 @@ class Connection:
         """What the managers can't be called without, and has not come so far; empty when nothing is missing."""
         if not self._alive:
             return "a heartbeat"
+        if self._unusable == self.instance_id:
+            return "a description that can be used here"
         if not self._known:
             return "their description" if self._described != self.instance_id else "the states of their resources"
         if not all(connected() for connected in self.subscriptions):

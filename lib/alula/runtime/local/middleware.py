@@ -272,6 +272,8 @@ class VirtualGoal:
     def __init__(self, bus: Bus, link: VirtualLink, goal_id: str, inputs: Mapping[str, object]) -> None:
         self.id = goal_id
         self.inputs = inputs
+        self.open_at: set[str] = set()
+        """The ids of its server's open goals."""
         self._bus = bus
         self._link = link
 
@@ -282,6 +284,7 @@ class VirtualGoal:
 
     def finish(self, event: ExecutionEvent) -> None:
         """Send the terminal event to the client as the goal's result."""
+        self.open_at.discard(self.id)
         outputs = self._link.outputs_of(event.outputs)
         ending = GoalResult(event.state, event.result, event.message, outputs)
         self._bus.send(lambda: self._link.listener.on_result(self.id, ending))
@@ -307,6 +310,7 @@ class VirtualServer:
     def take(self, goal: VirtualGoal) -> None:
         """Accept a goal and give it to the managers."""
         self.goals.add(goal.id)
+        goal.open_at = self.goals
         self._middleware.do(lambda: self._on_goal(goal))
 
     def cancel(self, goal_id: str) -> None:

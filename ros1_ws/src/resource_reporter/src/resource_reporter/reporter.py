@@ -84,7 +84,8 @@ class ResourceReporter:
     def _work(self) -> None:
         while (call := self._next_call()) is not None:
             self._make(call)
-        self._do_settled()
+        with self._changed:
+            self._do_settled()
 
     def _settled(self) -> bool:
         if self._ledger.settled or not self._subscriber.get_num_connections():
