@@ -119,6 +119,7 @@ CODES: Mapping[str, str] = {
     "ALU712": "an acceptance without a reason, or of nothing",
     "ALU713": "a property of a mission that can't be read",
     "ALU714": "a property of a mission that does not hold",
+    "ALU715": "how the search takes a node of the robot's own",
 }
 
 PROOF_CODES: Mapping[str, str] = {code: meaning for code, meaning in CODES.items() if code.startswith("ALU5")}

@@ -9,6 +9,7 @@ from __future__ import annotations
 from collections.abc import Hashable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
 
+from alula.prove.mission.own import Own
 from alula.prove.mission.reading import OUTCOME, SCRIPT_PORTS, Read
 from alula.trees.node import Node
 from alula.trees.nodes.decorators import Delay, ForceFailure, ForceSuccess, Inverter, Precondition, RunOnce, Timeout
@@ -75,7 +76,7 @@ class Looking:
         node = self._nodes[number]
         before = node.before
         conditions = before is not None and (before.skip_if is not None or before.while_true is not None)
-        return conditions or isinstance(node, SKIPS) or number in self._opaque
+        return conditions or isinstance(node, SKIPS) or (isinstance(node, Own) and node.skips) or number in self._opaque
 
     def may_be_skipped(self, number: int) -> bool:
         """Tell whether a node, or one below it, may be skipped, or asks for what is not known."""

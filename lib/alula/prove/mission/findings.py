@@ -3,8 +3,10 @@
 from __future__ import annotations
 
 from collections.abc import Iterator
+from dataclasses import replace
 
 from alula.language.errors import Diagnostic, Severity
+from alula.model.model import Property
 from alula.model.span import Span
 from alula.prove.limits import Deadline
 from alula.prove.mission.answers import GOOD, Answers, Row
@@ -20,6 +22,7 @@ from alula.prove.mission.words import situation, told
 from alula.trees.node import Node
 
 WAITS = "ALU704"
+OWN = "ALU715"
 ANSWER = "put a Fallback around it with what is to be done then, or `<AlwaysFailure/>` where giving up is meant"
 
 
@@ -28,6 +31,30 @@ def findings(regions: Regions, answers: Answers) -> list[Diagnostic]:
     found = [*_left_taken(regions), *_fighting(regions)]
     # What never happens is known only when all runs were looked at.
     return [*found, *_unanswered(regions, answers), *_never(regions)] if regions.complete else found
+
+
+def taken_as(system: System) -> Iterator[Diagnostic]:
+    """Yield ALU715, once for each type of node of the robot's own that has children or no class: how the search takes it."""
+    for one in system.own.taken:
+        node = next((node for node in system.nodes if node.wiring.type.name == one.name), None)
+        if node is None:
+            continue
+        if not one.why_not:
+            how = "is ticked by its class, and its children with it"
+        elif one.children:
+            how = f"may tick and halt its children in any order, and answer and write anything: {one.why_not}"
+        else:
+            how = f"may answer and write anything: {one.why_not}"
+        found = _finding(OWN, f"'{one.name}' {how}", node, "")
+        yield replace(found, severity=Severity.NOTE)
+
+
+def unless_held_up(system: System, one: Property) -> Iterator[Diagnostic]:
+    """Yield ALU715 for a property of what must come that holds, where nodes may do anything: also nothing, for ever."""
+    names = sorted({f"'{node.wiring.type.name}'" for node in system.nodes} & {f"'{name}'" for name in system.own.names_of_any_order})
+    if names:
+        message = f"the property `{one.name}` ({one.kind.value}) holds unless {' or '.join(names)} keeps it from coming for ever"
+        yield Diagnostic(OWN, message, one.span, Severity.WARNING, "have the search run its class, or ask what must come `within N ticks`")
 
 
 def _left_taken(regions: Regions) -> Iterator[Diagnostic]:
@@ -42,7 +69,7 @@ def _left_taken(regions: Regions) -> Iterator[Diagnostic]:
         message += f": left by {one.by}" if one.by else ""
         cure = "have the skill give back what it holds however it ends, or restart its managers before the next mission"
         states = tuple((f"{skillset.name}.{name}", state) for name, state in one.states.items())
-        run = MissionRun(one.events, one.end, states, system.skillsets)
+        run = MissionRun(one.events, one.end, states, system.skillsets, system.own.why)
         yield _finding("ALU701", message, system.nodes[0], cure, told(system, run.events), run)
 
 

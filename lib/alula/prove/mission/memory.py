@@ -15,6 +15,7 @@ from alula.prove.mission.ahead import RUNS, Ahead, Looking
 from alula.prove.mission.live import Live, Liveness, Place, leaf_place
 from alula.prove.mission.moments import Later, Moment, Thawing, numbered
 from alula.prove.mission.oracle import UndecidedError
+from alula.prove.mission.own import MOST, Run
 from alula.prove.mission.reading import ANOTHER, Read
 from alula.prove.mission.robot import Handle, Memory, Robot
 from alula.prove.mission.unknown import UNKNOWN, Unknown, UnknownNumber, UnknownText, is_unknown
@@ -164,7 +165,8 @@ class Keeper:
             values.append(status._value_)  # the hash of an Enum takes long, and each memory has hundreds
             for name in names if status is IDLE else all_names:
                 value = getattr(node, name)
-                if type(value) in PLAIN and name not in NOT_AS_THEY_ARE:  # nearly all
+                exact = type(value) is int and isinstance(node, Run)
+                if type(value) in PLAIN and name not in NOT_AS_THEY_ARE and not exact:  # nearly all
                     values.append(value)
                     continue
                 if isinstance(value, Moment | Later):
@@ -177,6 +179,8 @@ class Keeper:
     def _kept(self, node: Node, name: str) -> Hashable:
         """Return an attribute; counts of attempts and rounds are kept up to a few: from then on there may be more, or not."""
         value = getattr(node, name)
+        if isinstance(node, Run):
+            return _exactly(node, name, value)
         if name not in COUNTS or not isinstance(value, int | float):
             return _frozen(value)
         if not isinstance(value, UnknownNumber) and value <= self._body.few:
@@ -225,6 +229,25 @@ class Keeper:
             entry.value == ANOTHER if type(entry.value) is str else is_unknown(entry.value)
             for board in self._boards
             for entry in board.entries().values()
+        )
+
+    def inside(self) -> Hashable:
+        """Return, in the middle of a tick, all that the rest of it hangs on, and keep no more of what is counted than between two ticks."""
+        for node, _, all_names in self._nodes:
+            for name in (one for one in all_names if one in COUNTS):
+                setattr(node, name, self._thawed(self._kept(node, name)))
+        for board in self._boards:
+            for name, entry in board.entries().items():
+                if name in self._body.read.counted:
+                    entry.value = self._body.read.value(name, entry.value)
+        robot, told = self._body.robot, self._body.board
+        first = told.failures[0].skill if told.failures else ""
+        return (
+            self._values()[0],
+            tuple((name, one.type, _frozen(one.value)) for known in self._boards for name, one in sorted(known.entries().items())),
+            tuple((getattr(one.leaf.handle, "fixed", ""), one.leaf.interrupted) for one in self.leaves),
+            (first, frozenset(one.result for one in told.failures), told.reason),
+            (tuple(robot.started), frozenset(robot.interrupted)),
         )
 
     # --- back --------------------------------------------------------------------------------------------------------
@@ -289,6 +312,17 @@ class Keeper:
             case (_, *_):
                 return self._thawing.moment(value)
         return value
+
+
+def _exactly(node: Node, name: str, value: object) -> Hashable:
+    """Return what the class of a robot's own node remembers, as it is; raises UndecidedError where that can't be kept, or may grow."""
+    if isinstance(value, Unknown | dict) or is_unknown(value) or (isinstance(value, int) and abs(value) > MOST):
+        what = f"grows beyond {MOST}" if isinstance(value, int) else f"is {value!r}, which the search can't keep"
+        raise UndecidedError(f"{node.place()}: its `{name}` {what}")
+    if isinstance(value, list | tuple | set):
+        several = tuple(_exactly(node, name, one) for one in value)
+        return (type(value).__name__, frozenset(several) if isinstance(value, set) else several)
+    return _frozen(value)
 
 
 def _frozen(value: object) -> Hashable:

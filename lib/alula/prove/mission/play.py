@@ -10,6 +10,7 @@ from __future__ import annotations
 import operator
 from collections.abc import Callable, Collection, Mapping, Sequence
 from dataclasses import dataclass, replace
+from functools import partial
 from pathlib import Path
 
 from alula.missions.director import START_TIMEOUT_S, End, Outcome
@@ -26,15 +27,18 @@ from alula.prove.mission.fitting import COMPARE
 from alula.prove.mission.fitting import told as values_told
 from alula.prove.mission.measured import of_data
 from alula.prove.mission.oracle import Answer, Asked, Oracle, Question
+from alula.prove.mission.own import own_nodes
 from alula.prove.mission.playable import AS_WANTED, breaks, playable, refuses
-from alula.prove.mission.robot import Robot, opaque, progress_of
+from alula.prove.mission.robot import Robot, progress_of
 from alula.prove.mission.run import MissionRun
 from alula.prove.mission.state import Event, Kind
+from alula.prove.mission.system import nowhere_made
 from alula.prove.mission.unknown import UNKNOWN
 from alula.runtime.client import Client
 from alula.runtime.core.execution import Execution
 from alula.runtime.handle import SkillHandle
 from alula.runtime.local import LocalManagers, LocalWorld
+from alula.trees.reading import read_files
 
 FLIPPED = {"<": ">", "<=": ">=", ">": "<", ">=": "<=", "==": "=="}
 STEP_S = 0.01
@@ -101,6 +105,13 @@ class _Told(MissionClient):
     """A client to whose mission the run says what is measured."""
 
     said: dict[str, object]
+    on_start: Callable[[SkillHandle], None]
+
+    def start(self, skill: str, **inputs: object) -> SkillHandle:
+        """Start it, and say so: a tree may leave in the same tick what it has started, and start it again."""
+        handle = super().start(skill, **inputs)
+        self.on_start(handle)
+        return handle
 
     def follow(self, data: Collection[str]) -> None:
         """Follow nothing: the managers of a play have no data."""
@@ -126,7 +137,9 @@ class _Player:
         self._data = {one.skillset.name: one.data for one in playables}
         self._served = {one.skillset.name: one.skillset for one in playables}
         self.world = LocalWorld(self._served.values(), self._functions)
-        nodes = MissionPart(opaque(Robot(self._oracle), part).nodes, memory=part.memory)
+        declared = nowhere_made(read_files(path), run.skillsets, part)
+        own = own_nodes(Robot(self._oracle), part, declared, run.why_any_order)
+        nodes = MissionPart(own.part.nodes, memory=part.memory)
         plan = plan_of_file(path, path.stem, run.skillsets, _Unknown(), nodes)
         plan = replace(plan, inputs={})
         self._facts = plan.facts
@@ -134,20 +147,23 @@ class _Player:
         record = None if out is None else MissionRecord(out, plan, clock_ns, plan.parameters)
         bus = self.world.bus
         self._record = record
+        self._starting = -1
+        """The leaf that starts a skill now."""
+        self._begun: list[tuple[int, SkillHandle]] = []
+        """What leaves have started in this tick."""
         self._said: dict[str, object] = {}
         """The data that are told, None for one that is not fresh."""
 
         def client(name: str, wake: Callable[[], None]) -> _Told:
             made = _Told(Client(HeldMiddleware(bus, name, self._held), name), wake, record)
-            made.said = self._said
+            made.said, made.on_start = self._said, self._note_start
             return made
 
         self._driver = MissionDriver(plan, client, clock_ns, plan.parameters, record=record)
         self._driver.woken_by_events = False
         self._stops = False
         self._leaves = [node for node in self._driver.director.root.iterate() if isinstance(node, SkillNode)]
-        for node in self._leaves:
-            node.leaf.with_inputs({})
+        self._tell_starts(0)
         self.world.on_event(lambda _, event: self._driver.event(event))
         self.world.run_for(0.0)
 
@@ -245,16 +261,15 @@ class _Player:
         for one in event.choices:
             self._progress(one)
         self._tell_data(event)
-        before = {leaf: node.leaf.handle for leaf, node in enumerate(self._leaves)}
+        self._begun.clear()
         self._oracle.begin(lambda _: None)
         self._oracle.choices = list(event.choices)
         tick()
         self.world.run_for(0.0)
         self._follow_stop()
         started = []
-        for leaf, node in enumerate(self._leaves):
-            handle = node.leaf.handle
-            if handle is not None and handle is not before.get(leaf) and handle.id in self._held:  # else nobody could be asked
+        for leaf, handle in self._begun:
+            if handle.id in self._held:  # else nobody could be asked
                 started.append(leaf)
                 self._handles[leaf] = handle
         if sorted(started) != sorted(event.started):
@@ -266,9 +281,20 @@ class _Player:
         if stop is not None and not self._stops:
             self._stops = True
             more = [node for node in stop.iterate() if isinstance(node, SkillNode)]
-            for node in more:
-                node.leaf.with_inputs({})
             self._leaves += more
+            self._tell_starts(len(self._leaves) - len(more))
+
+    def _tell_starts(self, first: int) -> None:
+        """Have leaves, from one on, say when they start; nothing that is played hangs on inputs."""
+        for number, node in enumerate(self._leaves[first:], first):
+            node.leaf.with_inputs(partial(self._inputs, number))
+
+    def _inputs(self, leaf: int, _board: object) -> Mapping[str, object]:
+        self._starting = leaf
+        return {}
+
+    def _note_start(self, handle: SkillHandle) -> None:
+        self._begun.append((self._starting, handle))
 
     def _tell_data(self, event: Event) -> None:
         """Tell values that fit what the tick answers about data."""

@@ -16,7 +16,7 @@ from alula.prove.limits import Deadline, OutOfTimeError
 from alula.prove.mission.accepted import acceptances, divided
 from alula.prove.mission.answers import Answers, Row
 from alula.prove.mission.conditions import NO_FAULTS, Faults
-from alula.prove.mission.findings import WAITS, findings, waits
+from alula.prove.mission.findings import WAITS, findings, taken_as, unless_held_up, waits
 from alula.prove.mission.holding import SINGLE, held
 from alula.prove.mission.managers import Failures
 from alula.prove.mission.oracle import UndecidedError
@@ -117,20 +117,16 @@ class _Search:
     def within(self, deadline: Deadline, given: str) -> _Seen:
         """Look at what the models say, and at the properties of the file."""
         try:
-            system = System.read(self._path, self._models, self._part, LOOKED_AT, deadline)
-            properties, wrong = wanted(system.nodes, system.skillsets, self._faults)
-            # What must come is looked at one situation after another, for which it needs time of its own.
-            several = any(one.kind not in SINGLE for one in properties)
-            regions = Regions(system, deadline.half(deadline.doing) if several else deadline)
-            _explore(regions)
+            regions, several = self._regions(deadline)
         except (UndecidedError, InputError) as error:
             message = f"its runs can't be looked at: {error}"
             return _Seen(self._path, None, (Diagnostic("ALU711", message, _whole(self._path), Severity.WARNING),))
         except OutOfTimeError:
             return _Seen(self._path, None, bounds=(_bound(self._path, 0, given),))
+        properties, wrong = wanted(regions.system.nodes, regions.system.skillsets, self._faults)
         answers = Answers(regions)
         looked = Waits(regions)
-        found = findings(regions, answers)
+        found = [*taken_as(regions.system), *findings(regions, answers)]
         seen_waiting, complete = _waits(looked, regions, deadline.half(deadline.doing) if several else deadline)
         found += [*seen_waiting, *wrong]
         undecided = []
@@ -138,8 +134,28 @@ class _Search:
             seen = held(regions, one, self._faults, deadline, always_ends=looked.always_ends)
             found += [seen.finding] if seen.finding else []
             undecided += [one.name] if not seen.finding and not seen.complete else []
+            helped = one.kind not in SINGLE and not one.within and not seen.finding and seen.complete
+            found += list(unless_held_up(regions.system, one)) if helped else []
         bounds = () if complete and not undecided else (_bound(self._path, len(regions.regions), given, undecided),)
         return _Seen(self._path, regions, tuple(found), tuple(answers.rows), bounds)
+
+    def _regions(self, deadline: Deadline, why_any_order: str = "") -> tuple[Regions, bool]:
+        """Return what was looked at within a time, and whether a property needs some of that; raises as ``System.read``.
+
+        Where a class of a robot's own that was run needs what the search does not know, all such classes may do anything instead.
+        """
+        system = System.read(self._path, self._models, self._part, LOOKED_AT, deadline, why_any_order=why_any_order)
+        properties, _ = wanted(system.nodes, system.skillsets, self._faults)
+        # What must come is looked at one situation after another, for which it needs time of its own.
+        several = any(one.kind not in SINGLE for one in properties)
+        regions = Regions(system, deadline.half(deadline.doing) if several else deadline)
+        try:
+            _explore(regions)
+        except UndecidedError as error:
+            if not system.own.any_run:
+                raise
+            return self._regions(deadline, str(error))
+        return regions, several
 
     def also(self, before: _Seen, deadline: Deadline, given: str) -> _Seen:
         """Look at runs in which hooks raise, managers die, or somebody aborts or pauses the mission; of those, what is new."""

@@ -76,6 +76,7 @@ class Fork:
 
     ways: tuple[tuple[Answer, Sets], ...]
     free: bool
+    in_breadth: bool = False
 
 
 @dataclass
@@ -126,6 +127,7 @@ class Regions:
 
         Those that few ticks lead to come first; the last is the one that was looked for.
         """
+        self.system.ticker.deadline = self.deadline if self.system.own.names_of_any_order else None
         try:
             self.complete = self._explore(begin or self.system.initial(), until)
         finally:
@@ -188,14 +190,15 @@ class Regions:
 
     def split(self, memory: int, act: str, sets: Sets) -> Iterator[tuple[Outcome, Sets]]:
         """Yield each way in which a tick can go, with the managers that it can go so with."""
-        todo: list[tuple[tuple[Answer, ...], Sets]] = [((), sets)]
+        todo: deque[tuple[tuple[Answer, ...], Sets]] = deque([((), sets)])
         while todo:
             answers, left = todo.pop()
             found = self.follow(memory, act, answers, left)
             if isinstance(found, Outcome):
                 yield found, left
             else:
-                todo += [((*answers, answer), divided) for answer, divided in found.ways]
+                later = [((*answers, answer), divided) for answer, divided in found.ways]
+                todo.extendleft(later) if found.in_breadth else todo.extend(later)
 
     def follow(self, memory: int, act: str, answers: Sequence[Answer], sets: Sets) -> Outcome | Fork:
         """Return what a tick comes to after its first answers, or what is asked next, of managers that have answered so."""
@@ -203,7 +206,7 @@ class Regions:
         if isinstance(known, Outcome):
             return known
         if known.options:
-            return Fork(tuple((option, sets) for option in known.options), free=True)
+            return Fork(tuple((option, sets) for option in known.options), free=True, in_breadth=known.in_breadth)
         return Fork(tuple(self._divided(known, sets)), free=False)
 
     def _divided(self, known: Decision, sets: Sets) -> Iterator[tuple[Answer, Sets]]:

@@ -1,13 +1,12 @@
-"""What stands in the place of a robot when a mission's tree is ticked in the search: clients, executions, nodes of its own."""
+"""What stands in the place of a robot when a mission's tree is ticked in the search: its clients, and the executions of its skills."""
 
 from __future__ import annotations
 
 import math
-from collections.abc import Collection, Iterator, Mapping, Sequence
+from collections.abc import Callable, Collection, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field
 
 from alula.missions.blackboard import Blackboard, Failure
-from alula.missions.part import MissionPart
 from alula.missions.pending import PendingInterrupts
 from alula.missions.skill_types import type_of
 from alula.missions.skills import SkillNode
@@ -19,11 +18,10 @@ from alula.prove.mission.oracle import Oracle
 from alula.prove.mission.states import Compared, SeenState
 from alula.prove.mission.unknown import UnknownNumber, unknown
 from alula.runtime.handle import SkillHandle
-from alula.trees.node import Node, pointer
-from alula.trees.palette import Direction
-from alula.trees.status import FAILURE, IDLE, RUNNING, SUCCESS, Answer
 
 NO_END = ("sent",)
+Position = int
+"""A number of questions that a tick has asked."""
 
 
 @dataclass
@@ -39,6 +37,8 @@ class Robot:
     """The leaf that starts a skill now."""
     started: list[int] = field(default_factory=list)
     interrupted: list[int] = field(default_factory=list)
+    come_again: Callable[[Position], bool] = lambda _: False
+    """Tells a node that does one thing after another that all is as it was after fewer or other things of its; a play never does."""
     now: Moment = field(init=False)
     measurements: Measurements = field(init=False)
 
@@ -69,11 +69,11 @@ class Handle:
         self.skill = skill
         self._robot = robot
         self._outputs = skillset.skill(skill).outputs
-        self._fixed = ("ended", ExecutionState.FAILED.value, "") if failed else NO_END if fresh else None
+        self.fixed = ("ended", ExecutionState.FAILED.value, "") if failed else NO_END if fresh else None
 
     @property
     def _seen(self) -> tuple[str, ...]:
-        return self._fixed or self._robot.oracle.look(("execution", self.leaf))  # type: ignore[return-value]
+        return self.fixed or self._robot.oracle.look(("execution", self.leaf))  # type: ignore[return-value]
 
     @property
     def state(self) -> ExecutionState:
@@ -209,29 +209,3 @@ class Memory(Blackboard):
         known = [Failure("", first, ExecutionState.FAILED, "", "")] if first else []
         self.failures = known + [Failure("", "", ExecutionState.FAILED, end, "") for end in sorted(ends)]
         self.reason = ""
-
-
-def opaque(robot: Robot, part: MissionPart) -> MissionPart:
-    """Return a robot's part with nodes that may answer all that they declare, and write values of which nothing is known."""
-    return MissionPart(tuple((name, _opaque(robot, node)) for name, node in part.nodes), memory=Memory)
-
-
-def _opaque(robot: Robot, real: type[Node]) -> type[Node]:
-    several = "on_running" in {name for one in real.__mro__[:-1] for name in vars(one)}
-    options: tuple[Answer, ...] = (SUCCESS, FAILURE, RUNNING) if several else (SUCCESS, FAILURE)
-
-    def update(self: Node) -> Answer:
-        names = tuple(one.value for one in options if hasattr(one, "value"))
-        answer = options[names.index(str(robot.oracle.choose(("answer", self.name), names)))]
-        for port in self.wiring.type.ports.values():
-            text = self.wiring.ports.get(port.name, "")
-            if port.direction is not Direction.INPUT and pointer(text, port.name) is not None:
-                self.put(port.name, unknown(robot.oracle, f"`{pointer(text, port.name)}`", port.type))
-        return answer
-
-    def halt(self: Node) -> None:
-        self.reset_children() if hasattr(self, "reset_children") else None
-        self.become(IDLE)
-
-    content = {"ports": real.ports, "update": update, "category": real.category, "child_count": real.child_count, "halt": halt}
-    return type(real.__name__, (Node,), {**content, "__doc__": real.__doc__})

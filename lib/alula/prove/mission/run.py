@@ -20,6 +20,8 @@ class MissionRun:
     outcome: str
     states: tuple[tuple[str, str], ...]
     skillsets: tuple[Skillset, ...]
+    why_any_order: str = ""
+    """Why nodes of the robot's own do anything in it that their class need not do."""
 
 
 def run_of(system: System, events: Sequence[Event], state: State) -> MissionRun:
@@ -27,7 +29,7 @@ def run_of(system: System, events: Sequence[Event], state: State) -> MissionRun:
     names = [f"{one.name}.{resource.name}" for one in system.skillsets for resource in one.resources]
     states = ((name, known) for name in names if (known := system.resource(state, name)) is not None)
     outcome = system.outcome(state) or Outcome.RUNNING
-    return MissionRun(tuple(events), outcome.value, tuple(states), system.skillsets)
+    return MissionRun(tuple(events), outcome.value, tuple(states), system.skillsets, system.own.why)
 
 
 @dataclass(frozen=True)

@@ -23,6 +23,7 @@ from pathlib import Path
 
 from alula.missions.director import Director, Outcome
 from alula.missions.mission_file import STOP_HERE, FiledMission, plan_of_file
+from alula.missions.palette import mission_palette
 from alula.missions.part import MissionPart
 from alula.missions.plan import InputError, Inputs
 from alula.missions.skill_types import OUTCOME_PORT
@@ -34,15 +35,16 @@ from alula.prove.mission.managers import ENDED, RUNNING, SENT, End, Failures, Ma
 from alula.prove.mission.measured import Conditions
 from alula.prove.mission.memory import FEW, Body, TreeMemory
 from alula.prove.mission.oracle import Answer, Oracle, Question
+from alula.prove.mission.own import OwnNodes, own_nodes
 from alula.prove.mission.reading import what_is_read
-from alula.prove.mission.robot import Client, Memory, Robot, Waits, opaque
+from alula.prove.mission.robot import Client, Memory, Robot, Waits
 from alula.prove.mission.state import Event, Execution, Kind, Managers, State
 from alula.prove.mission.states import Compared
 from alula.prove.mission.ticking import ABORT, TICK, OneStop, Ticker
 from alula.prove.mission.ticking import Outcome as Ticked
 from alula.prove.mission.unknown import UNKNOWN
 from alula.trees.node import Node, pointer
-from alula.trees.palette import Direction, Port
+from alula.trees.palette import Direction, NodeType, Port
 from alula.trees.reading import TreeFiles, read_files, type_name
 
 _GIVEN_S = 30.0
@@ -52,8 +54,11 @@ TERMINATED, FAILED = ExecutionState.TERMINATED.value, ExecutionState.FAILED.valu
 class System:
     """All runs of a mission. ``skillsets`` are those that its trees name, in the models' order."""
 
-    def __init__(self, ticker: Ticker, body: Body, skillsets: Sequence[Skillset], failures: Failures, deadline: Deadline) -> None:
+    def __init__(
+        self, ticker: Ticker, body: Body, skillsets: Sequence[Skillset], failures: Failures, deadline: Deadline, own: OwnNodes
+    ) -> None:
         self.skillsets = tuple(skillsets)
+        self.own = own
         self.failures = failures
         self.ticker = ticker
         self.trees = body.trees
@@ -78,10 +83,12 @@ class System:
         deadline: Deadline | None = None,
         few: int = FEW,
         known: Inputs | None = None,
+        why_any_order: str = "",
     ) -> System:
         """Read a mission's file; attempts and rounds are counted exactly up to ``few``.
 
-        With ``known`` inputs the robot's own nodes do what they do; without, they may answer all that they declare.
+        With ``known`` inputs the robot's own leaves do what they do; without, they may answer all that they declare. Its nodes with
+        children are run where their code can be, unless a reason is given (``why_any_order``).
 
         Raises InputError where the file can't be used, UndecidedError where the search can't look at it.
         """
@@ -90,8 +97,8 @@ class System:
         oracle = Oracle()
         robot = Robot(oracle, Conditions.of(files, skillsets), Compared.of(files, skillsets))
         inputs = {port.name: UNKNOWN for port in _ports(files)} if known is None else known
-        nodes = opaque(robot, part) if known is None else MissionPart(part.nodes, memory=Memory)
-        plan = plan_of_file(path, path.stem, skillsets, inputs, nodes)
+        own = own_nodes(robot, part, nowhere_made(files, models, part), why_any_order, known=known is not None)
+        plan = plan_of_file(path, path.stem, skillsets, inputs, own.part)
         clients = {one.name: Client(robot, one) for one in skillsets}
         oracle.begin(lambda _: None)
         mission, board = plan.make(clients, robot.clock_ns, plan.parameters)  # type: ignore[arg-type]  # a client as far as missions use it
@@ -100,15 +107,14 @@ class System:
         stop = mission.stop_tree() if STOP_HERE in files.trees else None
         trees = (mission.tree, *([stop] if stop else []))
         director = Director(OneStop(mission, stop), board)
-        own = [name for name, _ in part.nodes]
-        unread = [*(own if known is None else []), *(f"{one.name}.{skill.name}" for one in skillsets for skill in one.skills)]
-        read = what_is_read(files, unread, plan.parameters, oracle, own if known is not None else ())
+        unread = [*own.unread, *(f"{one.name}.{skill.name}" for one in skillsets for skill in one.skills)]
+        read = what_is_read(files, unread, plan.parameters, oracle, own.free)
         body = Body(robot, director, board, trees, {one.name: one for one in skillsets}, read, few)
         ticker = Ticker(body, oracle)
         board.pending = Waits(robot, [one.name for one in skillsets], ticker.leaves)
         for number, node in enumerate(ticker.leaves):
             node.leaf.with_inputs(_Starting(robot, number))
-        return cls(ticker, body, skillsets, failures, deadline or Deadline.after(_GIVEN_S))
+        return cls(ticker, body, skillsets, failures, deadline or Deadline.after(_GIVEN_S), own)
 
     def looking_at(self, failures: Failures, deadline: Deadline) -> System:
         """Return the same mission with other failures: what is known of its ticks, and the numbers, hold for both."""
@@ -295,6 +301,13 @@ class _Starting:
     def __call__(self, _: object) -> Mapping[str, object]:
         self._robot.starting = self._leaf
         return {}
+
+
+def nowhere_made(files: TreeFiles, skillsets: Sequence[Skillset], part: MissionPart) -> list[NodeType]:
+    """Return the types of node that a mission's trees use and its files only declare."""
+    palette = mission_palette(skillsets, part)
+    used = {type_name(element) for tree in files.trees.values() for element in tree.iterate()}
+    return [one for one in files.declared() if one.name in used and palette.get(one.name) is None]
 
 
 def _named(files: TreeFiles) -> frozenset[str]:

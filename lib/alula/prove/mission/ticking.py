@@ -6,7 +6,8 @@ decisions; a situation that gives answers which are known already needs no tick.
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Sequence
+from collections import deque
+from collections.abc import Hashable, Iterator, Sequence
 from dataclasses import dataclass, field
 from typing import NamedTuple
 
@@ -14,14 +15,17 @@ from py_trees.behaviour import Behaviour
 
 from alula.missions.director import Director
 from alula.missions.mission_file import FiledMission
+from alula.prove.limits import Deadline
 from alula.prove.mission.measured import of_data
 from alula.prove.mission.memory import Body, Keeper, TreeMemory
 from alula.prove.mission.oracle import Answer, Asked, Oracle, Question, UndecidedError, View
+from alula.prove.mission.own import DOES
 from alula.trees.node import Node
 from alula.trees.status import Status
 from alula.trees.tree import Tree
 
 TICK, ABORT = "tick", "abort"
+CHOSEN_ANEW = frozenset({DOES, "answer", "compare"})
 
 
 class Outcome(NamedTuple):
@@ -41,6 +45,11 @@ class Decision:
     question: Question
     options: tuple[Answer, ...]
     next: dict[Answer, Decision | Outcome] = field(default_factory=dict)
+
+    @property
+    def in_breadth(self) -> bool:
+        """Tell whether few such choices come before many: what a node does one after another leads to most things in many ways."""
+        return self.question[0] == DOES
 
 
 class OneStop:
@@ -86,18 +95,25 @@ class Ticker:
         self._pausing: dict[int, bool] = {}
         self._touched: set[tuple[int, str]] = set()
         self._of = {id(node): number for number, node in enumerate(self.nodes)}
+        self.deadline: Deadline | None = None
+        """Looked at before each tick of a mission in which one tick can be so many that a look at each group of situations is too few."""
+        self._inside: dict[Hashable, tuple[Answer, ...]] = {}
+        """By what was so in the middle of a tick, the answers that first led to it."""
+        self._doing: tuple[int, str] = (0, TICK)
+        body.robot.come_again = self._come_again
         oracle.begin(lambda _: None)
         self.initial = self._number(self._keeper.take())
 
     def outcomes(self, memory: int, view: View, act: str = TICK) -> Iterator[Outcome]:
         """Yield all that a tick (or an abort) can come to where observations are as ``view`` answers."""
-        todo: list[tuple[Answer, ...]] = [()]
+        todo: deque[tuple[Answer, ...]] = deque([()])
         while todo:
             answers = todo.pop()
             known = self.known(memory, act, view, answers)
             while isinstance(known, Decision):
                 if known.options:
-                    todo += [(*answers, option) for option in known.options[1:]]
+                    later = ((*answers, option) for option in known.options[1:])
+                    todo.extendleft(later) if known.in_breadth else todo.extend(later)
                     answers = (*answers, known.options[0])
                 else:
                     answers = (*answers, view(known.question))
@@ -132,7 +148,10 @@ class Ticker:
 
     def _run(self, memory: int, act: str, view: View, answers: Sequence[Answer]) -> None:
         """Do a tick by the engine, and keep what it came to."""
+        if self.deadline is not None:
+            self.deadline.check()
         self.runs += 1
+        self._doing = (memory, act)
         self._oracle.begin(view, answers)
         self._keeper.put(self.memories[memory])
         self._touched = set()
@@ -163,6 +182,15 @@ class Ticker:
             if self._keeper.unknown or self._body.robot.measurements.any:
                 raise UndecidedError(str(error)) from error
             director.broken(f"the tree raised {type(error).__name__}: {error}")
+
+    def _come_again(self, begin: int) -> bool:
+        """Tell whether all is as it was after other answers from the same question on: what follows from here follows from there, too."""
+        asked = self._oracle.asked
+        # What is asked of leaves and unknown values is chosen anew each time; all else has one answer for the whole tick.
+        lasting = frozenset((one.question, one.answer) for one in asked[begin:] if one.question[0] not in CHOSEN_ANEW)
+        answers = tuple(one.answer for one in asked)
+        key = (self._doing, begin, answers[:begin], self._keeper.inside(), lasting)
+        return self._inside.setdefault(key, answers) != answers
 
     def _keep(self, memory: int, act: str, asked: Sequence[Asked], outcome: Outcome) -> None:
         if not asked:

@@ -79,6 +79,8 @@ def choice(one: Asked) -> str:
     match one.question:
         case ("time", str(duration)):
             return f"{float(duration) / 1e9:g} s are over" if one.answer and float(duration) >= 1e6 else ""
+        case ("does", str(name)):
+            return f"'{name}' {one.answer}"
         case ("answer", str(name)):
             return f"'{name}' answers {one.answer}"
         case ("data", str(what), "fresh", _):

@@ -498,11 +498,11 @@ class Function(SkillHooks):
         self._running.append(execution)
 
 
-def flown(path: Path, chance: random.Random) -> Iterator[tuple[frozenset[int], Mapping[str, str], str]]:
+def flown(path: Path, chance: random.Random, part: MissionPart = PART) -> Iterator[tuple[frozenset[int], Mapping[str, str], str]]:
     """Fly a mission by the real engine over real managers, and yield what is the case after each of its ticks."""
     skillsets = robots()
     used = [one for one in skillsets if f"{one.name}." in path.read_text()]
-    plan = plan_of_file(path, "mission", used, {}, PART)
+    plan = plan_of_file(path, "mission", used, {}, part)
     running: list[Execution] = []
     Pick.chance = chance
 
