@@ -18,7 +18,7 @@ from alula.prove.mission.oracle import UndecidedError
 from alula.prove.mission.own import MOST, Run
 from alula.prove.mission.reading import ANOTHER, Read
 from alula.prove.mission.robot import Handle, Memory, Robot
-from alula.prove.mission.unknown import UNKNOWN, Unknown, UnknownNumber, UnknownText, is_unknown
+from alula.prove.mission.unknown import Unknown, UnknownNumber, UnknownText, is_unknown
 from alula.trees.blackboard import Entry
 from alula.trees.node import Node
 from alula.trees.status import IDLE, RUNNING, Skipped, Status
@@ -303,6 +303,8 @@ class Keeper:
                 return [self._thawed(one) for one in items]
             case ("tuple", tuple(items)):
                 return tuple(self._thawed(one) for one in items)
+            case ("dict", tuple(items)):
+                return {name: self._thawed(one) for name, one in items}
             case ("set", frozenset() as items):
                 return set(items)
             case ("number", (str(what), float(low), float(high))):
@@ -340,5 +342,5 @@ def _frozen(value: object) -> Hashable:
         case set():
             return ("set", frozenset(value))
         case dict():
-            return UNKNOWN
+            return ("dict", tuple((name, _frozen(one)) for name, one in value.items()))
     raise UndecidedError(f"a node remembers {value!r}, which the search can't keep")

@@ -3,13 +3,13 @@
 from __future__ import annotations
 
 import random
-from typing import ClassVar
+from typing import Any, ClassVar
 
 from alula.missions.part import MissionPart
-from alula.trees.node import Action, Control, Decorator, Wiring
+from alula.trees.node import Action, Control, Decorator, SyncAction, Wiring
 from alula.trees.palette import input_port, output_port
 from alula.trees.status import FAILURE, IDLE, RUNNING, SKIPPED, SUCCESS, Answer
-from alula.trees.values import INT
+from alula.trees.values import ANY, DOUBLE, INT
 
 SECOND_NS = 1e9
 
@@ -198,3 +198,15 @@ RUN = {"robot.Guard": Guard, "robot.Limit": Limit, "robot.Recovery": Recovery, "
 ANYHOW = {"robot.Moody": Moody, "robot.Counted": Counted, "robot.Seldom": Seldom}
 """Those that may do anything there."""
 PART = MissionPart((*RUN.items(), *ANYHOW.items(), ("robot.Shy", Shy)))
+
+
+class Place(SyncAction):
+    """Computes with what it is given: succeeds where that is near."""
+
+    ports = (input_port("seen", ANY), output_port("far", DOUBLE))
+
+    def update(self) -> Answer:
+        """Compute."""
+        seen: Any = self.get("seen")
+        self.put("far", float(seen["x"] + 1))
+        return SUCCESS if seen["x"] < 3 else FAILURE

@@ -136,6 +136,59 @@ def test_a_node_that_is_only_declared_may_answer_and_write_anything(tmp_path: Pa
     assert all("the file declares it, and no class is known" in one for one in told)
 
 
+SEEING = """
+type Spot
+skillset eyes {
+  skill look {
+    output { spot: Spot }
+    success SEEN
+  }
+  skill wave { success DONE }
+}
+"""
+PLACED = """<Sequence>
+  <eyes.look spot="{spot}"/>
+  <robot.Place seen="{PORT}" far="{far}"/>
+  <ScriptCondition name="it is far" code="far &gt;= 3"/>
+  <eyes.wave/>
+</Sequence>"""
+
+
+def known_to(folder: Path, text: str, inputs: Mapping[str, object]) -> System:
+    """Return a mission as odds look at it, with inputs that are known."""
+    (eyes,) = check_texts([ModelFile("robot.rl", SEEING)])[0].skillsets
+    names = "".join(f'<input_port name="{name}"/>' for name in inputs)
+    path = folder / "mission.xml"
+    path.write_text(whole(text).replace("</root>", f'<TreeNodesModel><SubTree ID="mission">{names}</SubTree></TreeNodesModel></root>'))
+    part = MissionPart((("robot.Place", own_nodes.Place),))
+    return System.read(path, (eyes,), part, Failures(refusals=False, hooks=False, aborts=False), known=inputs)
+
+
+def answers(system: System) -> dict[str, set[str]]:
+    """Return what nodes answer in all runs, by their names."""
+    regions = Regions(system, Deadline.after(1e6))
+    regions.explore()
+    touched = {one for region in regions.regions for _, ticked in region.next for way, _ in ticked.ways for one in way.touched}
+    found: dict[str, set[str]] = {}
+    for number, status in touched:
+        found.setdefault(system.nodes[number].name, set()).add(status)
+    return found
+
+
+def test_a_leaf_that_computes_with_what_nobody_knows_may_answer_and_write_anything(tmp_path: Path) -> None:
+    both = {"SUCCESS", "FAILURE"}
+    told = answers(known_to(tmp_path, PLACED.replace("PORT", "spot"), {}))
+    assert (told["robot.Place"], told["it is far"]) == (both, both)
+    told = answers(known_to(tmp_path, PLACED.replace("PORT", "place"), {"place": {"x": 2.5}}))
+    assert (told["robot.Place"], told["it is far"]) == ({"SUCCESS"}, {"SUCCESS"})
+
+
+def test_a_leaf_whose_code_breaks_on_what_is_known_is_named(tmp_path: Path) -> None:
+    system = known_to(tmp_path, PLACED.replace("PORT", "place"), {"place": 3})
+    with pytest.raises(UndecidedError, match=r"mission\.xml:\d+:\d+ \(robot\.Place\): its code raises TypeError: 'int'"):
+        answers(system)
+
+
 # --- which classes are run ---------------------------------------------------------------------------------------------
 
 
