@@ -17,7 +17,6 @@ from test_prove_mission_runs import flown, robots
 
 from alula.language.errors import Diagnostic, Severity
 from alula.language.models import ModelFile, check_texts
-from finding_pages.mission_checks import whole
 from alula.missions.part import NO_PART, MissionPart
 from alula.prove.limits import Deadline, OutOfTimeError
 from alula.prove.mission.managers import Failures
@@ -30,6 +29,7 @@ from alula.prove.mission.runnable import why_not
 from alula.prove.mission.system import System
 from alula.trees.node import Control, Decorator, Node
 from alula.trees.status import FAILURE, RUNNING, SUCCESS, Answer
+from finding_pages.mission_checks import whole
 
 ROVER = """
 skillset r1 {
