@@ -11,7 +11,7 @@ from xml.etree import ElementTree as ET
 
 import pytest
 
-from alula.commands.replay import OTHERWISE
+from alula.cli.replay import OTHERWISE
 
 RECORDING = Path(os.environ["ALULA_ROOT"]) / "tests/recordings/mapping"
 

@@ -11,10 +11,10 @@ from pathlib import Path
 import pytest
 from mcap.writer import Writer
 
-import alula.commands.replay
-from alula.commands import expect
-from alula.commands import run as over_mocks
-from alula.commands.replay import CANNOT_REPLAY, OTHERWISE, SAME
+import alula.cli.replay
+from alula.cli import expect
+from alula.cli import run as over_mocks
+from alula.cli.replay import CANNOT_REPLAY, OTHERWISE, SAME
 from alula.common.faults import parse_fault
 from alula.common.record import DATA, DECISIONS, FILE, MISSION, Entry, RecordWriter, read_record
 from alula.common.scenarios import load_scenario
@@ -32,7 +32,7 @@ ALULA_ROOT = Path(os.environ["ALULA_ROOT"])
 @pytest.fixture(autouse=True)
 def without_report(monkeypatch):
     """Make no report of a replay: seconds each; ``test_replay_outputs`` has those that are made."""
-    monkeypatch.setattr(alula.commands.replay, "make_report", lambda *_: None)
+    monkeypatch.setattr(alula.cli.replay, "make_report", lambda *_: None)
 
 
 def fly(out: Path, *faults: str, scenario: str = "mapping") -> Path:

@@ -11,8 +11,8 @@ from pathlib import Path
 
 import pytest
 
-import alula.commands.replay
-from alula.commands.replay import CANNOT_REPLAY, OTHERWISE, SAME
+import alula.cli.replay
+from alula.cli.replay import CANNOT_REPLAY, OTHERWISE, SAME
 from alula.common.record import DECISIONS, FILE, MISSION, read_record
 from alula_flight.replay import main
 
@@ -25,7 +25,7 @@ OTHERS = ALULA_ROOT.parent / "shared" / "data" / "bags"
 @pytest.fixture(autouse=True)
 def without_report(monkeypatch):
     """Make no report of a replay: seconds each; ``test_replay_outputs`` has those that are made."""
-    monkeypatch.setattr(alula.commands.replay, "make_report", lambda *_: None)
+    monkeypatch.setattr(alula.cli.replay, "make_report", lambda *_: None)
 
 
 def decided(run: Path) -> list[tuple]:

@@ -37,7 +37,7 @@ def run(rover: Path, *words: str) -> subprocess.CompletedProcess[str]:
 def test_its_models_are_proved_and_its_missions_have_no_findings(rover: Path) -> None:
     missions = [f"missions/{name}.xml" for name in ("deliver", "patrol")]
     models = [str(path) for path in sorted((rover / "skillsets").iterdir()) if path.suffix in {".skill", ".rl"}]
-    done = run(rover, "alula.commands.check", *models, *missions)
+    done = run(rover, "alula.cli.check", *models, *missions)
     assert done.returncode == 0, done.stdout + done.stderr
     # What a mission accepts is a note, and one that the time was over before all its runs were looked at.
     assert len(re.findall(r": ok(, 1 note|, 2 notes)?$", done.stdout, re.MULTILINE)) == len(models) + len(missions)
@@ -45,7 +45,7 @@ def test_its_models_are_proved_and_its_missions_have_no_findings(rover: Path) ->
 
 
 def test_the_laser_dies_and_it_reports_where_it_waits(rover: Path, tmp_path: Path) -> None:
-    done = run(rover, "alula.commands.run", "deliver", "--mock", "--fail", "laser@30", "--out", str(tmp_path / "run"))
+    done = run(rover, "alula.cli.run", "deliver", "--mock", "--fail", "laser@30", "--out", str(tmp_path / "run"))
     assert done.returncode == 0, done.stdout + done.stderr
     summary = json.loads((tmp_path / "run/summary.json").read_text(encoding="utf-8"))
     assert (summary["outcome"], summary["problems"]) == ("degraded", [])
@@ -55,16 +55,16 @@ def test_the_laser_dies_and_it_reports_where_it_waits(rover: Path, tmp_path: Pat
 
 def test_a_run_is_decided_again_and_held_against_what_is_expected_of_it(rover: Path, tmp_path: Path) -> None:
     folder = tmp_path / "run"
-    assert run(rover, "alula.commands.run", "deliver", "--mock", "--fail", "pose@20-25", "--out", str(folder)).returncode == 0
-    again = run(rover, "alula.commands.replay", str(folder))
+    assert run(rover, "alula.cli.run", "deliver", "--mock", "--fail", "pose@20-25", "--out", str(folder)).returncode == 0
+    again = run(rover, "alula.cli.replay", str(folder))
     assert again.returncode == 0, again.stdout + again.stderr
     assert "decisions, all as they were" in again.stderr
-    assert "decisions differ at" in run(rover, "alula.commands.replay", str(folder), "--fail", "laser@40").stderr
-    (tmp_path / "expected.yaml").write_text(run(rover, "alula.commands.expect", str(folder)).stdout, encoding="utf-8")
-    held = run(rover, "alula.commands.expect", str(folder), "--check", str(tmp_path / "expected.yaml"))
+    assert "decisions differ at" in run(rover, "alula.cli.replay", str(folder), "--fail", "laser@40").stderr
+    (tmp_path / "expected.yaml").write_text(run(rover, "alula.cli.expect", str(folder)).stdout, encoding="utf-8")
+    held = run(rover, "alula.cli.expect", str(folder), "--check", str(tmp_path / "expected.yaml"))
     assert held.returncode == 0, held.stdout + held.stderr
-    assert run(rover, "alula.commands.run", "deliver", "--mock", "--out", str(tmp_path / "other")).returncode == 0
-    assert run(rover, "alula.commands.expect", str(tmp_path / "other"), "--check", str(tmp_path / "expected.yaml")).returncode == 1
+    assert run(rover, "alula.cli.run", "deliver", "--mock", "--out", str(tmp_path / "other")).returncode == 0
+    assert run(rover, "alula.cli.expect", str(tmp_path / "other"), "--check", str(tmp_path / "expected.yaml")).returncode == 1
 
 
 def test_a_campaign_finds_no_trouble_in_runs_that_end_where_it_may_be_left(rover: Path, tmp_path: Path) -> None:
@@ -196,12 +196,12 @@ def test_the_page_that_adds_a_skill_works_as_it_stands(rover: Path, tmp_path: Pa
         path.write_text(before + lines + (after.lstrip("\n") if how == "in place of" else found + after), encoding="utf-8")
         if path.suffix == ".py":
             compile(path.read_text(encoding="utf-8"), path, "exec")
-    done = run(copy, "alula.commands.check", str(copy / "skillsets/cargo.skill"))
+    done = run(copy, "alula.cli.check", str(copy / "skillsets/cargo.skill"))
     assert done.returncode == 0, done.stdout + done.stderr
     (tmp_path / "mute.yaml").write_text("skills: {cargo.honk: {result: MUTE}}", encoding="utf-8")
     for words, ends in (([], ["HONKED", "ARRIVED"]), (["--behaviour", str(tmp_path / "mute.yaml")], ["MUTE", "ANSWERED", "ARRIVED"])):
         out = tmp_path / f"run{len(words)}"
-        done = run(copy, "alula.commands.run", "deliver", "--mock", "--fail", "laser@30", *words, "--out", str(out))
+        done = run(copy, "alula.cli.run", "deliver", "--mock", "--fail", "laser@30", *words, "--out", str(out))
         assert done.returncode == 0, done.stdout + done.stderr
         skills = [(one["skill"], one["result"]) for one in json.loads((out / "summary.json").read_text(encoding="utf-8"))["skills"]]
         at = next(at for at, (skill, _) in enumerate(skills) if skill == "honk")

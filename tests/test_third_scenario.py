@@ -66,7 +66,7 @@ def run(root: Path, *words: str) -> subprocess.CompletedProcess[str]:
 
 def test_the_scenario_of_the_page_flies_over_mocks(checkout: Path, tmp_path: Path) -> None:
     out = tmp_path / "run"
-    flown = run(checkout, "setup/in_ros2", "python", "-m", "alula.commands.run", "patrol", "--mock", "--out", str(out))
+    flown = run(checkout, "setup/in_ros2", "python", "-m", "alula.cli.run", "patrol", "--mock", "--out", str(out))
     assert flown.returncode == 0, flown.stdout + flown.stderr
     summary = json.loads((out / "summary.json").read_text())
     assert (summary["scenario"], summary["outcome"], summary["landed"], summary["problems"]) == ("patrol", "accomplished", True, [])

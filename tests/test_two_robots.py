@@ -20,7 +20,7 @@ FLEET = ALULA_ROOT / "examples/two_robots"
 
 def command(module: str, *words: str) -> subprocess.CompletedProcess[str]:
     environment = {**os.environ, "ALULA_ROBOT": str(FLEET)}
-    command = [str(ALULA_ROOT / "setup/in_ros2"), "python", "-m", f"alula.commands.{module}", *words]
+    command = [str(ALULA_ROOT / "setup/in_ros2"), "python", "-m", f"alula.cli.{module}", *words]
     return subprocess.run(command, capture_output=True, text=True, check=False, env=environment)
 
 

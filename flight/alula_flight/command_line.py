@@ -9,7 +9,7 @@ from collections.abc import Mapping, Sequence
 from dataclasses import replace
 from typing import Any
 
-from alula.commands.run_options import check_limit, check_seed, groot_address, run_folder, run_parser, world_file
+from alula.cli.run_request import check_limit, check_seed, groot_address, run_folder, run_parser, world_file
 from alula.common.faults import FaultError, parse_fault
 from alula.common.network import DOMAINS, NAMESPACE, DomainClaim, free_port
 from alula.common.robots import find_robot, fleet_name

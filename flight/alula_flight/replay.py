@@ -1,4 +1,4 @@
-"""``alula replay`` of an installation: the depths below the skills, on top of the library's replay (``alula.commands.replay``).
+"""``alula replay`` of an installation: the depths below the skills, on top of the library's replay (``alula.cli.replay``).
 
 ``functional``: the bag of the functional layer answers the real hooks. ``sensors``, for a robot with the part of that name: the cores of
 its nodes perceive the measurements again first, in the ROS 1 world; a bag of measurements without a mission's record is perceived alone.
@@ -13,8 +13,8 @@ import sys
 from collections.abc import Iterator, Mapping, Sequence
 from pathlib import Path
 
-from alula.commands import replay
-from alula.commands.replay import Arguments, Below, Depth
+from alula.cli import replay
+from alula.cli.replay import Arguments, Below, Depth
 from alula.common.robots import RobotError, find_robot
 from alula.common.scenarios import ScenarioError, load_scenario
 from alula.language.load import load_robot

@@ -18,7 +18,7 @@ from pathlib import Path
 
 import psutil
 
-from alula.commands.run_options import shown_at
+from alula.cli.run_request import shown_at
 from alula.common.network import DOMAINS, DomainClaim, NoFreeDomainError, NoFreePortError, claim_domain
 from alula.common.processes import NAMESPACE_VARIABLE, RUN_ID_VARIABLE, die_with_parent, end_run, ends_within, node_name, processes_of_run
 from alula.common.robots import RobotError

@@ -10,10 +10,10 @@ from functools import cache, partial
 from pathlib import Path
 
 from alula.campaign.plan import load_campaign
-from alula.commands.check_missions import faults_of
-from alula.commands.mission_robot import models_of, part_of
+from alula.check.robot import models_of, part_of
 from alula.common.robots import find_robot
 from alula.language.messages import messages_of
+from alula.records.causes.fault_file import states_of_faults
 from alula.trees.reading import read_files
 from mission_mutations.flights import Campaigned, Flights
 from mission_mutations.judging import MISSED, Judge, Robot, Verdict
@@ -25,12 +25,17 @@ COMMAND = "mission_mutations"
 MAIN = "main_tree_to_execute="
 
 
+def warn(line: str) -> None:
+    """Write a line to the standard error."""
+    sys.stderr.write(f"{COMMAND}: {line}\n")
+
+
 @cache
 def robot_of(root: Path) -> Robot:
     """Return a robot with what its missions are made of."""
     robot = find_robot(root)
-    models = models_of(robot, COMMAND)
-    return Robot(robot.root / "missions", models, part_of(robot, COMMAND), faults_of(models), messages_of(robot))
+    models = models_of(robot, warn)
+    return Robot(robot.root / "missions", models, part_of(robot, warn), states_of_faults(models, warn), messages_of(robot))
 
 
 @cache

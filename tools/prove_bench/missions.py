@@ -20,7 +20,7 @@ import time
 from collections.abc import Callable, Iterator, Sequence
 from pathlib import Path
 
-from alula.commands.mission_robot import models_of, part_of
+from alula.check.robot import models_of, part_of
 from alula.common.robots import find_robot
 from alula.missions.part import NO_PART, MissionPart
 from alula.model.expressions import ResourceIs
@@ -147,13 +147,17 @@ def measure(family: str, size: str, timeout_s: float) -> dict[str, object]:
     with tempfile.TemporaryDirectory() as folder:
         if family not in FAMILIES:
             robot = find_robot(Path(size).parent)
-            path, models, part = Path(size), models_of(robot, COMMAND), part_of(robot, COMMAND)
+            path, models, part = Path(size), models_of(robot, _warn), part_of(robot, _warn)
         else:
             path, part = Path(folder) / "mission.xml", NO_PART
             skillsets, inside = FAMILIES[family][0](int(size))
             models = tuple(skillsets)
             path.write_text(f'<root BTCPP_format="4"><BehaviorTree ID="mission">{inside}</BehaviorTree></root>', encoding="utf-8")
         return {"family": family, "size": size if family in FAMILIES else Path(size).stem, **_looked_at(path, models, part, timeout_s)}
+
+
+def _warn(line: str) -> None:
+    sys.stderr.write(f"{COMMAND}: {line}\n")
 
 
 def _looked_at(path: Path, models: Sequence[Skillset], part: MissionPart, timeout_s: float) -> dict[str, object]:

@@ -3,7 +3,7 @@ from __future__ import annotations
 from pathlib import Path
 
 import pytest
-from alula.commands import check
+from alula.cli import check
 
 ROOT = Path(__file__).resolve().parents[1]
 BASE = (ROOT / "skillsets/base.skill").read_text(encoding="utf-8")

@@ -5,7 +5,7 @@ from __future__ import annotations
 import json
 from pathlib import Path
 
-from alula.commands import run
+from alula.cli import run
 
 ROOT = Path(__file__).resolve().parents[1]
 

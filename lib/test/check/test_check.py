@@ -9,7 +9,7 @@ from pathlib import Path
 import pytest
 
 from alula.check.findings import findings_of
-from alula.commands.check import main
+from alula.cli.check import main
 from alula.language.codes import MISSION_CODES
 from alula.language.errors import Severity
 from alula.language.models import ModelFile, check_texts

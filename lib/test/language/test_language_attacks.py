@@ -8,7 +8,7 @@ import os
 
 import pytest
 
-from alula.commands import check
+from alula.cli import check
 from alula.language.counterexamples import NumberedExecution, StepKind
 from alula.language.models import check_files
 from alula.prove import prove

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import pytest
 
-from alula.commands import check
+from alula.cli import check
 from alula_testing.battery import make_robot
 
 MODEL = """

@@ -13,7 +13,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from test_language_listings import LISTING_2, LISTING_3
 
-from alula.commands.check import main
+from alula.cli.check import main
 from alula.language import rl
 from alula.language.check import check
 from alula.language.errors import LanguageError

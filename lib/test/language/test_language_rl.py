@@ -10,7 +10,7 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from alula.commands.check import main
+from alula.cli.check import main
 from alula.language import rl
 from alula.language.errors import LanguageError
 from alula.language.lexer import MAX_ERRORS

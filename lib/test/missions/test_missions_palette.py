@@ -9,7 +9,7 @@ import pytest
 
 pytest.importorskip("py_trees")
 
-from alula.commands import palette
+from alula.cli import palette
 from alula.trees.reading import read_models
 
 MODEL = """

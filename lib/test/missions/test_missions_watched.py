@@ -15,7 +15,7 @@ import pytest
 pytest.importorskip("py_trees")
 
 from alula.campaign.mocked_scenarios import load_mocked_scenario
-from alula.commands import run
+from alula.cli import run
 from alula.common import run_log
 from alula.common.record import TREE, read_record
 from alula.common.scenarios import scenarios_folder

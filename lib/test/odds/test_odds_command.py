@@ -13,7 +13,7 @@ from xml.etree import ElementTree as ET
 import pytest
 from fetch_and_carry import by_hand
 
-from alula.commands.odds import main
+from alula.cli.odds import main
 
 CARRIER = Path(__file__).parent / "carrier"
 

@@ -11,7 +11,7 @@ from fetch_and_carry import by_hand
 from odds_flights import Flights, only
 
 from alula.campaign.mocked_scenarios import load_mocked_scenario
-from alula.commands.odds import steps_of
+from alula.cli.odds import steps_of
 from alula.common.robots import find_robot
 from alula.language.models import check_files, models_in
 from alula.missions.director import Outcome

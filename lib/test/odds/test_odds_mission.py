@@ -9,7 +9,7 @@ from pathlib import Path
 import pytest
 from tables import ACCOMPLISHED, GIVEN_UP, Table, chances, end, fault, now, storm
 
-from alula.commands.odds import main
+from alula.cli.odds import main
 from alula.odds.figures import FaultFigures, Figures, SkillFigures, point
 from alula.odds.graph import Graph, explore
 from alula.odds.odds import odds_of

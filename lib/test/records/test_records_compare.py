@@ -9,7 +9,7 @@ from xml.etree import ElementTree as ET
 import pytest
 
 from alula.campaign.mocked_scenarios import load_mocked_scenario
-from alula.commands.compare import main
+from alula.cli.compare import main
 from alula.common import run_log
 from alula.common.faults import parse_fault
 from alula.records.comparing.telling import spread

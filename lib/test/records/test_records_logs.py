@@ -13,7 +13,7 @@ from rosbags.rosbag2 import Writer as BagWriter
 from rosbags.typesys import Stores, get_types_from_msg, get_typestore
 
 from alula.campaign.mocked_scenarios import load_mocked_scenario
-from alula.commands.conform import main
+from alula.cli.conform import main
 from alula.common.faults import parse_fault
 from alula.common.record import EVENTS, FILE, MISSION, RecordWriter
 from alula.records.logs import MESSAGE, read_log

@@ -7,7 +7,7 @@ from dataclasses import replace
 
 import pytest
 
-from alula.commands import play as play_command
+from alula.cli import play as play_command
 from alula.language.counterexamples import Counterexample, CounterexampleEnd, CounterexampleStep, NumberedExecution, StateChange
 from alula.language.counterexamples import StepKind as Kind
 from alula.runtime.counterexample_play import play

@@ -9,7 +9,7 @@ import pytest
 
 pytest.importorskip("py_trees")
 
-from alula.commands import tree
+from alula.cli import tree
 
 FILE = """<root BTCPP_format="4">
   <BehaviorTree ID="Main">

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Collection, Mapping, Sequence
+from collections.abc import Callable, Collection, Mapping, Sequence
 from fnmatch import fnmatchcase
 from pathlib import Path
 
@@ -48,6 +48,19 @@ def effects_of_models() -> EffectsByFault:
     except RobotError as error:
         raise AnalysisError(str(error)) from None
     return EffectsByFault(alarms=alarms_of(robot_skillsets() if there else ()))
+
+
+def states_of_faults(skillsets: Sequence[Skillset], warn: Callable[[str], object]) -> Mapping[str, frozenset[str]]:
+    """Return the states in which the robot's faults show, those that have any; none where its file is wrong: ``warn`` is told."""
+    path = find_robot().file(FAULTS)
+    if path is None:
+        return {}
+    try:
+        effects = load_effects(path, skillsets)
+    except AnalysisError as error:
+        warn(f"properties can name no fault: {error}")
+        return {}
+    return {name: one.states for name, one in effects.known.items() if one.states}
 
 
 def alarms_of_robot() -> Alarms:

@@ -7,8 +7,7 @@ from pathlib import Path
 
 import pytest
 
-from alula.commands.check_missions import faults_of
-from alula.commands.mission_robot import models_of, part_of
+from alula.check.robot import models_of, part_of
 from alula.common.robots import find_robot
 from alula.language.models import ModelFile, check_texts
 from alula.missions.director import Outcome
@@ -21,6 +20,7 @@ from alula.prove.mission.regions import Regions
 from alula.prove.mission.run import MissionFinding, MissionRun
 from alula.prove.mission.state import Kind
 from alula.prove.mission.system import System
+from alula.records.causes.fault_file import states_of_faults
 from finding_pages.examples import RUNS, examples
 from finding_pages.mission_checks import whole
 from finding_pages.mission_proofs import ROBOT
@@ -138,8 +138,8 @@ def test_a_run_that_does_not_happen_is_left_where_it_does_not(tmp_path: Path) ->
 
 def test_the_axes_that_listing_3_keeps_are_kept_in_a_flight(tmp_path: Path) -> None:
     robot, path = find_robot(ROOT), ROOT / "missions" / "mapping.xml"
-    part, models = part_of(robot, "test"), models_of(robot, "test")
-    (finding,) = prove_within(Few.after(1e6), path, models, part, faults=faults_of(models), given="this test").accepted
+    part, models = part_of(robot, print), models_of(robot, print)
+    (finding,) = prove_within(Few.after(1e6), path, models, part, faults=states_of_faults(models, print), given="this test").accepted
     assert isinstance(finding, MissionFinding)
     assert finding.run is not None
     assert ("navigation.axes_authority", "USED") in finding.run.states

@@ -17,8 +17,7 @@ import pytest
 pytest.importorskip("z3")
 pytest.importorskip("py_trees")
 
-from alula.commands.check_missions import faults_of
-from alula.commands.mission_robot import models_of, part_of
+from alula.check.robot import models_of, part_of
 from alula.common.robots import find_robot
 from alula.language.codes import RUN_CODES
 from alula.language.models import ModelFile, check_texts
@@ -37,6 +36,7 @@ from alula.prove.mission.prover import Proved, prove_mission, prove_within
 from alula.prove.mission.regions import Regions
 from alula.prove.mission.state import State
 from alula.prove.mission.system import System
+from alula.records.causes.fault_file import states_of_faults
 from alula.runtime.core.execution import Execution
 from alula.runtime.hooks import SkillHooks
 from alula.runtime.local import LocalManagers, LocalWorld
@@ -214,9 +214,9 @@ class Few(Deadline):
 
 def drones(name: str, deadline: Deadline) -> Proved:
     robot = find_robot(ROOT)
-    models = models_of(robot, "test")
+    models = models_of(robot, print)
     path = ROOT / "missions" / f"{name}.xml"
-    return prove_within(deadline, path, models, part_of(robot, "test"), faults=faults_of(models), given="this test")
+    return prove_within(deadline, path, models, part_of(robot, print), faults=states_of_faults(models, print), given="this test")
 
 
 def test_what_was_found_before_the_bound_is_told() -> None:

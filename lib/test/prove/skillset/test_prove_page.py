@@ -6,7 +6,7 @@ from pathlib import Path
 
 import pytest
 
-from alula.commands.check import main
+from alula.cli.check import main
 from alula.language.codes import PROOF_CODES
 from alula.language.errors import Severity, has_errors
 from alula.language.models import check_files

@@ -9,7 +9,7 @@ from pathlib import Path
 
 import pytest
 
-from alula.commands import check, run
+from alula.cli import check, run
 
 ALULA_ROOT = Path(__file__).resolve().parents[4]
 PAGE = (ALULA_ROOT / "docs/changing-a-mission.md").read_text(encoding="utf-8")

@@ -68,7 +68,7 @@ def test_a_change_of_the_file_is_flown(tmp_path):
 def command(name, *words):
     """Return what a command writes to the standard output; it has to end with 0, and to say on standard error how far it is at most."""
     root = find_robot().root
-    ended = subprocess.run([sys.executable, "-m", f"alula.commands.{name}", *words], cwd=root, capture_output=True, text=True, check=False)
+    ended = subprocess.run([sys.executable, "-m", f"alula.cli.{name}", *words], cwd=root, capture_output=True, text=True, check=False)
     said = [line for line in ended.stderr.splitlines() if "looking at its runs" not in line]
     assert (ended.returncode, said) == (0, []), ended.stdout
     return ended.stdout

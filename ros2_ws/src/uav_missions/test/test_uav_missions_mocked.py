@@ -12,7 +12,7 @@ from pathlib import Path
 
 import pytest
 
-from alula.commands import run as over_mocks
+from alula.cli import run as over_mocks
 from alula.common import run_log
 from alula.common.faults import FaultRequest
 from alula.common.record import BLACKBOARD, DECISIONS, EVENTS, MISSION, REPORTS, TREE, read_record
@@ -229,7 +229,7 @@ def test_a_wrong_request_ends_2_and_writes_nothing(tmp_path, capsys):
 
 def test_no_ros_is_needed(tmp_path):
     code = (
-        "import sys; from alula.commands.run import main; code = main(sys.argv[1:]);"
+        "import sys; from alula.cli.run import main; code = main(sys.argv[1:]);"
         "assert not {m for m in sys.modules if m.startswith(('rclpy', 'rospy', 'geometry_msgs'))}; sys.exit(code)"
     )
     subprocess.run([sys.executable, "-c", code, *arguments(tmp_path / "run")], check=True, env=dict(os.environ), timeout=60)

@@ -11,7 +11,7 @@ from pathlib import Path
 
 import pytest
 
-from alula.commands import run
+from alula.cli import run
 from alula.common import run_log
 from alula.common.record import FILE, read_record
 from alula.missions.mocked import STOP_S
@@ -67,7 +67,7 @@ def test_a_limit_ends_it(tmp_path: Path, capsys) -> None:
 def test_ctrl_c_is_the_operators(tmp_path: Path) -> None:
     out = tmp_path / "run"
     script = (
-        "import os, signal, sys; from alula.commands import run; from alula.missions.mocked import MockedMission\n"
+        "import os, signal, sys; from alula.cli import run; from alula.missions.mocked import MockedMission\n"
         "begin = MockedMission.run\n"
         "def interrupted(self):\n"
         "    self.world.clock.after(30.0, lambda: os.kill(os.getpid(), signal.SIGINT))\n"

@@ -3,27 +3,28 @@
 from __future__ import annotations
 
 import sys
-from collections.abc import Mapping, Sequence
+from collections.abc import Sequence
 from dataclasses import replace
 from functools import partial
 from pathlib import Path
 
 from alula.check.findings import findings_of
-from alula.commands.mission_robot import models_of, part_of
-from alula.common.robots import FAULTS, RobotError, find_robot
+from alula.check.robot import models_of, part_of
+from alula.cli.saying import warner
+from alula.common.robots import RobotError, find_robot
 from alula.language.errors import Diagnostic, Severity, has_errors
 from alula.language.messages import NO_MESSAGES, Messages, messages_of
 from alula.language.models import ModelFile
 from alula.missions.part import NO_PART, MissionPart
 from alula.model.model import Skillset
 from alula.model.span import Span
-from alula.records.causes.fault_file import load_effects
-from alula.records.errors import AnalysisError
+from alula.records.causes.fault_file import states_of_faults
 from alula.trees.document import read_source
 from alula.trees.errors import FileError
 
 SUFFIX = ".xml"
 COMMAND = "alula check"
+warn = warner(COMMAND)
 
 
 def check_missions(paths: Sequence[str], palettes: Sequence[str]) -> list[ModelFile]:
@@ -42,7 +43,7 @@ def prove_missions(files: Sequence[ModelFile], timeout_s: float) -> None:
     from alula.prove.mission.prover import prove_mission  # which brings its solvers along
 
     skillsets, part, _ = _robot()
-    faults = faults_of(skillsets) if skillsets else {}
+    faults = states_of_faults(skillsets, warn) if skillsets else {}
     for file in sound if skillsets else []:
         tell = partial(_tell, file.path)
         proved = prove_mission(Path(file.path), skillsets, part, faults=faults, timeout_s=timeout_s, tell=tell)
@@ -65,20 +66,7 @@ def _robot() -> tuple[tuple[Skillset, ...], MissionPart, Messages]:
     except RobotError as error:
         sys.stderr.write(f"{COMMAND}: no skills are known: {error}\n")
         return (), NO_PART, NO_MESSAGES
-    return models_of(robot, COMMAND), part_of(robot, COMMAND), messages_of(robot)
-
-
-def faults_of(skillsets: Sequence[Skillset]) -> Mapping[str, frozenset[str]]:
-    """Return the states in which the robot's faults show, those that have any."""
-    path = find_robot().file(FAULTS)
-    if path is None:
-        return {}
-    try:
-        effects = load_effects(path, skillsets)
-    except AnalysisError as error:
-        sys.stderr.write(f"{COMMAND}: properties can name no fault: {error}\n")
-        return {}
-    return {name: one.states for name, one in effects.known.items() if one.states}
+    return models_of(robot, warn), part_of(robot, warn), messages_of(robot)
 
 
 def _checked(path: str, skillsets: Sequence[Skillset], palettes: Sequence[Path], part: MissionPart, messages: Messages) -> ModelFile:

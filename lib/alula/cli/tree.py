@@ -12,7 +12,8 @@ from collections.abc import Sequence
 from pathlib import Path
 
 from alula.check.mission import palette_for
-from alula.commands.mission_robot import models_of, part_of
+from alula.check.robot import models_of, part_of
+from alula.cli.saying import warner
 from alula.common.files import write_text
 from alula.common.robots import RobotError, find_robot
 from alula.missions.drawing import draw, drawn_as_text
@@ -76,7 +77,7 @@ def palette(files: TreeFiles, more: Sequence[Path]) -> Palette:
         robot = find_robot()
     except RobotError:
         return palette_for(files, (), more, NO_PART)  # a tree of others needs none
-    return palette_for(files, models_of(robot, COMMAND), more, part_of(robot, COMMAND))
+    return palette_for(files, models_of(robot, warner(COMMAND)), more, part_of(robot, warner(COMMAND)))
 
 
 if __name__ == "__main__":

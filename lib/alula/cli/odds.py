@@ -11,7 +11,8 @@ import sys
 from collections.abc import Mapping, Sequence
 from pathlib import Path
 
-from alula.commands.mission_robot import models_of, part_of
+from alula.check.robot import models_of, part_of
+from alula.cli.saying import warner
 from alula.common.files import write_text
 from alula.common.robots import FAULTS, RobotError, RobotFolder, find_robot
 from alula.common.scenarios import ScenarioError, load_scenario, scenario_names
@@ -100,10 +101,10 @@ def steps_of(path: Path, world: str = "", others: Figures | None = None) -> tupl
     Raises what ``main`` tells.
     """
     robot = find_robot()
-    models = models_of(robot, COMMAND)
+    models = models_of(robot, warner(COMMAND))
     figures, effects = _of_faults(robot, models)
     failures = Failures(refusals=False, hooks=False, aborts=False)
-    part = part_of(robot, COMMAND)
+    part = part_of(robot, warner(COMMAND))
     system = System.read(path, models, part, failures, few=COUNTED, known=_inputs(path, world))
     known = figures if others is None else others
     return MissionSteps(system, effects, _brought(robot, models), _departure(robot, models), known), known

@@ -11,7 +11,8 @@ from collections.abc import Iterator, Sequence
 from dataclasses import replace
 from pathlib import Path
 
-from alula.commands.mission_robot import part_of
+from alula.check.robot import part_of
+from alula.cli.saying import warner
 from alula.common.robots import RobotError, RobotFolder, find_robot
 from alula.language.errors import LanguageError, has_errors
 from alula.language.fleet import load_models
@@ -47,7 +48,7 @@ def robot_types(folder: str) -> Iterator[NodeType]:
         LanguageError: a model has errors.
     """
     robot = _robot(folder)
-    part = NO_PART if robot is None else part_of(robot, COMMAND)
+    part = NO_PART if robot is None else part_of(robot, warner(COMMAND))
     if robot is not None and robot.robots:
         files, skillsets = [], list(load_models(robot).skillsets)
     else:

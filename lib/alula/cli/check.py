@@ -15,7 +15,7 @@ from dataclasses import replace
 from functools import partial
 from time import monotonic
 
-from alula.commands.check_missions import SUFFIX, check_missions, prove_missions
+from alula.cli.check_missions import SUFFIX, check_missions, prove_missions
 from alula.common.garbage import collect_seldom
 from alula.common.robots import RobotError, RobotFolder, find_robot
 from alula.language.check.fields import check_fields
@@ -46,7 +46,7 @@ def main(arguments: Sequence[str] | None = None) -> int:
     options = _parser().parse_args(arguments)
     collect_seldom()
     if options.play is not None:
-        from alula.commands import play  # it takes the counterexamples from here
+        from alula.cli import play  # it takes the counterexamples from here
 
         return play.main(arguments)
     try:

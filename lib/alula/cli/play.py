@@ -11,9 +11,9 @@ import sys
 from collections.abc import Sequence
 from pathlib import Path
 
-from alula.commands.check import counterexamples_of
-from alula.commands.check_missions import SUFFIX
-from alula.commands.play_mission import play_mission
+from alula.cli.check import counterexamples_of
+from alula.cli.check_missions import SUFFIX
+from alula.cli.play_mission import play_mission
 from alula.language.models import check_files, models_in
 from alula.prove.limits import DEFAULT_TIME_S
 from alula.runtime.counterexample_play import PlayedStep, play

@@ -9,7 +9,7 @@ import sys
 
 import pytest
 
-from alula.commands.check import main
+from alula.cli.check import main
 
 SOUND = "skillset s { skill f { result { R } } }"
 WARNED = "skillset s { type P }"
@@ -81,14 +81,12 @@ def test_json(tmp_path, capsys):
 
 def test_as_a_program(tmp_path):
     (path,) = write(tmp_path, a=BROKEN)
-    done = subprocess.run([sys.executable, "-m", "alula.commands.check", path], capture_output=True, text=True, check=False)
+    done = subprocess.run([sys.executable, "-m", "alula.cli.check", path], capture_output=True, text=True, check=False)
     assert done.returncode == 1
     assert "did you mean `skill`?" in done.stdout
     assert done.stderr == ""
     nowhere = {**os.environ, "ALULA_ROBOT": ""}
-    done = subprocess.run(
-        [sys.executable, "-m", "alula.commands.check"], cwd=tmp_path, env=nowhere, capture_output=True, text=True, check=False
-    )
+    done = subprocess.run([sys.executable, "-m", "alula.cli.check"], cwd=tmp_path, env=nowhere, capture_output=True, text=True, check=False)
     assert done.returncode == 2
     assert "robot.yaml" in done.stderr
 

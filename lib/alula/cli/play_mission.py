@@ -7,9 +7,10 @@ import json
 import sys
 from pathlib import Path
 
-from alula.commands.check_missions import SUFFIX, check_missions, prove_missions
-from alula.commands.mission_robot import part_of
-from alula.commands.run_options import run_folder
+from alula.check.robot import part_of
+from alula.cli.check_missions import SUFFIX, check_missions, prove_missions
+from alula.cli.run_request import run_folder
+from alula.cli.saying import warner
 from alula.common.robots import RobotError, find_robot
 from alula.common.run_log import note_mocked
 from alula.console.page import write_report
@@ -47,7 +48,7 @@ def _flown(path: Path, finding: MissionFinding, folder: Path, *, as_json: bool) 
 
     assert finding.run is not None  # noqa: S101 - the caller has seen to it
     try:
-        part = part_of(find_robot(), COMMAND)
+        part = part_of(find_robot(), warner(COMMAND))
     except RobotError:
         part = NO_PART
     played = play(path, finding.run, part, folder)

@@ -18,7 +18,7 @@ from collections.abc import Sequence
 from pathlib import Path
 
 from alula.campaign.mocked_scenarios import load_mocked_scenario
-from alula.commands.run_options import check_limit, check_seed, groot_address, run_folder, run_parser, shown_at, world_file
+from alula.cli.run_request import check_limit, check_seed, groot_address, run_folder, run_parser, shown_at, world_file
 from alula.common.faults import MOCKED, FaultError, FaultRequest, changes_of, parse_fault, spans_of
 from alula.common.robots import RobotError
 from alula.common.run_log import note_mocked
