@@ -76,12 +76,12 @@ key_generated() { # of the models and of what generates from them
 }
 make_generated() {
   if [ ${#robot_fleet[@]} -gt 0 ]; then   # a fleet's missions call the skills of its robots, and need no more
-    clean "$ALULA_STATE/venv2/bin/python3" -m alula.generate "${robot_fleet[@]}" --interfaces --out "$state/generated" --prune
+    clean "$ALULA_STATE/venv2/bin/python3" -m alula.cli.generate "${robot_fleet[@]}" --interfaces --out "$state/generated" --prune
     return
   fi
   [ -d "$robot_skillsets" ] || { mkdir -p "$state/generated"; return; }   # a robot without models so far
   # In place: what is as it was keeps its time stamps, so that a changed skillset rebuilds no other.
-  clean "$ALULA_STATE/venv2/bin/python3" -m alula.generate "$robot_skillsets" --name "$robot_name" --out "$state/generated" --prune
+  clean "$ALULA_STATE/venv2/bin/python3" -m alula.cli.generate "$robot_skillsets" --name "$robot_name" --out "$state/generated" --prune
 }
 
 make_workspace() { # WORLD

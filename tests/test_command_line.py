@@ -5,12 +5,16 @@ from __future__ import annotations
 import json
 import os
 import re
+import shutil
 import subprocess
+import sys
 from pathlib import Path
 
 import pytest
 
-from alula.cli import COMMANDS
+from alula.cli.checkout import ROOT, checkout
+from alula.cli.help import PAGE, page
+from alula.cli.table import COMMANDS
 from alula_testing.counterexamples import EXAMPLES
 
 ALULA_ROOT = Path(__file__).resolve().parents[1]
@@ -41,7 +45,7 @@ def alula(*arguments: str) -> subprocess.CompletedProcess[str]:
         (["console", "--run", "no/such/run"], "no/such/run"),
         (["new", "robot", "Small-Rover"], "Small-Rover"),
         (["new", "robot", "docs"], "docs"),
-        (["run"], "scenario"),
+        (["run"], "SCENARIO"),
         (["conform", "no/such/run"], "no/such/run"),
         (["expect", "no/such/run"], "no/such/run"),
         (["compare", "no/such/run", "no/such/run"], "no/such/run"),
@@ -157,36 +161,125 @@ def test_what_works_on_models_needs_no_build_and_prints_results_only(tmp_path: P
     assert "is to be made" in built.stderr
 
 
-def test_completion_is_a_bash_script_that_knows_commands() -> None:
-    script = alula("completion").stdout
-    complete = "COMP_WORDS=(alula ch); COMP_CWORD=1; _alula; echo ${COMPREPLY[@]}"
-    done = subprocess.run(["bash", "-c", f"{script}\n{complete}"], capture_output=True, text=True, check=True)
-    assert done.stdout.split() == ["check"]
+def completed(line: str) -> list[str]:
+    """Return how bash completes a line, with what ``alula completion`` prints."""
+    told = """eval "$(alula completion bash)"; COMP_LINE=$0 COMP_POINT=${#0} COMP_TYPE=9; _python_argcomplete alula
+        printf '%s\\n' "${COMPREPLY[@]}" """
+    environment = {**os.environ, "PATH": f"{ALULA_ROOT}:{os.environ['PATH']}"}
+    done = subprocess.run(["bash", "-c", told, line], cwd=ALULA_ROOT, env=environment, capture_output=True, text=True, check=True)
+    return [word.rstrip() for word in done.stdout.split("\n") if word.strip()]
 
 
-def test_the_checkout_has_every_command_of_the_library() -> None:
-    told = alula("help").stdout
-    listed = set(re.findall(r"^  (\w+)", told, re.MULTILINE))
-    assert set(COMMANDS) <= listed
-    assert "language server" in alula("editor", "--help").stdout
+@pytest.mark.parametrize(
+    ("line", "words"),
+    [
+        ("alula chec", {"check"}),
+        ("alula bench bri", {"bridge"}),
+        ("alula new ", {"robot"}),
+        ("alula fly ma", {"mapping"}),
+        ("alula fly mapping --fail ze", {"zed", "zed_depth"}),
+        ("alula run mapping --mock --fail=lidar_m", {"lidar_mapping"}),
+        ("alula odds missions/mapping.xml --with zed", {"zed=", "zed_depth="}),
+        ("alula start navigation.goto_", {"navigation.goto_straight"}),
+        ("alula why goto_s", {"goto_straight"}),
+        ("alula start goto_straight sp", {"speed="}),
+        ("alula transition navigation.SDK_authority AV", {"AVAILABLE"}),
+        ("alula data video.", {"video.picture"}),
+        ("alula --robot examples/rover run del", {"deliver"}),
+        ("alula run --robot examples/rover del", {"deliver"}),
+        ("alula check --to p", {"paper"}),
+    ],
+)
+def test_completion_knows_commands_and_the_words_of_the_robot(line: str, words: set[str]) -> None:
+    assert set(completed(line)) == words
 
 
-OF_EACH_KIND = ["fly", "replay", "check", "tree", "generate", "mock", "bridge", "console", "panel", "skills", "events", "expect", "conform"]
+@pytest.mark.skipif(shutil.which("fish") is None, reason="there is no fish")
+def test_fish_completes() -> None:
+    told = "alula completion fish | source; complete -C 'alula fly ma'"
+    environment = {**os.environ, "PATH": f"{ALULA_ROOT}:{os.environ['PATH']}"}
+    done = subprocess.run(["fish", "-c", told], cwd=ALULA_ROOT, env=environment, capture_output=True, text=True, check=True)
+    assert done.stdout.split() == ["mapping"]
 
 
-@pytest.mark.parametrize("command", OF_EACH_KIND)
+@pytest.mark.skipif(shutil.which("zsh") is None, reason="there is no zsh")
+def test_zsh_takes_the_completion() -> None:
+    told = 'autoload -U compinit; compinit -u -D; eval "$(alula completion zsh)"; echo ${_comps[alula]}'
+    environment = {**os.environ, "PATH": f"{ALULA_ROOT}:{os.environ['PATH']}"}
+    done = subprocess.run(["zsh", "-c", told], cwd=ALULA_ROOT, env=environment, capture_output=True, text=True, check=True)
+    assert done.stdout.split() == ["_python_argcomplete"]
+
+
+def test_a_line_that_can_not_be_completes_to_nothing(tmp_path: Path) -> None:
+    (tmp_path / "robot.yaml").write_text("name: [", encoding="utf-8")
+    for line in ("alula 'x", "alula start nosuch ", f"alula --robot {tmp_path} run ", f"alula start --robot {tmp_path} "):
+        assert completed(line) == []
+
+
+def test_help_lists_every_command_and_a_pip_installation_the_librarys() -> None:
+    listed = set(re.findall(r"^  (\w+)", alula("help").stdout, re.MULTILINE))
+    assert listed == set(COMMANDS)
+    assert alula("--help").stdout == alula("help").stdout == alula().stdout
+
+
+def test_a_checkout_does_every_command_of_the_table() -> None:
+    here = checkout()
+    assert here is not None
+    own = {"setup", "doctor", "test", "bench"}
+    assert set(here.handlers) <= set(COMMANDS)
+    assert {name for name, command in COMMANDS.items() if not command.anywhere} <= set(here.handlers) | own
+    for handler in (*here.handlers.values(), *here.benches.values()):
+        world = str(ALULA_ROOT / f"setup/in_ros{handler.world}")
+        found = f"import importlib.util, sys; sys.exit(importlib.util.find_spec({handler.module!r}) is None)"
+        assert subprocess.run([world, "python3", "-c", found], check=False).returncode == 0, handler
+
+
+def test_the_front_needs_nothing_but_python(tmp_path: Path) -> None:
+    """As on a bare machine: no site's packages, no variables."""
+    begin = f"import sys; sys.path.insert(0, {str(ALULA_ROOT / 'lib')!r}); from alula.cli.__main__ import main; sys.exit(main())"
+    for words, code in ((["help"], 0), (["check", "--help"], 0), (["chekc"], 2), (["check", "--jsno"], 2)):
+        command = [sys.executable, "-I", "-S", "-c", begin, *words]
+        done = subprocess.run(command, cwd=tmp_path, env={ROOT: str(ALULA_ROOT)}, capture_output=True, text=True, check=False)
+        assert done.returncode == code, done.stderr
+
+
+CLOSED = [name for name, command in COMMANDS.items() if not command.open]
+
+
+@pytest.mark.parametrize("name", CLOSED)
+def test_a_wrong_option_is_one_line_before_anything_is_set_up(name: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setenv("ALULA_STATE", str(tmp_path / "nothing"))
+    done = alula(name, "--nosuch")
+    assert (done.returncode, done.stdout, done.stderr.count("\n")) == (2, "", 1), done.stderr
+    assert done.stderr.startswith(f"alula {name}: ")
+    assert "--nosuch" in done.stderr
+    assert not (tmp_path / "nothing").exists()
+
+
+def test_the_nearest_option_and_choice_are_named() -> None:
+    assert alula("check", "--jsno").stderr == "alula check: there is no option --jsno; did you mean `--json`?\n"
+    assert alula("replay", "x", "--from", "sensor").stderr == "alula replay: --from: there is no sensor; did you mean `sensors`?\n"
+
+
+WITH_OPTIONS = ["fly", "replay", "check", "tree", "generate", "mock", "bridge", "console", "panel", "skills", "events", "expect", "conform"]
+
+
+@pytest.mark.parametrize("command", WITH_OPTIONS)
 def test_completion_knows_the_options_of_a_command(command: str) -> None:
-    complete = f"COMP_WORDS=(alula {command} x --); COMP_CWORD=3; _alula; echo ${{COMPREPLY[@]}}"
-    script = f"{alula('completion').stdout}\n{complete}"
-    done = subprocess.run(["bash", "-c", script], capture_output=True, text=True, check=True)
-    known = set(re.findall(r"--[a-z][a-z-]*", alula(command, "--help").stdout))
-    assert set(done.stdout.split()) - {"--robot"} == known - {"--help"}
+    known = set(re.findall(r"--[a-z][a-z0-9-]*", alula(command, "--help").stdout))
+    assert set(completed(f"alula {command} --")) - {"--robot"} == known - {"--help"}
+
+
+def test_the_page_of_commands_is_the_tables() -> None:
+    here = checkout()
+    assert here is not None
+    assert (ALULA_ROOT / "docs" / PAGE).read_text(encoding="utf-8") == page(here), "setup/in_ros2 python -m alula.cli.help docs"
 
 
 def test_version_is_the_change_logs() -> None:
     newest = re.search(r"^## (\S+)", (ALULA_ROOT / "CHANGELOG.md").read_text(encoding="utf-8"), re.MULTILINE)
     assert newest is not None
-    assert alula("--version").stdout == f"alula {newest[1]}\n"
+    assert alula("--version").stdout == alula("version").stdout == f"alula {newest[1]}\n"
     for place in ("lib/setup.py", "lib/package.xml", "CITATION.cff", "ros2_ws/src/skillset_ros2/package.xml"):
         assert newest[1] in (ALULA_ROOT / place).read_text(encoding="utf-8"), place
 

@@ -91,5 +91,10 @@ def test_a_campaign_runs_over_mocks(alula: Alula, tmp_path: Path) -> None:
 
 def test_what_needs_ros_says_so(alula: Alula) -> None:
     assert "needs an installation with ROS" in alula("run", "mapping", code=2).stderr
-    assert "there is no command 'fly'" in alula("fly", "mapping", code=2).stderr
+    assert "needs an installation with ROS" in alula("fly", "mapping", code=2).stderr
+    for name in ("test", "panel", "setup", "bench"):
+        said = alula(name, code=2).stderr
+        assert said.startswith(f"alula: {name}: ")
+        assert "use its entry script ./alula" in said
+    assert alula("completion", "zsh").stdout.startswith("#compdef alula")
     assert sys.version_info >= (3, 11)

@@ -71,7 +71,7 @@ def test_a_campaign_finds_no_trouble_in_runs_that_end_where_it_may_be_left(rover
     faults = "[[pose@20], [laser@30], [bumper@10, laser@20], [battery@30]]"
     (tmp_path / "campaign.yaml").write_text(f"scenarios: [deliver]\nseeds: [0]\nfaults: {faults}\n", encoding="utf-8")
     # All runs of the mission are not looked at here: test_its_models_are_proved_and_its_missions_have_no_findings does.
-    done = run(rover, "alula.campaign", str(tmp_path / "campaign.yaml"), "--out", str(tmp_path / "out"), "--time", "0")
+    done = run(rover, "alula.cli.campaign", str(tmp_path / "campaign.yaml"), "--out", str(tmp_path / "out"), "--time", "0")
     assert done.returncode == 0, done.stdout + done.stderr
     rows = [json.loads(line) for line in (tmp_path / "out/runs.jsonl").read_text(encoding="utf-8").splitlines()]
     ends = [(row["outcome"], row["landed"]) for row in sorted(rows, key=lambda row: row["run"])]

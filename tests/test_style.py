@@ -32,6 +32,7 @@ TYPED = [
     "bridge/ros_bridge/ros_bridge",
     "tools/bridge_tools",
     "tools/skill_bench",
+    "tools/start_bench",
     "tools/flight_bench",
     "tools/console_bench",
     "tools/perception_bench",

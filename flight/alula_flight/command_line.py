@@ -2,14 +2,14 @@
 
 from __future__ import annotations
 
-import argparse
 import sys
 import uuid
 from collections.abc import Mapping, Sequence
 from dataclasses import replace
-from typing import Any
 
-from alula.cli.run_request import check_limit, check_seed, groot_address, run_folder, run_parser, world_file
+from alula.cli.options.runs import fleet_run
+from alula.cli.run_request import check_limit, check_seed, groot_address, run_folder, world_file
+from alula.cli.table import parser_of
 from alula.common.faults import FaultError, parse_fault
 from alula.common.network import DOMAINS, NAMESPACE, DomainClaim, free_port
 from alula.common.robots import find_robot, fleet_name
@@ -21,40 +21,15 @@ from alula.runtime.live.spec import RequestError, RunSpec
 from alula_flight.launch import launch_file
 
 
-class TellOptions(argparse.Action):
-    """Prints what the robot's part declares, and exits, as ``--help`` does."""
-
-    def __init__(self, option_strings: Sequence[str], dest: str, *, part: RunPart, **others: Any) -> None:
-        super().__init__(option_strings, dest, nargs=0, default=argparse.SUPPRESS, **others)
-        self._part = part
-
-    def __call__(self, parser: argparse.ArgumentParser, *_others: object) -> None:
-        """Print and exit."""
-        sys.stdout.write(f"{options.as_json(self._part)}\n")
-        parser.exit()
-
-
 def parse(arguments: Sequence[str], part: RunPart) -> RunSpec:
     """Turn the command line into a specification; raise RequestError, or exit 2 as argparse does."""
-    parser = run_parser("Run a scenario of the robot, in a ROS graph of its own.")
-    parser.add_argument("--console", action="store_true", help="serve the operator's page beside the run")
-    parser.add_argument("--domain", type=int, metavar="N", help="run in this DDS domain (default: a free one)")
-    parser.add_argument(
-        "--namespace", default="", metavar="NAME", help="put its ROS 2 names below this one: runs with one may share a domain"
-    )
-    parser.add_argument(
-        "--commanded",
-        action="store_true",
-        help="of a scenario without a mission: simulated time waits for who calls the skills from outside",
-    )
+    parser = parser_of("run")
     if find_robot().robots:
-        parser.add_argument("--served", action="store_true", help="the robots run already, in the DDS domain of --domain: start none")
-        parser.add_argument(
-            "--with", dest="options", action="append", default=[], metavar="ROBOT:OPTION", help="an option of a robot's own run"
-        )
-    parser.add_argument("--behaviour", action="append", default=[], metavar="FILE", help="with --mock: behaviour file of the mocks")
-    parser.add_argument(options.FLAG, action=TellOptions, part=part, help="print the robot's own options as JSON, and run nothing")
+        fleet_run(parser)
     part.add_options(parser)
+    if options.FLAG in arguments:
+        sys.stdout.write(f"{options.as_json(part)}\n")
+        parser.exit()
     given = parser.parse_args(arguments)
     scenario = read_scenario(given.scenario)
     if given.behaviour:

@@ -161,7 +161,7 @@ async def live(
 def served(folder: Path) -> Iterator[tuple[subprocess.Popen[bytes], int]]:
     """Serve the run in a folder; give the server and its port."""
     port = free_port()
-    words = [sys.executable, "-m", "alula.console", "--run", str(folder), "--port", str(port)]
+    words = [sys.executable, "-m", "alula.cli.console", "--run", str(folder), "--port", str(port)]
     with subprocess.Popen(words, stdout=subprocess.PIPE, stderr=subprocess.DEVNULL) as server:
         try:
             if server.stdout is None or not server.stdout.readline():

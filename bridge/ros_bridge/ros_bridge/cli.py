@@ -28,17 +28,24 @@ LOOPBACK = ("http://127.0.0.1", "http://localhost")
 def parse_arguments(arguments: Sequence[str]) -> argparse.Namespace:
     """Read the options without what roslaunch adds: ``own_name`` reads ``__name:=`` and ``__ns:=``, the rest has no effect."""
     parser = argparse.ArgumentParser(prog="ros_bridge", description="Bridges topics and services between ROS 1 and ROS 2.")
-    parser.add_argument("--config", type=Path, action="append", default=[], help="configuration (YAML); several files are merged")
-    discovery_options.add_arguments(parser)
-    parser.add_argument("--list", action="store_true", help="print what would be bridged, and why the rest can't be, and exit")
-    parser.add_argument(
-        "--stats", type=Path, metavar="FILE", help="write figures of all routes to this JSON file, every 2 s and at the end"
-    )
+    add_arguments(parser)
     options = parser.parse_args([argument for argument in arguments if ":=" not in argument])
     if not (options.config or options.all or options.include or options.list):
         parser.error("nothing to bridge: give --config FILE, or --all, or --include PATTERN")
     options.all = options.all or (options.list and not options.config and not options.include)
     return options
+
+
+def add_arguments(parser: argparse.ArgumentParser) -> None:
+    """Add all options to a parser."""
+    parser.add_argument(
+        "--config", type=Path, action="append", default=[], metavar="FILE", help="configuration (YAML); several files are merged"
+    )
+    discovery_options.add_arguments(parser)
+    parser.add_argument("--list", action="store_true", help="print what would be bridged, and why the rest can't be, and exit")
+    parser.add_argument(
+        "--stats", type=Path, metavar="FILE", help="write figures of all routes to this JSON file, every 2 s and at the end"
+    )
 
 
 def ros2_namespace(arguments: Sequence[str]) -> str:

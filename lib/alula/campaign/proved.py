@@ -26,7 +26,6 @@ from alula.records.tree import Path
 
 LOOKED_AT = Failures(aborts=False)
 """What can happen in a campaign: hooks may refuse and raise, too; nobody aborts, and processes of managers that die are not compared."""
-TIME_S = 120.0
 """What the search has where nothing else is said, seconds of wall clock."""
 End = tuple[str, str]
 """State and result of an execution."""
@@ -78,7 +77,7 @@ class ProvedMission:
 
 
 def proved(
-    scenario: Scenario, models: Sequence[Skillset], effects: EffectsByFault, tell: Callable[[str], None], time_s: float = TIME_S
+    scenario: Scenario, models: Sequence[Skillset], effects: EffectsByFault, tell: Callable[[str], None], time_s: float
 ) -> ProvedMission:
     """Look at all runs of a scenario's mission within a time; ``tell`` hears now and then how far a long search is."""
     if not scenario.mission.endswith(".xml"):

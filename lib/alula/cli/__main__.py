@@ -1,81 +1,138 @@
-"""The command ``alula`` of a pip installation: everything that needs no ROS. The entry script of a checkout has all the commands."""
+"""``alula COMMAND [arguments] [--robot DIR]``: the front of a checkout and of a pip installation.
+
+1. find the robot                3. read its words: help, or what is wrong with them
+2. find the command              4. hand over: to what the checkout has, else to the library's module
+
+It needs nothing but Python itself, so that a bare machine can be told what to do.
+"""
 
 from __future__ import annotations
 
 import importlib
 import os
+import shlex
 import sys
 from collections.abc import Sequence
 from pathlib import Path
 
-from alula.common.robots import VARIABLE
+from alula.cli.checkout import ROBOT, Checkout, checkout
+from alula.cli.help import usage
+from alula.cli.parser import WRONG
+from alula.cli.table import COMMANDS, VERSION, Command
 from alula.common.suggestions import nearest
 
-COMMANDS = {
-    "check": ("alula.cli.check", "check skill models: errors and warnings, then proofs"),
-    "odds": ("alula.cli.odds", "tell how likely a mission is accomplished, degraded, given up, or neither: alula odds FILE"),
-    "tree": ("alula.cli.tree", "draw a mission, or tick it without any robot: alula tree FILE [--svg FILE] [--answers FILE]"),
-    "palette": ("alula.cli.palette", "write a robot's skills as a palette for Groot2: alula palette FOLDER"),
-    "new": ("alula.generate.scaffold.__main__", "make a robot: alula new robot FOLDER"),
-    "run": ("alula.cli.run", "run a scenario over mocks, in virtual time: alula run SCENARIO --mock [--fail WHAT@SECONDS]"),
-    "replay": ("alula.cli.replay", "make a recorded mission's decisions again, with one thing changed"),
-    "expect": ("alula.cli.expect", "write a run's expectations, or check a run against them"),
-    "conform": ("alula.cli.conform", "check a record against the models"),
-    "compare": ("alula.cli.compare", "show runs side by side"),
-    "campaign": ("alula.campaign.__main__", "run scenarios many times with faults, and report the responses to failures"),
-    "console": ("alula.console.__main__", "serve the page of runs"),
-    "editor": ("alula.editor.__main__", "serve editors over the standard streams (language server)"),
-    "generate": ("alula.generate.__main__", "generate interfaces, managers and bridge configuration from a robot's models"),
-}
-ROBOT = "--robot"
+OPTION = "--robot"
+ROBOT_FILE = "robot.yaml"
+MAKE_ONE = "make one: alula new robot DIR"
+COMPLETING = "_ARGCOMPLETE"
+"""Set by a shell that asks for completions: of the line in COMP_LINE, not of this process's words."""
+_OTHER_WORDS = {"-h": "help", "--help": "help", "--version": "version"}
 
 
-def usage() -> str:
-    """Return the help text: a line for each command."""
-    lines = ["usage: alula [--robot DIR] COMMAND [arguments]", ""]
-    lines += [f"  {name:<10} {about}" for name, (_, about) in COMMANDS.items()]
-    return "\n".join([*lines, "", "What needs ROS (setup, fly, bridge, panel, test) is in the entry script ./alula of a checkout.", ""])
+class WordsError(Exception):
+    """The command line can't be; the message says why, and what would be right."""
 
 
-def without_robot(words: Sequence[str]) -> list[str]:
-    """Return the words without ``--robot DIR``, which is noted in the environment; raises ValueError."""
-    left, rest = [], list(words)
-    while rest:
-        word = rest.pop(0)
+def split_robot(words: Sequence[str]) -> tuple[list[str], str | None]:
+    """Return the words without ``--robot DIR``, and the folder; None where none is named. Raises WordsError."""
+    left: list[str] = []
+    named: str | None = None
+    rest = iter(words)
+    for word in rest:
         name, equals, value = word.partition("=")
-        if name != ROBOT:
+        if name != OPTION:
             left.append(word)
             continue
-        if not equals and not rest:
-            raise ValueError("--robot: needs the robot's folder")
-        folder = Path(value if equals else rest.pop(0)).expanduser()
-        if not folder.is_dir():
-            raise ValueError(f"--robot {folder}: is no folder")
-        os.environ[VARIABLE] = str(folder.resolve())
-    return left
+        named = value if equals else next(rest, None)
+        if not named:
+            raise WordsError(f"{OPTION} needs a folder")
+    return left, named
+
+
+def find_robot(named: str | None) -> Path | None:
+    """Return the robot's folder: the one that is named, that of the calling process, or the one from here upwards. Raises WordsError."""
+    if named is not None:
+        folder = Path(named).expanduser()
+        if not (folder / ROBOT_FILE).is_file():
+            raise WordsError(f"{OPTION} {named}: there is no {ROBOT_FILE} in it; name a robot's folder, or {MAKE_ONE}")
+        return folder.resolve()
+    if os.environ.get(ROBOT):
+        return Path(os.environ[ROBOT]).resolve()
+    here = Path.cwd()
+    return next((folder for folder in (here, *here.parents) if (folder / ROBOT_FILE).is_file()), None)
+
+
+def find_command(name: str) -> Command:
+    """Return a command; raises WordsError."""
+    command = COMMANDS.get(_OTHER_WORDS.get(name, name))
+    if command is None:
+        hint = nearest(name, COMMANDS) or "'alula help' lists the commands"
+        raise WordsError(f"there is no command '{name}'; {hint}")
+    return command
+
+
+def do(command: Command, words: Sequence[str], robot: Path | None, here: Checkout | None) -> int:
+    """Do a command, as far as it is not the library's; return the exit code. Raises WordsError."""
+    if not command.open:
+        command.parser().parse_args(words)  # before anything is set up: what is wrong, or --help, ends the process
+    if command.name == "help":
+        sys.stdout.write(find_command(words[0]).parser().format_help() if words else usage())
+        return 0
+    if command.name == "version":
+        sys.stdout.write(f"alula {VERSION}\n")
+        return 0
+    if command.robot and robot is None:
+        raise WordsError(f"there is no {ROBOT_FILE} in {Path.cwd()} or above; name the robot's folder with {OPTION} DIR, or {MAKE_ONE}")
+    if here is not None:
+        return here.do(command, words)
+    if not command.module:
+        raise WordsError(f"{command.name}: {command.elsewhere}")
+    return run_module(command, words)
+
+
+def run_module(command: Command, words: Sequence[str]) -> int:
+    """Run the library's module of a command in this process; return its exit code."""
+    try:
+        module = importlib.import_module(command.module)
+    except ModuleNotFoundError as error:
+        sys.stderr.write(f"alula {command.name}: needs the Python package {error.name}; pip install 'alula[all]' brings it\n")
+        return WRONG
+    code: int = module.main(words)
+    return code
+
+
+def complete(here: Checkout | None) -> int:
+    """Tell a shell how its line goes on; nothing where the packages that this needs are not there yet."""
+    try:
+        _, named = split_robot(shlex.split(os.environ.get("COMP_LINE", ""))[1:])
+        os.environ[ROBOT] = str(find_robot(named) or "")
+    except (ValueError, WordsError):
+        pass  # a line that is not finished: completed as far as it goes, with the robot of this folder
+    command = COMMANDS["completion"]
+    if here is None:
+        return run_module(command, [])
+    if here.has("venv2"):
+        here.become(2, command.module)
+    return 1
 
 
 def main(words: Sequence[str] | None = None) -> int:
-    """Run a command; return its exit code."""
+    """Do what the command line says; return the exit code."""
+    here = checkout()
+    if COMPLETING in os.environ:
+        return complete(here)
     try:
-        left = without_robot(sys.argv[1:] if words is None else words)
-    except ValueError as error:
+        left, named = split_robot(sys.argv[1:] if words is None else words)
+        robot = find_robot(named)
+        if here is not None or named is not None:
+            os.environ[ROBOT] = str(robot or "")
+        name, *others = left or ["help"]
+        return do(find_command(name), others, robot, here)
+    except WordsError as error:
         sys.stderr.write(f"alula: {error}\n")
-        return 2
-    command, *arguments = left or ["help"]
-    if command in {"help", "-h", "--help"}:
-        sys.stdout.write(usage())
-        return 0
-    if command not in COMMANDS:
-        sys.stderr.write(f"alula: there is no command '{command}'; {nearest(command, COMMANDS)}\n")
-        return 2
-    try:
-        module = importlib.import_module(COMMANDS[command][0])
-    except ModuleNotFoundError as error:
-        sys.stderr.write(f"alula {command}: needs the Python package {error.name}; pip install 'alula[all]' brings it\n")
-        return 2
-    code: int = module.main(arguments)
-    return code
+        return WRONG
+    except KeyboardInterrupt:
+        return 130
 
 
 if __name__ == "__main__":

@@ -6,7 +6,6 @@ are printed there instead, and findings go to standard error.
 
 from __future__ import annotations
 
-import argparse
 import json
 import sys
 from collections import Counter
@@ -16,6 +15,7 @@ from functools import partial
 from time import monotonic
 
 from alula.cli.check_missions import SUFFIX, check_missions, prove_missions
+from alula.cli.table import parse
 from alula.common.garbage import collect_seldom
 from alula.common.robots import RobotError, RobotFolder, find_robot
 from alula.language.check.fields import check_fields
@@ -26,14 +26,6 @@ from alula.language.printer import print_file
 from alula.model.model import Skillset
 
 UNREADABLE = "ALU0"
-FILES_HELP = (
-    "skillsets in the paper's notation (*.skill) or the Robot Language (*.rl), folders of them, or `-`: the standard input; "
-    "missions (*.xml)"
-)
-EXIT_CODES = """
-exit code: 0 proved, or nothing but warnings; 1 a model has errors (also of syntax) or a property fails; 2 a file can't be read
-(not there, no UTF-8 text, too large), or the arguments are wrong
-"""
 
 
 def _models_of(robot: RobotFolder) -> list[str]:
@@ -43,12 +35,12 @@ def _models_of(robot: RobotFolder) -> list[str]:
 
 def main(arguments: Sequence[str] | None = None) -> int:
     """Check the files named on the command line; return the exit code."""
-    options = _parser().parse_args(arguments)
+    options = parse("check", arguments)
     collect_seldom()
     if options.play is not None:
         from alula.cli import play  # it takes the counterexamples from here
 
-        return play.main(arguments)
+        return play.run(options)
     try:
         given = options.files or _models_of(find_robot())
     except RobotError as error:
@@ -74,48 +66,10 @@ def main(arguments: Sequence[str] | None = None) -> int:
 
 
 def exit_code(findings: Sequence[Diagnostic]) -> int:
-    """Return 0, 1 or 2 (``EXIT_CODES``)."""
+    """Return 0, proved, or nothing but warnings; 1, a model has errors or a property fails; 2, a file can't be read."""
     if any(finding.severity is Severity.ERROR and finding.code.startswith(UNREADABLE) for finding in findings):
         return 2
     return 1 if has_errors(findings) else 0
-
-
-def _parser() -> argparse.ArgumentParser:
-    description = "Check skill models: report errors and warnings with their places, then prove the rest."
-    parser = argparse.ArgumentParser(prog="alula check", description=description, epilog=EXIT_CODES)
-    parser.add_argument(
-        "files",
-        nargs="*",
-        metavar="FILE",
-        help=f"{FILES_HELP} (default: the robot's)",
-    )
-    parser.add_argument(
-        "--json",
-        action="store_true",
-        help="print one JSON object: each finding's place, code, counterexample",
-    )
-    parser.add_argument(
-        "--palette",
-        action="append",
-        default=[],
-        metavar="FILE",
-        help="with a mission: a TreeNodesModel with more types of node, as Groot2's",
-    )
-    parser.add_argument(
-        "--closed-world", action="store_true", help="assume that transitions that are neither extern nor used by an effect are never taken"
-    )
-    parser.add_argument("--no-proofs", dest="proofs", action="store_false", help="skip the proofs")
-    parser.add_argument("--time", type=float, default=30.0, metavar="SECONDS", help="time limit for the proofs of a file (default 30)")
-    parser.add_argument(
-        "--play",
-        type=int,
-        metavar="N",
-        help="play counterexample N: in running managers, or as a run of the mission (see `--play 1 --help`)",
-    )
-    parser.add_argument("--out", metavar="DIR", help="with --play of a mission: folder for the run's files")
-    parser.add_argument("--strict", action="store_true", help="treat warnings as errors")
-    parser.add_argument("--to", choices=[notation.value for notation in Notation], help="print the models in this notation instead")
-    return parser
 
 
 def _prove(files: Sequence[ModelFile], timeout_s: float, *, closed_world: bool) -> None:

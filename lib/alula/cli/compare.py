@@ -8,6 +8,7 @@ import sys
 from collections.abc import Sequence
 from pathlib import Path
 
+from alula.cli.table import parser_of
 from alula.common.files import strict, write_aside
 from alula.records.comparing import compare, load_side
 from alula.records.comparing.telling import as_dict, lines
@@ -18,13 +19,8 @@ ALIKE, DIFFERENT, UNREADABLE = 0, 1, 2
 
 def parse(arguments: Sequence[str]) -> argparse.Namespace:
     """Return the command line's values; wrong ones, or a single run, print the usage on stderr and exit with code 2."""
-    parser = argparse.ArgumentParser(
-        prog="alula compare", description="Show runs side by side, and whether their missions made the same decisions."
-    )
-    parser.add_argument("runs", type=Path, nargs="+", metavar="RUN", help="two or more folders of runs, or logs")
-    parser.add_argument("--json", action="store_true", help="print the comparison as JSON")
-    parser.add_argument("--svg", type=Path, metavar="FILE", help="also draw the skills of all runs over time")
-    given = parser.parse_args(arguments)
+    parser = parser_of("compare")
+    given: argparse.Namespace = parser.parse_args(arguments)
     if len(given.runs) < 2:
         parser.error("one run alone can't be compared; name two or more")
     return given

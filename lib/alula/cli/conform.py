@@ -5,12 +5,12 @@ With ``--complete`` a log that misses something conforms only up to there, and t
 
 from __future__ import annotations
 
-import argparse
 import json
 import sys
 from collections.abc import Iterator, Sequence
 from pathlib import Path
 
+from alula.cli.table import parse
 from alula.model.errors import UnsupportedModelError
 from alula.records.conformance import ConformanceVerdict, Monitor
 from alula.records.errors import AnalysisError
@@ -18,23 +18,6 @@ from alula.records.logs import Log, read_log
 from alula.records.models import models_of
 
 CONFORMS, DIFFERS, UNREADABLE = 0, 1, 2
-
-
-def parse(arguments: Sequence[str]) -> argparse.Namespace:
-    """Return the command line's values; wrong ones print the usage on stderr and exit with code 2."""
-    parser = argparse.ArgumentParser(prog="alula conform", description="Check a log of skillset events against the models.")
-    parser.add_argument("log", type=Path, help="a run's folder, skills.mcap, a bag with Event messages, or events.jsonl")
-    parser.add_argument(
-        "--model",
-        type=Path,
-        action="append",
-        default=[],
-        metavar="FILE",
-        help="check it against this model (default: the models of the managers that wrote it)",
-    )
-    parser.add_argument("--complete", action="store_true", help="exit with 1 if the log has a gap, breaks off, or ends within a step")
-    parser.add_argument("--json", action="store_true", help="print the verdict as JSON")
-    return parser.parse_args(arguments)
 
 
 def judge(log: Log, models: Sequence[Path] = ()) -> ConformanceVerdict:
@@ -78,7 +61,7 @@ def holes(log: Log, verdict: ConformanceVerdict) -> tuple[str, ...]:
 
 def main(arguments: Sequence[str] | None = None) -> int:
     """Judge; return the exit code."""
-    given = parse(sys.argv[1:] if arguments is None else arguments)
+    given = parse("conform", arguments)
     try:
         log = read_log(given.log)
         verdict = judge(log, given.model)

@@ -5,8 +5,8 @@ from __future__ import annotations
 import argparse
 import sys
 from collections.abc import Sequence
-from pathlib import Path
 
+from alula.cli.table import parser_of
 from alula.common.files import write_text
 from alula.records.errors import AnalysisError
 from alula.records.expectations import Checked, check, expectations_of, junit, load_expectations
@@ -17,11 +17,8 @@ FULFILLED, FAILED, UNREADABLE = 0, 1, 2
 
 def parse(arguments: Sequence[str]) -> argparse.Namespace:
     """Return the command line's values; wrong ones print the usage on stderr and exit with code 2."""
-    parser = argparse.ArgumentParser(prog="alula expect", description="Write expectations from a run, or check a run against them.")
-    parser.add_argument("run", type=Path, help="a run's folder, or its log")
-    parser.add_argument("--check", type=Path, metavar="FILE", help="check the run against this file instead of writing one")
-    parser.add_argument("--junit", type=Path, metavar="FILE", help="with --check: also write the results as JUnit XML")
-    given = parser.parse_args(arguments)
+    parser = parser_of("expect")
+    given: argparse.Namespace = parser.parse_args(arguments)
     if given.junit is not None and given.check is None:
         parser.error("--junit writes the results of a check; add --check FILE")
     return given

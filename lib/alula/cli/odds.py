@@ -13,6 +13,7 @@ from pathlib import Path
 
 from alula.check.robot import models_of, part_of
 from alula.cli.saying import warner
+from alula.cli.table import parse
 from alula.common.files import write_text
 from alula.common.robots import FAULTS, RobotError, RobotFolder, find_robot
 from alula.common.scenarios import ScenarioError, load_scenario, scenario_names
@@ -38,14 +39,12 @@ from alula.trees.errors import TreeError
 
 COMMAND = "alula odds"
 WRONG = 2
-MOST_SITUATIONS = 200_000
-UNLIKELY = 1e-3
 COUNTED = 100  # attempts and rounds, exactly: each has its share of the odds
 
 
 def main(words: Sequence[str] | None = None) -> int:
     """Tell the odds; return the exit code."""
-    given = _parser().parse_args(words)
+    given = parse("odds", words)
     try:
         return run(given)
     except (
@@ -61,22 +60,6 @@ def main(words: Sequence[str] | None = None) -> int:
     ) as error:
         sys.stderr.write(f"{COMMAND}: {error}\n")
         return WRONG
-
-
-def _parser() -> argparse.ArgumentParser:
-    parser = argparse.ArgumentParser(prog=COMMAND, description="Tell how likely a mission is accomplished, degraded, given up, or neither.")
-    parser.add_argument("file", type=Path, metavar="FILE", help="a mission: BehaviorTree.CPP 4's XML")
-    parser.add_argument(
-        "--with", dest="changes", action="append", default=[], metavar="FAULT=UNITS", help="what it would bring: camera=2, or camera=never"
-    )
-    parser.add_argument("--world", default="", metavar="FILE|NAME", help="inputs of the mission (default: those of its scenario)")
-    parser.add_argument(
-        "--unlikely", type=float, default=UNLIKELY, metavar="P", help=f"less likely situations are not looked at ({UNLIKELY:g})"
-    )
-    parser.add_argument("--most", type=int, default=MOST_SITUATIONS, metavar="N", help=f"situations looked at ({MOST_SITUATIONS})")
-    parser.add_argument("--svg", type=Path, metavar="FILE", help="write a picture there, too")
-    parser.add_argument("--json", action="store_true", help="print one JSON object")
-    return parser
 
 
 def run(given: argparse.Namespace) -> int:

@@ -5,7 +5,6 @@ Ends with 0, and with 2 when a model is wrong or can't be read.
 
 from __future__ import annotations
 
-import argparse
 import sys
 from collections.abc import Iterator, Sequence
 from dataclasses import replace
@@ -13,6 +12,7 @@ from pathlib import Path
 
 from alula.check.robot import part_of
 from alula.cli.saying import warner
+from alula.cli.table import parse
 from alula.common.robots import RobotError, RobotFolder, find_robot
 from alula.language.errors import LanguageError, has_errors
 from alula.language.fleet import load_models
@@ -29,9 +29,7 @@ WRONG = 2
 
 def main(words: Sequence[str] | None = None) -> int:
     """Write the palette to the standard output; return the exit code."""
-    parser = argparse.ArgumentParser(prog=COMMAND, description="Write a robot's skills as a TreeNodesModel for Groot2.")
-    parser.add_argument("folder", metavar="FOLDER", help="the robot's models, as skillsets/uav")
-    given = parser.parse_args(words)
+    given = parse("palette", words)
     try:
         types = list(robot_types(given.folder))
     except LanguageError as error:

@@ -9,19 +9,19 @@ import argparse
 import json
 import sys
 from collections.abc import Sequence
-from pathlib import Path
 
 from alula.cli.check import counterexamples_of
 from alula.cli.check_missions import SUFFIX
 from alula.cli.play_mission import play_mission
 from alula.language.models import check_files, models_in
-from alula.prove.limits import DEFAULT_TIME_S
 from alula.runtime.counterexample_play import PlayedStep, play
 
 
-def main(arguments: Sequence[str] | None = None) -> int:
-    """Play a counterexample; return the exit code."""
-    options = _parser().parse_args(arguments)
+def run(options: argparse.Namespace) -> int:
+    """Play the counterexample that ``alula check --play`` is asked for; return the exit code."""
+    if not options.files:
+        sys.stderr.write("alula check: --play needs the models or missions whose counterexample is meant\n")
+        return 2
     if any(one.endswith(SUFFIX) for one in options.files):
         return play_mission(options)
     paths = dict.fromkeys(path for given in options.files for path in models_in(given))
@@ -38,23 +38,6 @@ def main(arguments: Sequence[str] | None = None) -> int:
     return 0 if agrees else 1
 
 
-def _parser() -> argparse.ArgumentParser:
-    parser = argparse.ArgumentParser(prog="alula check --play", description="Play a counterexample of the proofs in running managers.")
-    parser.add_argument("files", nargs="+", metavar="FILE", help="models, as for `alula check`")
-    parser.add_argument(
-        "--play", type=int, required=True, metavar="N", help="the number of the counterexample in the output of `alula check`"
-    )
-    parser.add_argument(
-        "--time", type=float, default=DEFAULT_TIME_S, metavar="SECONDS", help="time limit for the proofs of a file (default 30)"
-    )
-    parser.add_argument("--closed-world", action="store_true", help="as for `alula check`")
-    parser.add_argument(
-        "--out", type=Path, metavar="DIR", help="of a mission: folder for the run's files (default: runs/TIME-NAME of the robot)"
-    )
-    parser.add_argument("--json", action="store_true", help="print one JSON object")
-    return parser
-
-
 def _as_text(title: str, played: Sequence[PlayedStep], *, agrees: bool) -> str:
     lines = [title]
     for number, one in enumerate(played, 1):
@@ -67,7 +50,3 @@ def _as_text(title: str, played: Sequence[PlayedStep], *, agrees: bool) -> str:
 def _as_json(title: str, played: Sequence[PlayedStep], *, agrees: bool) -> str:
     steps = [{**one.step.as_json(), "differences": list(one.differences)} for one in played]
     return json.dumps({"finding": title, "agrees": agrees, "steps": steps}, indent=2) + "\n"
-
-
-if __name__ == "__main__":
-    sys.exit(main())

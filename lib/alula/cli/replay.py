@@ -18,6 +18,9 @@ from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 
+from alula.cli.options.runs import SKILLS
+from alula.cli.options.runs import replay as options
+from alula.cli.parser import Parser
 from alula.common.faults import parse_fault
 from alula.common.files import write_text
 from alula.common.record import FILE
@@ -74,54 +77,14 @@ class Depth:
 
 
 Depths = Mapping[str, Depth]
-SKILLS = "skills"
 NO_DEPTHS: Depths = {}
 
 
 def parse(words: Sequence[str], depths: Depths = NO_DEPTHS) -> Arguments:
     """Return the command line's values; ``depths`` are the robot's own for ``--from``. Wrong ones exit with code 2."""
-    parser = argparse.ArgumentParser(prog="alula replay", description="Make the decisions of a recorded mission again.")
-    parser.add_argument("run", type=Path, metavar="RUN", help="a run's folder, its skills.mcap or its functional.bag")
-    parser.add_argument(
-        "--from", dest="depth", choices=[SKILLS, *depths], default=SKILLS, help="the layer whose record is replayed (default skills)"
-    )
-    parser.add_argument("--tree", default="", metavar="FILE.xml", help="use the tree of another mission's file")
-    parser.add_argument(
-        "--model", type=Path, action="append", default=[], metavar="FILE", help="use another model of a skillset; repeatable"
-    )
-    parser.add_argument(
-        "--set", action="append", default=[], dest="settings", metavar="NAME=VALUE", help="change a parameter of the mission; repeatable"
-    )
-    parser.add_argument(
-        "--fail",
-        action="append",
-        default=[],
-        metavar="WHAT[@SECONDS[-SECONDS]]",
-        help="inject a fault that the recorded run did not have; repeatable",
-    )
-    parser.add_argument(
-        "--behaviour",
-        type=Path,
-        action="append",
-        default=[],
-        metavar="FILE",
-        help="behaviour file of the mocks that stand in where nothing was recorded",
-    )
-    parser.add_argument(
-        "--map",
-        action="append",
-        default=[],
-        dest="names",
-        metavar="/THEIRS:=/OURS",
-        help="with --from sensors: read a topic of the bag under another name",
-    )
-    parser.add_argument("--on", action="store_true", help="continue over mocks after the first difference")
-    parser.add_argument("--rate", type=float, default=0.0, help="mission seconds per second at most (default 0: no limit)")
-    parser.add_argument("--out", type=Path, help="folder for the replay's own record, summary, pictures and report")
-    parser.add_argument("--expect", type=Path, metavar="FILE", help="check the replay against expectations; they decide the exit code")
-    parser.add_argument("--junit", type=Path, metavar="FILE", help="with --expect: also write the results as JUnit XML")
-    parser.add_argument("--json", action="store_true", help="print each decision and the difference as a line of JSON")
-    given = parser.parse_args(words, namespace=Arguments())
+    parser = Parser(prog="alula replay", description="Make the decisions of a recorded mission again.")
+    options(parser, (SKILLS, *depths))
+    given: Arguments = parser.parse_args(words, namespace=Arguments())
     if given.junit is not None and given.expect is None:
         parser.error("--junit writes the results of expectations; add --expect FILE")
     if not 0.0 <= given.rate <= 1e6:

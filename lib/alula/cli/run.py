@@ -18,7 +18,9 @@ from collections.abc import Sequence
 from pathlib import Path
 
 from alula.campaign.mocked_scenarios import load_mocked_scenario
-from alula.cli.run_request import check_limit, check_seed, groot_address, run_folder, run_parser, shown_at, world_file
+from alula.cli.options.runs import every_run
+from alula.cli.parser import Parser
+from alula.cli.run_request import check_limit, check_seed, groot_address, run_folder, shown_at, world_file
 from alula.common.faults import MOCKED, FaultError, FaultRequest, changes_of, parse_fault, spans_of
 from alula.common.robots import RobotError
 from alula.common.run_log import note_mocked
@@ -43,8 +45,8 @@ CANNOT_START = EXIT_CODES[Outcome.NOT_STARTED]
 
 def parse(words: Sequence[str]) -> argparse.Namespace:
     """Read the command line; raises RequestError."""
-    parser = run_parser("Run a scenario of the robot over mocks, in virtual time.")
-    parser.add_argument("--behaviour", type=Path, action="append", default=[], metavar="FILE", help="behaviour file, on top of the robot's")
+    parser = Parser(prog="alula run", description="Run a scenario of the robot over mocks, in virtual time.")
+    every_run(parser)
     given, others = parser.parse_known_args(words)
     if not given.mock:
         raise RequestError("without --mock a run needs an installation with ROS: use ./alula of a checkout")

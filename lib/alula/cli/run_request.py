@@ -1,35 +1,18 @@
-"""The command line of ``alula run``: what live runs and runs over mocks have in common."""
+"""What a run is asked for, checked before anything starts: of live runs and of runs over mocks."""
 
 from __future__ import annotations
 
-import argparse
 import math
 from datetime import datetime, timezone
 from pathlib import Path
 
 from alula.common.robots import find_robot, wrong_world
 from alula.common.runs import runs_folder
-from alula.common.scenarios import Scenario, scenario_names
+from alula.common.scenarios import Scenario
 from alula.runtime.live.spec import RequestError
 from alula.trees.groot.address import Address, ServerError
 
-FAULT = "WHAT[:HOW][@SECONDS[-SECONDS]]"
 MAX_SEED = 2**31 - 1
-
-
-def run_parser(about: str) -> argparse.ArgumentParser:
-    """Return a parser with the options of every run."""
-    parser = argparse.ArgumentParser(prog="alula run", description=about)
-    parser.add_argument("scenario", help=f"name of the scenario: {', '.join(scenario_names())}")
-    parser.add_argument("--fail", action="append", default=[], metavar=FAULT, help="a fault, seconds after the departure; repeatable")
-    parser.add_argument("--world", default="", metavar="FILE|NAME", help="surroundings and inputs of the mission (default: the scenario's)")
-    parser.add_argument("--seed", type=int, default=0, help="seed of all random choices (default 0)")
-    parser.add_argument("--out", type=Path, help="folder for the results (default: runs/TIME-SCENARIO of the robot)")
-    parser.add_argument("--monitor", action="store_true", help="check every event against the models")
-    parser.add_argument("--groot", nargs="?", const="", metavar="[HOST:]PORT", help="show the tree to Groot2 and its like (127.0.0.1:1667)")
-    parser.add_argument("--limit", type=float, default=0.0, metavar="SECONDS", help="end the run after so long, by the mission clock")
-    parser.add_argument("--mock", action="store_true", help="run over mocks in virtual time: without simulator and ROS, in about a second")
-    return parser
 
 
 def check_seed(seed: int) -> int:

@@ -13,7 +13,9 @@ from pathlib import Path
 
 from alula.check.mission import palette_for
 from alula.check.robot import models_of, part_of
+from alula.cli.options.models import TICKS
 from alula.cli.saying import warner
+from alula.cli.table import parse
 from alula.common.files import write_text
 from alula.common.robots import RobotError, find_robot
 from alula.missions.drawing import draw, drawn_as_text
@@ -26,30 +28,16 @@ from alula.trees.view import view_of
 
 COMMAND = "alula tree"
 WRONG = 2
-DEFAULT_TICKS = 10
 
 
 def main(words: Sequence[str] | None = None) -> int:
     """Draw; return the exit code."""
-    given = _parser().parse_args(words)
+    given = parse("tree", words)
     try:
         return run(given)
     except (AnswersError, TreeError, OSError) as error:
         sys.stderr.write(f"{COMMAND}: {error}\n")
         return WRONG
-
-
-def _parser() -> argparse.ArgumentParser:
-    parser = argparse.ArgumentParser(prog=COMMAND, description="Draw a mission; with answers tick it without any robot.")
-    parser.add_argument("file", type=Path, metavar="FILE", help="a mission: BehaviorTree.CPP 4's XML")
-    parser.add_argument("--svg", type=Path, metavar="FILE", help="write the drawing there, too")
-    parser.add_argument(
-        "--palette", type=Path, action="append", default=[], metavar="FILE", help="a TreeNodesModel with more types of node, as Groot2's"
-    )
-    parser.add_argument("--answers", type=Path, metavar="FILE", help='what leaves answer: {"leaf name": ["RUNNING", "SUCCESS"], ...}')
-    parser.add_argument("--ticks", type=int, metavar="N", help=f"with answers, how often it is ticked ({DEFAULT_TICKS})")
-    parser.add_argument("--json", action="store_true", help="print the tree, or each tick, as JSON")
-    return parser
 
 
 def run(given: argparse.Namespace) -> int:
@@ -61,7 +49,7 @@ def run(given: argparse.Namespace) -> int:
     clock = StepClock()
     tree = scripted_tree(files, palette(files, given.palette), answers, clock)
     if given.answers is not None:
-        for tick in ticks(tree, answers, DEFAULT_TICKS if given.ticks is None else given.ticks, clock):
+        for tick in ticks(tree, answers, TICKS if given.ticks is None else given.ticks, clock):
             sys.stdout.write((tick.as_json() if given.json else tick.as_text()) + "\n")
     view, title = view_of(tree.root), f"{given.file.name}: {files.main}"
     if given.svg is not None:

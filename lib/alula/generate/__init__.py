@@ -1,4 +1,4 @@
-"""Makes ROS 2 packages and the bridge's configuration from a robot's models; ``python -m alula.generate``."""
+"""Makes ROS 2 packages and the bridge's configuration from a robot's models."""
 
 from alula.generate.robot_files import robot_files
 

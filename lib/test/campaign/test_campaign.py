@@ -13,7 +13,6 @@ from dataclasses import asdict
 import pytest
 from campaign_mocks import fly_recorded
 
-from alula.campaign.__main__ import main
 from alula.campaign.coverage import cover, is_troubled, processes
 from alula.campaign.failures import ARROW, FAULT, INVARIANT, PROCESS, RESULT, Failure, Way, failures_in, ways_to_fail
 from alula.campaign.mocked_scenarios import load_mocked_scenario
@@ -21,6 +20,7 @@ from alula.campaign.plan import MOCKS, PlannedRun, load_campaign
 from alula.campaign.rows import rows_of
 from alula.campaign.table import ROWS, Table
 from alula.campaign.telling import as_page, as_text
+from alula.cli.campaign import main
 from alula.common.record import read_record
 from alula.common.scenarios import load_scenario, scenario_names
 from alula.records.errors import AnalysisError
@@ -316,7 +316,7 @@ def test_a_campaign_whose_plan_was_damaged_is_refused(tmp_path):
 
 
 def test_a_folder_that_goes_away_is_told_in_a_line(tmp_path, capsys, monkeypatch):
-    monkeypatch.setattr("alula.campaign.__main__.run", lambda *_: shutil.rmtree(tmp_path / "out"))
+    monkeypatch.setattr("alula.cli.campaign.run", lambda *_: shutil.rmtree(tmp_path / "out"))
     path = campaign_file(tmp_path / "a.yaml", "faults: [[zed@3]]\n")
     assert main([str(path), "--out", str(tmp_path / "out")]) == 2
     said = capsys.readouterr().err
@@ -330,7 +330,7 @@ def test_a_campaign_that_is_killed_goes_on_and_has_the_same_table_in_the_end(tmp
     killed = subprocess.run([sys.executable, "-c", KILLED_AFTER_FIRST_ROWS, *words], capture_output=True, timeout=300, check=False)
     assert killed.returncode == -signal.SIGKILL
     assert 0 < (out / ROWS).read_bytes().count(b"\n") < 14
-    words = [sys.executable, "-m", "alula.campaign", *words]
+    words = [sys.executable, "-m", "alula.cli.campaign", *words]
     assert subprocess.run(words, capture_output=True, timeout=300, check=False).returncode in {0, 1}
     runs = load_campaign(path).runs
     there = [json.loads(line) for line in (out / ROWS).read_text(encoding="utf-8").splitlines()]

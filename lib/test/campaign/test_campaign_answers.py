@@ -12,7 +12,6 @@ import pytest
 
 pytest.importorskip("z3")
 
-from alula.campaign.__main__ import main
 from alula.campaign.beside import NOTHING, MissionAnswers, beside
 from alula.campaign.coverage import Coverage
 from alula.campaign.flown import FlownAnswer
@@ -21,6 +20,7 @@ from alula.campaign.plan import MOCKS, PlannedRun
 from alula.campaign.proved import ProvedMission, proved
 from alula.campaign.rows import rows_of
 from alula.campaign.telling import as_page, as_text
+from alula.cli.campaign import main
 from alula.common.scenarios import load_scenario
 from alula.records.causes.fault_file import effects_of_robot
 from alula.records.models import robot_skillsets

@@ -21,9 +21,9 @@ from console_serving import WAIT_S, Robot, answer_to, heard
 from websockets.asyncio.client import ClientConnection, connect
 from websockets.exceptions import InvalidMessage
 
+from alula.cli.console import main
 from alula.common.network import free_port
 from alula.console import commands, server
-from alula.console.__main__ import main
 from alula.console.admission import Admission
 from alula.console.certificates import NAME, fingerprint, own_certificate, server_context
 from alula.console.server import FEED, Console
@@ -203,7 +203,7 @@ def console(tmp_path: Path) -> Iterator[Callable[..., subprocess.Popen[str]]]:
     environment = {**os.environ, "ALULA_STATE": str(tmp_path), "ALULA_ROOT": str(tmp_path)}
 
     def start(*words: str) -> subprocess.Popen[str]:
-        command = [sys.executable, "-m", "alula.console", "--port", str(free_port()), *words]
+        command = [sys.executable, "-m", "alula.cli.console", "--port", str(free_port()), *words]
         started.append(subprocess.Popen(command, stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True, env=environment))
         return started[-1]
 

@@ -23,12 +23,12 @@ from console_serving import OPTIONS, WAIT_S, Bench, Robot, answer_to, heard, ser
 from websockets.asyncio.client import ClientConnection, connect
 from websockets.exceptions import ConnectionClosed, InvalidStatus
 
+from alula.cli.console import main
 from alula.common import run_log
 from alula.common.record import EVENTS, MISSION, OPERATOR
 from alula.common.robots import load_robot_folder
 from alula.common.runs import Run
 from alula.console import acts, commands, server
-from alula.console.__main__ import main
 from alula.console.acts import ActError, WantedRun, read_wanted
 from alula.console.admission import is_loopback
 from alula.console.server import FEED, MAX_COMMANDS_PER_S, MAX_MESSAGE_BYTES

@@ -37,7 +37,7 @@ class Editor:
     """The other end of the protocol."""
 
     def __init__(self):
-        command = [sys.executable, "-m", "alula.editor"]
+        command = [sys.executable, "-m", "alula.cli.editor"]
         self.process = subprocess.Popen(command, stdin=subprocess.PIPE, stdout=subprocess.PIPE, stderr=subprocess.DEVNULL)
         self.received = queue.Queue()
         self.number = 0

@@ -8,8 +8,8 @@ from pathlib import Path
 import pytest
 from generate_rover import SKILL
 
+from alula.cli.generate import main
 from alula.generate import robot_files
-from alula.generate.__main__ import main
 from alula.generate.writer import write_files
 from alula.language.load import load_robot
 

@@ -6,9 +6,9 @@ from pathlib import Path
 
 import pytest
 
+from alula.cli.generate import main as generate
 from alula.common.faults import parse_fault
 from alula.common.robots import RobotError, load_robot_folder
-from alula.generate.__main__ import main as generate
 from alula.language.errors import LanguageError
 from alula.language.fleet import load_models
 from alula.mock import mock_world

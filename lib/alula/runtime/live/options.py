@@ -60,8 +60,13 @@ def _option(action: argparse.Action) -> RunOption:
 
 
 def as_json(part: RunPart) -> str:
-    """Return what `ask_options` reads."""
+    """Return what `read_options` reads."""
     return json.dumps([asdict(option) for option in options_of(part)])
+
+
+def read_options(text: str) -> list[RunOption]:
+    """Read what `as_json` wrote; raises ValueError, TypeError."""
+    return [RunOption(**{**said, "choices": tuple(said["choices"])}) for said in json.loads(text)]
 
 
 async def ask_options() -> list[RunOption]:
@@ -86,7 +91,7 @@ async def ask_options() -> list[RunOption]:
                     os.killpg(asked.pid, signal.SIGTERM)
         if asked.returncode:
             raise RequestError((why.strip().splitlines() or [f"alula run {FLAG} ended with {asked.returncode}"])[-1])
-        return [RunOption(**{**said, "choices": tuple(said["choices"])}) for said in json.loads(told)]
+        return read_options(told)
     except (OSError, subprocess.TimeoutExpired, ValueError, TypeError) as error:
         raise RequestError(f"alula run {FLAG}: {error}") from None
 

@@ -13,12 +13,13 @@ from dataclasses import dataclass
 from functools import partial
 from pathlib import Path
 
+from alula.cli.options.live import DOMAINS
+from alula.cli.table import parser_of
 from alula.common.runs import NoRunError, Run, find_run, live_runs
 from skill_panel.memory import Memory
 from skill_panel.watcher import Watcher, all_found, skillsets_in
 from skillset_ros2.session import Session
 
-DOMAINS = range(233)
 LIST_S = 3.0
 """How long (wall clock) `--list` looks into a domain that seems empty."""
 
@@ -34,18 +35,8 @@ class Place:
 
 def parse(arguments: Sequence[str] | None) -> argparse.Namespace:
     """Return the command line's values; wrong ones print the usage on stderr and exit with code 2."""
-    parser = argparse.ArgumentParser(
-        prog="alula panel",
-        description="Show running skillsets and control them manually.",
-        epilog="Without --run and --domain: the run that is under way (the newest), else the domain of ROS_DOMAIN_ID, else domain 0.",
-    )
-    parser.add_argument("skillsets", nargs="*", metavar="SKILLSET", help="show only these")
-    parser.add_argument("--namespace", default="", metavar="NS", help="show only the robot in this namespace, such as /robot1")
-    place = parser.add_mutually_exclusive_group()
-    place.add_argument("--run", metavar="DIR|latest", help="the run of this folder, or the newest one under way")
-    place.add_argument("--domain", type=int, metavar="N", help="the skillsets in this DDS domain")
-    parser.add_argument("--list", action="store_true", help="list the runs under way on this machine, and exit")
-    options = parser.parse_args(arguments)
+    parser = parser_of("panel")
+    options: argparse.Namespace = parser.parse_args(arguments)
     if options.domain is not None and options.domain not in DOMAINS:
         parser.error(f"--domain {options.domain}: a DDS domain is a number from 0 to {DOMAINS[-1]}")
     return options

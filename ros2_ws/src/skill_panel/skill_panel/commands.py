@@ -16,6 +16,7 @@ from typing import Any
 
 import yaml
 
+from alula.cli.table import parse
 from alula.common.record import EVENTS, FILE, RecordFollower
 from alula.common.runs import LATEST, NoRunError, find_run, load_run
 from alula.common.signals import Interrupts, on_end_signal
@@ -23,7 +24,7 @@ from alula.common.suggestions import nearest
 from alula.runtime.core.errors import SkillRuntimeError
 from alula.runtime.core.events import event_record
 from alula.runtime.waiting import NoResponseError
-from skill_panel.__main__ import DOMAINS, LIST_S, Place, place_of
+from skill_panel.__main__ import LIST_S, Place, place_of
 from skill_panel.watcher import all_found, skillsets_in
 
 DONE, NOT_DONE, WRONG = 0, 1, 2
@@ -209,38 +210,6 @@ COMMANDS: dict[str, Callable[[Clients, argparse.Namespace, Out], int]] = {
 }
 
 
-def parse(arguments: Sequence[str] | None) -> argparse.Namespace:
-    """Read the command line; exits with 2 when it is wrong."""
-    parser = argparse.ArgumentParser(
-        prog="alula",
-        description="Drive running skillsets from a shell.",
-        epilog="Without --run and --domain: the run that is under way (the newest), else the domain of ROS_DOMAIN_ID, else domain 0.",
-    )
-    commands = parser.add_subparsers(dest="command", required=True)
-    for name, function in COMMANDS.items():
-        command = commands.add_parser(name, help=str(function.__doc__), description=function.__doc__)
-        if name in {"start", "interrupt", "why"}:
-            command.add_argument("skill", metavar="SKILL", help="a skill, such as drive or base.drive")
-        if name in {"start", "why"}:
-            command.add_argument("inputs", nargs="*", metavar="key=value", help="inputs of the skill; values as in YAML")
-        if name == "transition":
-            command.add_argument("resource", metavar="SKILLSET.RESOURCE")
-            command.add_argument("state", metavar="STATE")
-        if name == "data":
-            command.add_argument("data", nargs="?", metavar="SKILLSET.DATA", help="a data of a skillset (default: all)")
-        if name == "events":
-            command.add_argument(
-                "--follow", action="store_true", help="print events as they happen (default: those that the run has recorded)"
-            )
-            command.add_argument("--skillset", metavar="NAME", help="only events of this skillset")
-        place = command.add_mutually_exclusive_group()
-        place.add_argument("--run", metavar="DIR|latest", help="the run of this folder, or the newest one under way")
-        place.add_argument("--domain", type=int, choices=DOMAINS, metavar="N", help="the skillsets in this DDS domain")
-        command.add_argument("--namespace", default="", metavar="NS", help="only the robot in this namespace")
-        command.add_argument("--json", action="store_true", help="print a JSON object a line")
-    return parser.parse_args(arguments)
-
-
 def write(value: object, text: str, *, as_json: bool) -> None:
     """Write one result to stdout, at once."""
     sys.stdout.write(f"{json.dumps(value, default=str) if as_json else text}\n")
@@ -290,8 +259,10 @@ def _one_namespace(found: Sequence[tuple[str, str]], place: Place) -> str:
 
 
 def main(arguments: Sequence[str] | None = None) -> int:
-    """Do a command; return the exit code."""
-    options = parse(arguments)
+    """Do the command that the first word names; return the exit code."""
+    name, *words = sys.argv[1:] if arguments is None else arguments
+    options = parse(name, words)
+    options.command = name
 
     def out(value: object, text: str) -> None:
         write(value, text, as_json=options.json)

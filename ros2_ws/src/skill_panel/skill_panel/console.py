@@ -1,10 +1,10 @@
-"""The operator's page with robots reached over ROS 2: ``python -m skill_panel.console``, see ``alula.console``."""
+"""The operator's page with robots reached over ROS 2: ``python -m skill_panel.console``, see ``alula.cli.console``."""
 
 from __future__ import annotations
 
 import sys
 
-from alula.console.__main__ import main
+from alula.cli.console import main
 from alula.console.link import Link
 
 

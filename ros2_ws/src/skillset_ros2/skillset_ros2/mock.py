@@ -21,6 +21,8 @@ from rclpy.node import Node
 from rclpy.signals import SignalHandlerOptions
 from rclpy.utilities import remove_ros_args
 
+from alula.cli.options.live import mock, mocks
+from alula.cli.parser import Parser
 from alula.common.fast_dds import leave
 from alula.common.faults import FaultError, FaultRequest, parse_fault
 from alula.common.robots import BEHAVIOUR, RobotError, find_robot
@@ -96,26 +98,10 @@ class MockNodes:
 
 def parse(words: Sequence[str], *, program: str, folder: bool) -> argparse.Namespace:
     """Read the command line without its ROS arguments."""
-    parser = argparse.ArgumentParser(prog=program, description="Serve skillsets by mocks: the same interface, scripted behaviour.")
-    if folder:
-        models = f"a folder of models, bindings, and {BEHAVIOUR} if there is one (default: the robot's)"
-        parser.add_argument("robot", type=Path, nargs="?", help=models)
-        parser.add_argument(
-            "--skillset", action="append", default=[], metavar="NAME", help="mock only this skillset of the robot; repeatable"
-        )
-    parser.add_argument(
-        "--behaviour", action="append", default=[], type=Path, metavar="FILE", help="behaviour file, on top of the robot's own"
-    )
-    parser.add_argument(
-        "--fail",
-        action="append",
-        default=[],
-        metavar="WHAT[:HOW][@SECONDS[-SECONDS]]",
-        help="inject a fault that the behaviour file declares",
-    )
-    parser.add_argument("--seed", type=int, default=0, help="seed of the mocks' random choices (default 0)")
-    parser.add_argument("--starter", action="store_true", help="print a behaviour file to start from, and exit")
-    return parser.parse_args(words)
+    parser = Parser(prog=program, description="Serve skillsets by mocks: the same interface, scripted behaviour.")
+    (mock if folder else mocks)(parser)
+    given: argparse.Namespace = parser.parse_args(words)
+    return given
 
 
 def read_faults(texts: Sequence[str]) -> list[FaultRequest]:

@@ -1,17 +1,12 @@
-"""``alula new robot DIR``: make a robot, a working repository in a folder of its own.
-
-Ends with 0 when it was written, 2 when the folder's name can't be used or something is in it already; then nothing was written.
-"""
+"""The skeleton of a robot: the files of a working repository, from templates."""
 
 from __future__ import annotations
 
-import argparse
 import importlib.util
 import keyword
 import re
 import subprocess
 import sys
-from collections.abc import Sequence
 from pathlib import Path
 
 TEMPLATES = Path(__file__).parent / "robot"
@@ -62,34 +57,5 @@ def write(folder: Path, files: dict[str, str]) -> None:
             subprocess.run([sys.executable, "-m", "ruff", *command, "."], cwd=folder, check=True)
 
 
-def main(arguments: Sequence[str] | None = None) -> int:
-    """Make what the command line asks for; return the exit code."""
-    parser = argparse.ArgumentParser(prog="alula new", description="Make a robot: a working repository to start from.")
-    parser.add_argument("what", choices=["robot"], help="always robot")
-    parser.add_argument("folder", metavar="DIR", type=Path, help="a new folder, whose name is the robot's: a-z, 0-9, _")
-    parser.add_argument("--git", action="store_true", help="run git init in it")
-    options = parser.parse_args(arguments)
-    folder = options.folder.expanduser().absolute()
-    files = files_of(folder.name)
-    try:
-        check(folder)
-        write(folder, files)
-    except ScaffoldError as error:
-        sys.stderr.write(f"alula new: {error}\n")
-        return 2
-    except OSError as error:
-        sys.stderr.write(f"alula new: {error.filename}: can't be written: {error.strerror}\n")
-        return 2
-    if options.git and subprocess.run(["git", "init", "--quiet", str(folder)], check=False).returncode:
-        return 2
-    sys.stdout.write("".join(f"{path}\n" for path in files))
-    sys.stdout.write(f"\nNext: cd {options.folder} && alula test, and read README.md there\n")
-    return 0
-
-
 def _filled(text: str, name: str) -> str:
     return text.replace("@name@", name).replace("@Name@", camel(name)).replace("@dot@", ".")
-
-
-if __name__ == "__main__":
-    sys.exit(main())

@@ -6,7 +6,6 @@ its folder any more.
 
 from __future__ import annotations
 
-import argparse
 import sys
 import time
 from collections.abc import Sequence
@@ -18,10 +17,11 @@ from alula.campaign.coverage import Coverage, cover, processes
 from alula.campaign.failures import ways_to_fail
 from alula.campaign.mocked_scenarios import load_mocked_scenario
 from alula.campaign.plan import MOCKS, Campaign, load_campaign
-from alula.campaign.proved import TIME_S, proved
+from alula.campaign.proved import proved
 from alula.campaign.running import options_of, run
 from alula.campaign.table import ROWS, Row, Table
 from alula.campaign.telling import as_page, as_text
+from alula.cli.table import parse
 from alula.common.files import write_json, write_text
 from alula.common.garbage import collect_seldom
 from alula.common.robots import RobotError
@@ -33,26 +33,6 @@ from alula.records.models import robot_skillsets
 
 DONE, TROUBLE, CANNOT_START = 0, 1, 2
 SHOW_EVERY_S = 1.0
-
-
-def parse(arguments: Sequence[str]) -> argparse.Namespace:
-    """Return the command line's values; wrong ones print the usage on stderr and exit with code 2."""
-    parser = argparse.ArgumentParser(
-        prog="alula campaign", description="Run scenarios many times with faults, and report the mission's response to each failure."
-    )
-    parser.add_argument("file", type=Path, help="campaign file (docs/records.md)")
-    parser.add_argument("--out", type=Path, help="folder for the results (default: runs/campaign-NAME); an interrupted one continues there")
-    parser.add_argument(
-        "--dask", metavar="URL", help="use the workers of this Dask scheduler, such as tcp://host:8786 (default: this machine)"
-    )
-    parser.add_argument(
-        "--time",
-        type=float,
-        default=TIME_S,
-        metavar="SECONDS",
-        help=f"time limit for the proof of a mission's answers (default {TIME_S:g})",
-    )
-    return parser.parse_args(arguments)
 
 
 def check_faults(campaign: Campaign) -> None:
@@ -113,7 +93,7 @@ def finish(campaign: Campaign, table: Table, out: Path, title: str, time_s: floa
 
 def main(arguments: Sequence[str] | None = None) -> int:
     """Do it; return the exit code."""
-    given = parse(sys.argv[1:] if arguments is None else arguments)
+    given = parse("campaign", arguments)
     collect_seldom()
     out = given.out or runs_folder() / f"campaign-{given.file.stem}"
     try:

@@ -17,6 +17,8 @@ import sys
 from collections.abc import Callable, Sequence
 from pathlib import Path
 
+from alula.cli.options.live import DOMAINS, PORT
+from alula.cli.table import parser_of
 from alula.common.network import free_port
 from alula.common.robots import RobotError, RobotFolder, load_robot_folder
 from alula.common.runs import LATEST, Run, live_runs
@@ -26,35 +28,11 @@ from alula.console.link import ActError, Link, Mission, Skillsets
 from alula.console.server import Console
 from alula.runtime.live.options import ask_options
 
-PORT = 8440
-DOMAINS = range(233)
-
 
 def parse(arguments: Sequence[str] | None) -> argparse.Namespace:
     """Return the command line's values; wrong ones print the usage on stderr and exit with code 2."""
-    parser = argparse.ArgumentParser(
-        prog="alula console",
-        description="Serve the operator's page: start a mission, watch it, understand it afterwards.",
-        epilog="Without --run and --domain the page shows the newest run, and goes on to the next one when that starts.",
-    )
-    which = parser.add_mutually_exclusive_group()
-    which.add_argument("--run", metavar="DIR|latest", default=LATEST, help="show this run's folder first (default: the newest)")
-    which.add_argument("--domain", type=int, metavar="N", help="show the run under way in this DDS domain first")
-    parser.add_argument(
-        "--beside", type=Path, action="append", default=[], metavar="DIR", help="show the runs of the robot in this folder, too; repeatable"
-    )
-    parser.add_argument(
-        "--host",
-        default="127.0.0.1",
-        help="address to listen on (default 127.0.0.1); any other is served over TLS, and viewers need the printed URL",
-    )
-    parser.add_argument(
-        "--certificate", type=Path, metavar="FILE", help="TLS certificate, PEM (default for other addresses: a self-signed one)"
-    )
-    parser.add_argument("--key", type=Path, metavar="FILE", help="its private key, PEM, without a passphrase")
-    parser.add_argument("--plain", action="store_true", help="with --host: serve without TLS; other machines may then only watch")
-    parser.add_argument("--port", type=int, help=f"listen on this port (default {PORT}, or a free one where that is taken)")
-    options = parser.parse_args(arguments)
+    parser = parser_of("console")
+    options: argparse.Namespace = parser.parse_args(arguments)
     if options.domain is not None and options.domain not in DOMAINS:
         parser.error(f"--domain {options.domain}: a DDS domain is a number from 0 to {DOMAINS[-1]}")
     if options.port is not None and not 0 < options.port < 2**16:

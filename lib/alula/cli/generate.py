@@ -1,4 +1,4 @@
-"""`python -m alula.generate ROBOT_FOLDER... --out DIR`: make ROS 2 packages and bridge configurations.
+"""``alula generate ROBOT_FOLDER... --out DIR``: make ROS 2 packages and bridge configurations.
 
 Ends with 0 when all was written, 2 when a model, a side file or the output folder is not as it should be; then nothing
 was changed.
@@ -6,12 +6,12 @@ was changed.
 
 from __future__ import annotations
 
-import argparse
 import sys
 from collections.abc import Sequence
 from dataclasses import replace
 from pathlib import Path
 
+from alula.cli.table import parser_of
 from alula.generate.interfaces import interface_package
 from alula.generate.robot_files import robot_files
 from alula.generate.writer import prune, write_files
@@ -22,20 +22,7 @@ from alula.model.span import Span
 
 def main(arguments: Sequence[str] | None = None) -> int:
     """Generate for the folders named on the command line; return the exit code."""
-    parser = argparse.ArgumentParser(prog="alula generate", description="Make interfaces, managers and the bridge's configuration.")
-    parser.add_argument(
-        "robots", nargs="+", metavar="FOLDER", type=Path, help="folder with the robot's models: *.skill, types.yaml, bindings.yaml"
-    )
-    parser.add_argument("--out", required=True, metavar="DIR", type=Path, help="folder for the generated packages and configurations")
-    parser.add_argument(
-        "--prune", action="store_true", help="remove everything else from DIR, such as packages of models that no longer exist"
-    )
-    parser.add_argument("--name", help="name of the robot (default: its folder's); only with one FOLDER")
-    parser.add_argument(
-        "--interfaces",
-        action="store_true",
-        help="make interfaces only, one package for all skillsets of a name",
-    )
+    parser = parser_of("generate")
     options = parser.parse_args(arguments)
     if options.name and len(options.robots) > 1:
         parser.error("--name: several robots can't have one name")

@@ -1,0 +1,1 @@
+"""What each command takes, a function each, which adds it to a parser. Nothing here imports what a command needs."""

@@ -1,0 +1,112 @@
+"""What the commands about models and missions take."""
+
+from __future__ import annotations
+
+from argparse import ArgumentParser
+from pathlib import Path
+
+from alula.cli.parser import completed_by
+
+NOTATIONS = ("paper", "rl")
+SHELLS = ("bash", "zsh", "fish")
+PROOFS_S = 30.0
+TICKS = 10
+MOST_SITUATIONS = 200_000
+UNLIKELY = 1e-3
+FILES_HELP = (
+    "skillsets in the paper's notation (*.skill) or the Robot Language (*.rl), folders of them, or `-`: the standard input; "
+    "missions (*.xml)"
+)
+MISSION_HELP = "a mission: BehaviorTree.CPP 4's XML"
+PALETTE_HELP = "a TreeNodesModel with more types of node, as Groot2's"
+
+
+def check(parser: ArgumentParser) -> None:
+    """Add what ``alula check`` takes."""
+    parser.add_argument("files", nargs="*", metavar="FILE", help=f"{FILES_HELP} (default: the robot's)")
+    parser.add_argument("--json", action="store_true", help="print one JSON object: each finding's place, code, counterexample")
+    parser.add_argument("--palette", action="append", default=[], metavar="FILE", help=f"with a mission: {PALETTE_HELP}")
+    parser.add_argument(
+        "--closed-world", action="store_true", help="assume that transitions that are neither extern nor used by an effect are never taken"
+    )
+    parser.add_argument("--no-proofs", dest="proofs", action="store_false", help="skip the proofs")
+    parser.add_argument(
+        "--time", type=float, default=PROOFS_S, metavar="SECONDS", help=f"time limit for the proofs of a file (default {PROOFS_S:g})"
+    )
+    parser.add_argument(
+        "--play", type=int, metavar="N", help="play counterexample N of the output: in running managers, or as a run of the mission"
+    )
+    parser.add_argument(
+        "--out", type=Path, metavar="DIR", help="with --play of a mission: folder for the run's files (default: runs/TIME-NAME)"
+    )
+    parser.add_argument("--strict", action="store_true", help="treat warnings as errors")
+    parser.add_argument("--to", choices=NOTATIONS, help="print the models in this notation instead")
+
+
+def odds(parser: ArgumentParser) -> None:
+    """Add what ``alula odds`` takes."""
+    parser.add_argument("file", type=Path, metavar="FILE", help=MISSION_HELP)
+    changes = parser.add_argument(
+        "--with", dest="changes", action="append", default=[], metavar="FAULT=UNITS", help="what it would bring: camera=2, or camera=never"
+    )
+    completed_by(changes, "units")
+    world = parser.add_argument("--world", default="", metavar="FILE|NAME", help="inputs of the mission (default: those of its scenario)")
+    completed_by(world, "worlds")
+    parser.add_argument(
+        "--unlikely", type=float, default=UNLIKELY, metavar="P", help=f"less likely situations are not looked at ({UNLIKELY:g})"
+    )
+    parser.add_argument("--most", type=int, default=MOST_SITUATIONS, metavar="N", help=f"situations looked at ({MOST_SITUATIONS})")
+    parser.add_argument("--svg", type=Path, metavar="FILE", help="write a picture there, too")
+    parser.add_argument("--json", action="store_true", help="print one JSON object")
+
+
+def tree(parser: ArgumentParser) -> None:
+    """Add what ``alula tree`` takes."""
+    parser.add_argument("file", type=Path, metavar="FILE", help=MISSION_HELP)
+    parser.add_argument("--svg", type=Path, metavar="FILE", help="write the drawing there, too")
+    parser.add_argument("--palette", type=Path, action="append", default=[], metavar="FILE", help=PALETTE_HELP)
+    parser.add_argument("--answers", type=Path, metavar="FILE", help='what leaves answer: {"leaf name": ["RUNNING", "SUCCESS"], ...}')
+    parser.add_argument("--ticks", type=int, metavar="N", help=f"with answers, how often it is ticked ({TICKS})")
+    parser.add_argument("--json", action="store_true", help="print the tree, or each tick, as JSON")
+
+
+def palette(parser: ArgumentParser) -> None:
+    """Add what ``alula palette`` takes."""
+    parser.add_argument("folder", metavar="FOLDER", help="the robot's models, as skillsets/uav")
+
+
+def generate(parser: ArgumentParser) -> None:
+    """Add what ``alula generate`` takes."""
+    parser.add_argument(
+        "robots", nargs="+", metavar="FOLDER", type=Path, help="folder with the robot's models: *.skill, types.yaml, bindings.yaml"
+    )
+    parser.add_argument("--out", required=True, metavar="DIR", type=Path, help="folder for the generated packages and configurations")
+    parser.add_argument(
+        "--prune", action="store_true", help="remove everything else from DIR, such as packages of models that no longer exist"
+    )
+    parser.add_argument("--name", help="name of the robot (default: its folder's); only with one FOLDER")
+    parser.add_argument("--interfaces", action="store_true", help="make interfaces only, one package for all skillsets of a name")
+
+
+def editor(parser: ArgumentParser) -> None:
+    """Add what ``alula editor`` takes."""
+    parser.add_argument(
+        "--trust", action="store_true", help="import the Python of the robots whose missions are opened, which knows their own nodes"
+    )
+
+
+def new(parser: ArgumentParser) -> None:
+    """Add what ``alula new`` takes."""
+    parser.add_argument("what", choices=["robot"], help="always robot")
+    parser.add_argument("folder", metavar="DIR", type=Path, help="a new folder, whose name is the robot's: a-z, 0-9, _")
+    parser.add_argument("--git", action="store_true", help="run git init in it")
+
+
+def completion(parser: ArgumentParser) -> None:
+    """Add what ``alula completion`` takes."""
+    parser.add_argument("shell", nargs="?", default=SHELLS[0], choices=SHELLS, help=f"the shell that evaluates it (default {SHELLS[0]})")
+
+
+def command(parser: ArgumentParser) -> None:
+    """Add what ``alula help`` takes."""
+    completed_by(parser.add_argument("command", nargs="?", metavar="COMMAND", help="the command that it is about"), "commands")

@@ -1,0 +1,1 @@
+"""Measures how long the command line takes to start."""
