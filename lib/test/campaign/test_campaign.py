@@ -40,7 +40,7 @@ draw:
 # The campaign's process is killed in the moment in which its first rows are in the table.
 KILLED_AFTER_FIRST_ROWS = """
 import os, signal, sys
-from alula.campaign import __main__ as command
+from alula.cli import campaign as command
 from alula.campaign.table import Table
 
 class Killed(Table):

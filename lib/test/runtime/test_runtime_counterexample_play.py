@@ -7,7 +7,7 @@ from dataclasses import replace
 
 import pytest
 
-from alula.cli import play as play_command
+from alula.cli import check
 from alula.language.counterexamples import Counterexample, CounterexampleEnd, CounterexampleStep, NumberedExecution, StateChange
 from alula.language.counterexamples import StepKind as Kind
 from alula.runtime.counterexample_play import play
@@ -128,9 +128,9 @@ def test_steps_cross_as_json(text, tmp_path):
 def test_the_command(tmp_path, capsys):
     path = tmp_path / "example.rl"
     path.write_text(EXAMPLES["ALU510"])
-    assert play_command.main(["--play", "1", str(path)]) == 0
+    assert check.main(["--play", "1", str(path)]) == 0
     assert capsys.readouterr().out.endswith("the managers do the same\n")
-    assert play_command.main(["--play", "1", "--json", str(path)]) == 0
+    assert check.main(["--play", "1", "--json", str(path)]) == 0
     assert json.loads(capsys.readouterr().out)["agrees"]
-    assert play_command.main(["--play", "2", str(path)]) == 2
+    assert check.main(["--play", "2", str(path)]) == 2
     assert "there is no counterexample 2" in capsys.readouterr().err

@@ -16,7 +16,7 @@ from typing import Any
 
 import yaml
 
-from alula.cli.table import parse
+from alula.cli.table import parser_of
 from alula.common.record import EVENTS, FILE, RecordFollower
 from alula.common.runs import LATEST, NoRunError, find_run, load_run
 from alula.common.signals import Interrupts, on_end_signal
@@ -210,6 +210,14 @@ COMMANDS: dict[str, Callable[[Clients, argparse.Namespace, Out], int]] = {
 }
 
 
+def parse(arguments: Sequence[str]) -> argparse.Namespace:
+    """Read the command line, whose first word names the command; exits with 2 when it is wrong."""
+    name, *words = arguments
+    options = parser_of(name).parse_args(words)
+    options.command = name
+    return options
+
+
 def write(value: object, text: str, *, as_json: bool) -> None:
     """Write one result to stdout, at once."""
     sys.stdout.write(f"{json.dumps(value, default=str) if as_json else text}\n")
@@ -260,9 +268,7 @@ def _one_namespace(found: Sequence[tuple[str, str]], place: Place) -> str:
 
 def main(arguments: Sequence[str] | None = None) -> int:
     """Do the command that the first word names; return the exit code."""
-    name, *words = sys.argv[1:] if arguments is None else arguments
-    options = parse(name, words)
-    options.command = name
+    options = parse(sys.argv[1:] if arguments is None else arguments)
 
     def out(value: object, text: str) -> None:
         write(value, text, as_json=options.json)
