@@ -136,7 +136,7 @@ def test_a_proof_that_is_not_whole_makes_no_error() -> None:
 def test_a_mission_that_is_no_file_is_not_proved() -> None:
     scenario = load_scenario("mapping")
     python = replace(scenario, mission="a.module:function")
-    assert proved(python, [], effects_of_robot(), print).unproved == "a.module:function is no file of a tree"
+    assert proved(python, [], effects_of_robot(), print, 1.0).unproved == "a.module:function is no file of a tree"
 
 
 def test_an_aborted_mission_is_not_held_against_a_proof() -> None:
