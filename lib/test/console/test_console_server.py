@@ -368,8 +368,8 @@ def test_a_run_that_does_not_begin_is_ended_and_told(
 
 
 def test_only_the_link_to_a_robot_needs_ros() -> None:
-    names = sorted(path.stem for path in Path(server.__file__).parent.glob("*.py") if path.stem not in {"ros_link", "__main__"})
-    script = f"import sys, {', '.join(f'alula.console.{name}' for name in [*names, '__main__'])}; print(*sys.modules)"
+    names = sorted(path.stem for path in Path(server.__file__).parent.glob("*.py") if path.stem != "__init__")
+    script = f"import sys, alula.cli.console, {', '.join(f'alula.console.{name}' for name in names)}; print(*sys.modules)"
     modules = subprocess.run([sys.executable, "-c", script], capture_output=True, text=True, check=True).stdout.split()
     assert [name for name in modules if name.split(".")[0] in {"rclpy", "std_srvs", "skillset_interfaces"}] == []
 
