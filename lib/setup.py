@@ -4,13 +4,10 @@ import sys
 
 from setuptools import find_packages, setup
 
-# Colcon looks at this file by a dry run, and then understands literals only, which a range of versions is not.
-requires = {} if "--dry-run" in sys.argv else {"python_requires": ">=3.10"}
-
-setup(
+distribution = setup(
     name="alula",
     version="0.3.0",
-    **requires,
+    python_requires=">=3.10",
     packages=find_packages(include=["alula", "alula.*"]),
     package_dir={"": "."},  # so that an editable installation is a path, not an import hook
     package_data={
@@ -20,3 +17,6 @@ setup(
     },
     data_files=[("share/ament_index/resource_index/packages", ["resource/alula"]), ("share/alula", ["package.xml"])],
 )
+
+if "--dry-run" in sys.argv:  # colcon's look, which understands literals only: a range of versions is none
+    distribution.python_requires = None
