@@ -1,0 +1,55 @@
+"""Networks of a test's own: what is cut, and what is not."""
+
+import socket
+import subprocess
+
+from alula_testing.networks import Network
+from alula_testing.waits import HANGS_S
+
+
+def reaches(one, other):
+    """Tell whether a connection to a closed port is refused, which takes a packet there and one back."""
+    probe = f"exec 3<>/dev/tcp/{other.address}/9"
+    done = subprocess.run(one.command("timeout", "0.5", "bash", "-c", probe), capture_output=True, text=True, check=False)
+    return "refused" in done.stderr
+
+
+def test_three_computers_reach_each_other_until_a_link_is_cut():
+    with Network() as network:
+        base, decision, here = network.computer("base"), network.computer("decision"), network.here()
+        for one, other in ((base, decision), (here, base), (decision, here)):
+            network.wait_reached(one, other)
+        with network.cut(base, decision):
+            assert not reaches(base, decision)
+            assert not reaches(decision, base)
+            assert reaches(here, base)
+            assert reaches(decision, here)
+        assert reaches(base, decision)
+
+
+def test_cut_of_one_direction_and_change_of_an_address():
+    with Network() as network:
+        base, here = network.computer("base"), network.here()
+        network.wait_reached(here, base)
+        with network.cut(here, base, one_way=True):
+            assert not reaches(here, base)
+            with socket.socket(socket.AF_INET, socket.SOCK_DGRAM) as receiver:
+                receiver.bind((here.address, 0))
+                receiver.settimeout(HANGS_S)
+                send = f"echo hello > /dev/udp/{here.address}/{receiver.getsockname()[1]}"
+                subprocess.run(base.command("bash", "-c", send), check=True)
+                assert receiver.recv(100) == b"hello\n"
+        old = base.address
+        network.move(base)
+        assert base.address != old
+        assert reaches(here, base)
+        known = subprocess.run(here.command("getent", "hosts", "base"), capture_output=True, text=True, check=True).stdout
+        assert known.split() == [base.address, "base"]
+
+
+def test_nothing_is_left_of_a_network():
+    with Network() as network:
+        here = network.here()
+        assert subprocess.run(["ip", "link", "show", here.interface], capture_output=True, check=False).returncode == 0
+    gone = subprocess.run(["ip", "link", "show", here.interface], capture_output=True, text=True, check=False)
+    assert "does not exist" in gone.stderr
