@@ -75,7 +75,7 @@ def decide(graphs: Graphs, selection: Selection, types: TypeLookup, configured: 
         if ros1_name not in taken1 and ros2_name not in taken2 and ros1_name not in in_actions:
             decisions += _topic(graphs, types, ros1_name, ros2_name)
     for ros1_name, ros2_name in sorted(_pairs(graphs.ros1.services, graphs.ros2.services, selection)):
-        if ros1_name not in taken1 and ros2_name not in taken2:
+        if ros1_name not in taken1 and ros2_name not in taken2 and ros1_name not in graphs.ros1.services_asked:
             decisions.append(_service(graphs, types, ros1_name, ros2_name))
     for ros1_name, ros2_name in sorted(actions):
         if ros1_name not in taken1 and ros2_name not in taken2:

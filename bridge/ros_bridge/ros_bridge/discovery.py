@@ -19,10 +19,12 @@ from ros_bridge.config import Direction, Spec, TopicRoute
 from ros_bridge.decisions import Decision, Refused, RouteDecision, decide
 from ros_bridge.graph import Graphs
 from ros_bridge.graph_events import GraphEvents
+from ros_bridge.hung_nodes import HungNodes
 from ros_bridge.keep_alive import KeepAlive
 from ros_bridge.ros1_graph import Ros1Reader
 from ros_bridge.ros2_graph import read_ros2_graph
 from ros_bridge.routes import key_of
+from ros_bridge.service_types import ServiceTypes
 
 if TYPE_CHECKING:
     from rclpy.node import Node
@@ -43,11 +45,14 @@ AGAIN_AFTER_S = 0.5
 class GraphReader:
     """Reads both graphs and their types."""
 
-    def __init__(self, node: Node, types: Types, master: Connection, caller_id: str) -> None:
+    def __init__(self, node: Node, types: Types, master: Connection, caller_id: str, selection: Selection) -> None:
         self._node = node
         self._master = master
         self._caller_id = caller_id
-        self._ros1 = Ros1Reader(master, caller_id, lambda name, uri: tcpros.service_type(name, uri, caller_id))
+        self._hung = HungNodes(time.monotonic)
+        self.services = ServiceTypes(self._service_type, self._hung)
+        self._selection = selection
+        self._ros1 = Ros1Reader(master, caller_id, self.services, self._selects)
         self.types = CheckedTypes(types, self._publisher_headers)
 
     def read_ros1(self, system: bytes) -> bool:
@@ -58,13 +63,32 @@ class GraphReader:
         """Return ROS 1's graph as it was last read, and ROS 2's of now."""
         return Graphs(self._ros1.graph, read_ros2_graph(self._node))
 
+    def _selects(self, ros1_name: str) -> bool:
+        ros2_name = self._selection.to_ros2(ros1_name)
+        return ros2_name is not None and self._selection.selects(ros1_name, ros2_name)
+
+    def _service_type(self, name: str) -> str | None:
+        try:
+            uri = str(self._master.call("lookupService", self._caller_id, name))
+        except OSError:
+            return None
+        return tcpros.service_type(name, uri, self._caller_id)
+
     def _publisher_headers(self, topic: str) -> Iterator[dict[str, str]]:
+        """Ask the publishers, but none that hangs."""
         for node in sorted(self._ros1.graph.publishers.get(topic, ())):
+            if not self._hung.may_be_asked(node):
+                continue
             try:
                 uri = str(self._master.call("lookupNode", self._caller_id, node))
+                header = tcpros.publisher_header(uri, topic, self._caller_id)
+                self._hung.answers(node)
+            except TimeoutError:
+                self._hung.hangs(node)
+                continue
             except OSError:
                 continue
-            if (header := tcpros.publisher_header(uri, topic, self._caller_id)) is not None:
+            if header is not None:
                 yield header
 
 
@@ -91,7 +115,7 @@ class Discovery:
 
     def start(self) -> None:
         """Start the thread that follows both graphs."""
-        self._monitor.on_graph = self._events.wake
+        self._monitor.on_graph = self._reader.services.on_answer = self._events.wake
         self._thread.start()
 
     def _run(self) -> None:
@@ -184,6 +208,7 @@ class Discovery:
     def close(self) -> None:
         """Stop following; the routes are the table's."""
         self._monitor.on_graph = lambda: None
+        self._reader.services.close()
         self._stop.set()
         if self._thread.is_alive():
             self._thread.join(CONNECT_WITHIN_S)

@@ -18,13 +18,17 @@ def is_bridge(node: str) -> bool:
 
 @dataclass(frozen=True)
 class Ros1Graph:
-    """ROS 1: nodes by topic, services' nodes, types (``package/Name`` or ``*``) of topics and services."""
+    """ROS 1: nodes by topic, services' nodes, types (``package/Name`` or ``*``) of topics and services.
+
+    ``services_asked``: services whose nodes are being asked for the types, and have not answered yet.
+    """
 
     publishers: Mapping[str, frozenset[str]] = field(default_factory=dict)
     subscribers: Mapping[str, frozenset[str]] = field(default_factory=dict)
     services: Mapping[str, str] = field(default_factory=dict)
     types: Mapping[str, str] = field(default_factory=dict)
     service_types: Mapping[str, str] = field(default_factory=dict)
+    services_asked: frozenset[str] = frozenset()
 
     def type_of(self, topic: str) -> str | None:
         """Return a topic's type, or None when it is not known."""

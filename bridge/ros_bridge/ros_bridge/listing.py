@@ -31,16 +31,20 @@ def list_routes(config: BridgeConfig, types: Types, master: Connection) -> str:
     """Return the table as text. rclpy has to be initialised. Raises OSError when the master does not answer any more."""
     node = rclpy.create_node(LIST_NODE)
     events = GraphEvents(node)
-    reader = GraphReader(node, types, master, f"/{LIST_NODE}")
+    reader = GraphReader(node, types, master, f"/{LIST_NODE}", config.selection)
     try:
         end_s = time.monotonic() + AT_MOST_S
         # DDS finds the others in its own time, and their names after them.
         while time.monotonic() < end_s and (events.wait(QUIET_S) or not all_named(node)):
             time.sleep(QUIET_S / 10)
-        reader.read_ros1(master.call_raw("getSystemState", f"/{LIST_NODE}"))
+        system = master.call_raw("getSystemState", f"/{LIST_NODE}")
+        reader.read_ros1(system)
+        reader.services.wait(AT_MOST_S)
+        reader.read_ros1(system)
         decisions = decide(reader.graphs(), config.selection, reader.types, config.routes)
         return render(list_table(decisions, {spec: problem(spec, types) for spec in config.routes}))
     finally:
+        reader.services.close()
         events.close()
         leave(node)
 

@@ -30,6 +30,10 @@ class RefusedError(OSError):
     """A master or node has answered, and says no."""
 
 
+class SilentError(OSError):
+    """A master or node has not answered in time."""
+
+
 class Connection:
     """XML-RPC over a connection that is kept between calls; safe from several threads, which wait for each other."""
 
@@ -50,8 +54,10 @@ class Connection:
             fresh = self._http.sock is None
             try:
                 return self._exchange(body)
+            except TimeoutError as error:
+                raise SilentError(f"{self.uri}: {error}") from error
             except (OSError, http.client.HTTPException) as error:
-                if fresh or isinstance(error, TimeoutError):
+                if fresh:
                     raise OSError(f"{self.uri}: {error or type(error).__name__}") from error
             try:
                 return self._exchange(body)  # a kept connection may have been closed meanwhile

@@ -61,7 +61,7 @@ class Bridge:
         self._discovery: Discovery | None = None
         self._parameters: ParameterMirror | None = None
         if config.selection.include:
-            reader = GraphReader(self._node, types, master, name)
+            reader = GraphReader(self._node, types, master, name, config.selection)
             self._parameters = ParameterMirror(self._plane.node, master) if config.selection.parameters else None
             self._discovery = Discovery(reader, self._node, self._monitor, config.selection, self.table, config.routes)
         self._heartbeat = Heartbeat(context, self._state)

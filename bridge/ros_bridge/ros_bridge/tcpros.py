@@ -13,7 +13,7 @@ from collections.abc import Mapping
 from urllib.parse import urlsplit
 
 from ros_bridge.errors import WireError
-from ros_bridge.master import call_node
+from ros_bridge.master import SilentError, call_node
 
 logger = logging.getLogger("ros_bridge")
 
@@ -42,22 +42,34 @@ def decode_header(body: bytes) -> dict[str, str]:
 
 
 def publisher_header(node_uri: str, topic: str, caller_id: str) -> dict[str, str] | None:
-    """Return the header with which a node offers a topic; None when it does not answer as it should."""
+    """Return the header with which a node offers a topic; None when it answers otherwise than it should, or is not there.
+
+    Raises TimeoutError when it does not answer in time.
+    """
     wanted = {"topic": topic, "type": "*", "md5sum": "*", "callerid": caller_id, "message_definition": ""}
     try:
         _, host, port = call_node(node_uri, "requestTopic", caller_id, topic, [["TCPROS"]], within_s=WITHIN_S)
         return _exchange(str(host), int(port), wanted)
+    except SilentError as error:
+        raise TimeoutError(str(error)) from error
+    except TimeoutError:
+        raise
     except (OSError, ValueError, TypeError, WireError) as error:
         logger.debug("%s says nothing about %s: %s", node_uri, topic, error)
         return None
 
 
 def service_type(service: str, service_uri: str, caller_id: str) -> str | None:
-    """Return the type of a service; None when its node does not answer as it should."""
+    """Return the type of a service; None when its node answers otherwise than it should, or is not there.
+
+    Raises TimeoutError when it does not answer in time.
+    """
     wanted = {"service": service, "probe": "1", "md5sum": "*", "callerid": caller_id}
     try:
         parts = urlsplit(service_uri)
         return _exchange(str(parts.hostname), int(parts.port or 0), wanted).get("type")
+    except TimeoutError:
+        raise
     except (OSError, ValueError, WireError) as error:
         logger.debug("%s says nothing about %s: %s", service_uri, service, error)
         return None
