@@ -40,6 +40,10 @@ class ActionlibServerEnd:
         """Tell whether the server's status has no publisher any more."""
         return self._status.peers() == 0
 
+    def late(self) -> bool:
+        """Tell whether a result may come late that the server has sent while it was away."""
+        return self._result.late()
+
     def send_goal(self, name: str, payload: bytes) -> None:
         """Publish a goal without a stamp: the server fills in its own clock's."""
         self._goals.publish(actionlib_wire.encode_goal(GoalId(name, 0), payload, seq=next(self._seq), stamp_ns=time.time_ns()))

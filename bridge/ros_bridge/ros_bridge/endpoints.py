@@ -103,6 +103,11 @@ class Ros1Subscriber(_Endpoint):
         with self._lock:
             return 0 if self._handle is None else int(self._native.route_source_peers(self._handle))
 
+    def late(self) -> bool:
+        """Tell whether something may come late that a publisher has sent while it was away."""
+        with self._lock:
+            return self._handle is not None and bool(self._native.route_late_peers(self._handle))
+
     def close(self) -> None:
         """Unregister the subscription and free it."""
         if self._handle is not None:

@@ -22,11 +22,13 @@ logger = logging.getLogger("ros_bridge")
 QUEUED_S = 0.5
 SEND_AGAIN_S = 1.0  # a goal that the server does not list: it was lost on the way; actionlib takes an id only once
 RESULT_WITHIN_S = 2.0  # a terminal status without its result: the result message was lost
+LATE_RESULT_WITHIN_S = 125.0  # a server that has been away sends what it had sent meanwhile again after two minutes at the latest (TCP)
 KEEP_RESULT_S = 60.0
 KEEP_RESULTS = 1000
 KEEP_RESULT_BYTES = 64_000_000  # of all results that are kept; the newest is kept whatever its size
 MOST_GOALS = 1000  # open at a time; more are rejected
 ANY_GOAL = bytes(16)
+NOT_TAKEN = frozenset({Ros1Status.REJECTED, Ros1Status.RECALLED})
 
 
 class ActionlibServer(Protocol):
@@ -37,6 +39,9 @@ class ActionlibServer(Protocol):
 
     def gone(self) -> bool:
         """Tell whether the server's status has no publisher any more."""
+
+    def late(self) -> bool:
+        """Tell whether a result may come late that the server has sent while it was away."""
 
     def send_goal(self, name: str, payload: bytes) -> None:
         """Publish a goal under this id; ``payload`` is the serialized ROS 1 goal."""
@@ -213,7 +218,7 @@ class GoalsToRos1:
             self._end_as_in_ros1(goal, status.status, payload, status.text, now_s)
 
     def _end_as_in_ros1(self, goal: GoalToRos1, status: Ros1Status, payload: bytes | None, reason: str, now_s: float) -> None:
-        if goal.status is Ros2Status.UNKNOWN and status in (Ros1Status.REJECTED, Ros1Status.RECALLED):
+        if goal.status is Ros2Status.UNKNOWN and status in NOT_TAKEN:
             self._reject(goal, reason, now_s)
             return
         final = TO_ROS2[status]
@@ -225,10 +230,10 @@ class GoalsToRos1:
     def tick(self, now_s: float) -> None:
         """Do what is due: send to a server that came, give up on one that went, drop old results."""
         with self.lock:
-            gone = self._server.gone()
+            gone, late = self._server.gone(), self._server.late()
             for goal in list(self._goals.values()):
                 if goal.open:
-                    self._tick_open(goal, now_s, gone=gone)
+                    self._tick_open(goal, now_s, gone=gone, late=late)
             self._forget_results(now_s)
 
     def _forget_results(self, now_s: float) -> None:
@@ -241,13 +246,15 @@ class GoalsToRos1:
             if too_old or number >= KEEP_RESULTS or (number and kept_bytes > KEEP_RESULT_BYTES):
                 del self._goals[goal.uuid]
 
-    def _tick_open(self, goal: GoalToRos1, now_s: float, *, gone: bool) -> None:
+    def _tick_open(self, goal: GoalToRos1, now_s: float, *, gone: bool, late: bool) -> None:
         unanswered = goal.status is Ros2Status.UNKNOWN
-        if goal.ended_in_ros1 is not None and now_s - goal.ended_in_ros1[1] > RESULT_WITHIN_S:
+        refused = goal.ended_in_ros1 is not None and goal.ended_in_ros1[0] in NOT_TAKEN
+        result_within_s = LATE_RESULT_WITHIN_S if late else RESULT_WITHIN_S
+        if goal.ended_in_ros1 is not None and now_s - goal.ended_in_ros1[1] > result_within_s:
             self._end_as_in_ros1(goal, goal.ended_in_ros1[0], None, "the server in ROS 1 has sent no result", now_s)
         elif goal.sent_s is not None and gone and (goal.listed_s is not None or goal.cancel_seen):
             self._give_up(goal, "the server in ROS 1 is gone", now_s)
-        elif unanswered and goal.listed_s is not None and now_s - goal.listed_s > QUEUED_S and goal.ended_in_ros1 is None:
+        elif unanswered and goal.listed_s is not None and now_s - goal.listed_s > QUEUED_S and not refused:
             self._accept(goal)
         elif unanswered and now_s > goal.answer_by_s and goal.listed_s is None:
             if goal.sent_s is not None:

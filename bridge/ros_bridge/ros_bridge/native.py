@@ -32,6 +32,11 @@ class EventKind(IntEnum):
     BAD_MESSAGE = 6
     BAD_PEER = 7
     CALL_FAILED = 8
+    MISSED = 9
+    SUBSCRIBED = 10
+    UNSUBSCRIBED = 11
+    UNHEARD = 12
+    HEARD = 13
 
 
 class Specification(Structure):
@@ -128,11 +133,13 @@ KEEPING_THE_LOCK = {
     "plane_route_delete": (None, [c_void_p]),
     "plane_route_target_peers": (c_uint64, [c_void_p]),
     "plane_route_source_peers": (c_uint64, [c_void_p]),
+    "plane_route_late_peers": (c_uint64, [c_void_p]),
     "plane_route_figures": (None, [c_void_p, POINTER(RouteFigures)]),
     "plane_service_in_ros1_new": (c_void_p, [c_void_p, POINTER(ServiceSpecification)]),
     "plane_service_in_ros2_new": (c_void_p, [c_void_p, POINTER(ServiceSpecification)]),
     "plane_service_found": (None, [c_void_p, c_char_p, c_uint16]),
     "plane_service_not_found": (None, [c_void_p, c_char_p]),
+    "plane_end_older_connections": (None, [c_void_p, c_char_p]),
     "plane_python_done": (None, [c_void_p]),
     "plane_python_close": (None, [c_void_p]),
     "plane_port": (c_int32, [c_void_p]),

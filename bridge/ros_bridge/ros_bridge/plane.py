@@ -15,10 +15,12 @@ from collections.abc import Callable
 from concurrent.futures import ThreadPoolExecutor
 
 from ros_bridge import native
+from ros_bridge.addresses import bind_address, own_host, resolve
 from ros_bridge.master import Connection
 from ros_bridge.native import EventKind, Native, PythonMessage
-from ros_bridge.publisher_links import PublisherLinks, resolve
-from ros_bridge.ros1_node import Ros1Node, bind_address, own_host
+from ros_bridge.publisher_links import PublisherLinks
+from ros_bridge.ros1_node import Ros1Node
+from ros_bridge.subscriber_links import SubscriberLinks
 
 logger = logging.getLogger("ros_bridge")
 
@@ -46,7 +48,8 @@ class Plane:
         self.context = library.require(library.new(name.encode(), bind_address(host).encode()))
         self.links = PublisherLinks(library, self._tokens)
         self.node = Ros1Node(name, master, host=host, topics_port=library.port(self.context), changed=self.links.publishers_changed)
-        self.links.node = self.node
+        self.subscribers = SubscriberLinks(master, library, self.context)
+        self.links.node = self.subscribers.node = self.node
         # The master may hang: the threads that ask it do not hold up the one that takes events.
         self._lookers = ThreadPoolExecutor(LOOKING_THREADS, thread_name_prefix="plane_look")
         self._threads = [
@@ -85,6 +88,7 @@ class Plane:
         self._closed.set()
         self.node.close()
         self.links.close()
+        self.subscribers.close()
         self._lookers.shutdown(wait=False, cancel_futures=True)
         self.native.python_close(self.context)
         for thread in self._threads:
@@ -111,7 +115,7 @@ class Plane:
         try:
             place = self.node.place_of_service(service)
             if place is not None:
-                address, port = resolve(*place), place[1]
+                address, port = resolve(*place)[0].encode(), place[1]
         except (OSError, ValueError, TypeError, LookupError) as error:  # it does not answer, or answers nonsense
             problem = f"no server can be reached: {error}"
         with self._lock:
@@ -126,7 +130,7 @@ class Plane:
     def _listen(self) -> None:
         event = native.Event()
         while not self._closed.is_set():
-            missing = self.links.try_again()
+            missing = self.links.try_again() | self.subscribers.try_again()
             if self.native.next_event(self.context, RETRY_MS if missing else LISTEN_MS, ctypes.byref(event)):
                 self._hear(EventKind(event.kind), event.token, event.text.decode(errors="replace"))
 
@@ -142,5 +146,7 @@ class Plane:
             with self._lock:
                 if token in self._callers:
                     self._lookers.submit(self._look, token, self._callers[token][1])
+        elif kind >= EventKind.SUBSCRIBED:
+            self.subscribers.on_event(kind, text)
         else:
             self.links.on_event(kind, token, text)

@@ -1,16 +1,20 @@
-"""Connections of the data plane to publishers in ROS 1: to all that the master names, tried again as long as it names them."""
+"""Connections of the data plane to publishers in ROS 1: to all that the master names, tried again as long as it names them.
+
+Each node is asked by one thread at a time, for all its topics in a row: a node that hangs holds up its own topics and no others.
+"""
 
 from __future__ import annotations
 
 import logging
-import socket
 import threading
 import time
-from collections.abc import Iterator
+from collections.abc import Iterable, Iterator
 from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass, field
 from typing import TYPE_CHECKING
 
+from ros_bridge.addresses import resolve
+from ros_bridge.master import RefusedError
 from ros_bridge.native import EventKind, Native
 from ros_bridge.ros1_node import Kind
 
@@ -19,8 +23,8 @@ if TYPE_CHECKING:
 
 logger = logging.getLogger("ros_bridge")
 
-ASKING_THREADS = 4
-FIRST_RETRY_S, LAST_RETRY_S, REFUSED_RETRY_S = 0.1, 1.0, 5.0
+ASKING_THREADS = 32
+FIRST_RETRY_S, LAST_RETRY_S, REFUSED_RETRY_S = 0.1, 0.5, 5.0
 
 
 @dataclass
@@ -46,11 +50,6 @@ class _Subscription:
     links: dict[str, _Link] = field(default_factory=dict)
 
 
-def resolve(host: str, port: int) -> bytes:
-    """Return the address of a host; raises OSError."""
-    return str(socket.getaddrinfo(host, port, socket.AF_INET, socket.SOCK_STREAM)[0][4][0]).encode()
-
-
 class PublisherLinks:
     """All connections to publishers. Safe from several threads; ``node`` has to be set before the first subscription."""
 
@@ -62,9 +61,10 @@ class PublisherLinks:
         self._tokens = tokens
         self._lock = threading.RLock()
         self._subscriptions: dict[int, _Subscription] = {}  # by the native route's address
-        self._links: dict[int, _Link] = {}
+        self._links: dict[int, _Link] = {}  # those of subscriptions, and those that are about to be replaced
+        self._asked: set[str] = set()  # nodes
         self._closed = False
-        self._askers = ThreadPoolExecutor(ASKING_THREADS, thread_name_prefix="plane_ask")  # publishers that are asked may hang
+        self._askers = ThreadPoolExecutor(ASKING_THREADS, thread_name_prefix="plane_ask")
 
     def subscribe(self, topic: str, type_name: str, route: int) -> None:
         """Connect a native route to all publishers of a ROS 1 topic, now and later."""
@@ -78,8 +78,7 @@ class PublisherLinks:
             subscription = self._subscriptions.pop(route, None)
             if subscription is None:
                 return
-            for link in subscription.links.values():
-                self._links.pop(link.token, None)
+            self._links = {token: link for token, link in self._links.items() if link.route != route}
         self.node.unregister(Kind.SUBSCRIBER, subscription.topic, subscription.type_name)
 
     def publishers_changed(self, topic: str, uris: list[str]) -> None:
@@ -93,32 +92,58 @@ class PublisherLinks:
     def _connect_all(self, route: int, subscription: _Subscription, publishers: set[str]) -> None:
         """Connect to those that are new. The others' connections end when they close them: a restarted master does not know all at once."""
         subscription.publishers = publishers
-        for uri in publishers - subscription.links.keys():
-            link = _Link(route, subscription.topic, uri, next(self._tokens))
-            subscription.links[uri] = link
-            self._links[link.token] = link
-            self._try(link)
+        fresh = [self._new_link(route, subscription, uri) for uri in publishers - subscription.links.keys()]
+        self._try(fresh)
 
-    def _try(self, link: _Link) -> None:
-        """Ask the publisher where to connect to, in another thread."""
-        link.under_way = True
-        if not self._closed:
-            self._askers.submit(self._connect, link)
+    def _new_link(self, route: int, subscription: _Subscription, uri: str) -> _Link:
+        link = _Link(route, subscription.topic, uri, next(self._tokens))
+        subscription.links[uri] = link
+        self._links[link.token] = link
+        return link
 
-    def _connect(self, link: _Link) -> None:
+    def _try(self, links: Iterable[_Link]) -> None:
+        """Ask the nodes of these links where to connect to, each in another thread; those that are being asked are asked later."""
+        by_node: dict[str, list[_Link]] = {}
+        for link in links:
+            if link.uri not in self._asked:
+                by_node.setdefault(link.uri, []).append(link)
+        for uri, of_node in by_node.items():
+            if self._closed:
+                return
+            self._asked.add(uri)
+            for link in of_node:
+                link.under_way = True
+            self._askers.submit(self._connect, uri, of_node)
+
+    def _connect(self, uri: str, links: list[_Link]) -> None:
         try:
-            host, port = self.node.place_of(link.topic, link.uri)
-            address = resolve(host, port)
-        except (OSError, ValueError, TypeError, LookupError) as error:  # it does not answer, or answers nonsense
-            self._failed(link, str(error), refused=False)
-            return
+            away = ""
+            for link in links:
+                if away:
+                    self._failed(link, away, refused=False)
+                    continue
+                try:
+                    host, port = self.node.place_of(link.topic, link.uri)
+                    addresses = resolve(host, port)
+                except RefusedError as error:
+                    self._failed(link, str(error), refused=False)
+                except (OSError, ValueError, TypeError, LookupError) as error:  # it does not answer, or answers nonsense
+                    away = str(error)
+                    self._failed(link, away, refused=False)
+                else:
+                    self._connect_to(link, addresses[link.failures % len(addresses)], port)
+        finally:
+            with self._lock:
+                self._asked.discard(uri)
+
+    def _connect_to(self, link: _Link, address: str, port: int) -> None:
         with self._lock:
             wanted = link.route in self._subscriptions and link.token in self._links
-            if wanted and not self._native.connect_publisher(link.route, link.token, address, port):
+            if wanted and not self._native.connect_publisher(link.route, link.token, address.encode(), port):
                 self._failed(link, self._native.error().decode(errors="replace"), refused=False)
 
     def _failed(self, link: _Link, reason: str, *, refused: bool) -> None:
-        """Try again later, unless the publisher is gone by the master's word."""
+        """Try again later, unless the publisher is gone by the master's word, or another connection has taken its place."""
         with self._lock:
             subscription = self._subscriptions.get(link.route)
             if subscription is None or link.token not in self._links:
@@ -127,6 +152,9 @@ class PublisherLinks:
                 link.complaint = reason
                 logger.warning("%s: the publisher at %s is not bridged: %s", link.topic, link.uri, reason)
             link.connected = link.under_way = False
+            if subscription.links.get(link.uri) is not link:
+                del self._links[link.token]
+                return
             if link.uri not in subscription.publishers:
                 del subscription.links[link.uri]
                 del self._links[link.token]
@@ -145,17 +173,27 @@ class PublisherLinks:
                 link.connected, link.under_way, link.failures, link.complaint = True, False, 0, ""
             elif kind is EventKind.NEEDS_WRITER:
                 self._native.add_writer(link.route, token)
+            elif kind is EventKind.MISSED:
+                self._replace(link)
             elif kind in {EventKind.CLOSED, EventKind.REFUSED}:
                 self._failed(link, text, refused=kind is EventKind.REFUSED)
+
+    def _replace(self, link: _Link) -> None:
+        """Connect a second time to a publisher that is not heard any more, until that succeeds.
+
+        Its system repeats what is not acknowledged at growing intervals: when the network is back after a long cut, a minute may go by. The
+        data plane keeps the first connection until something comes on the second.
+        """
+        subscription = self._subscriptions[link.route]
+        if subscription.links.get(link.uri) is link and link.uri in subscription.publishers:
+            self._try([self._new_link(link.route, subscription, link.uri)])
 
     def try_again(self) -> bool:
         """Try the connections whose time has come; tell whether any is missing."""
         now_s = time.monotonic()
         with self._lock:
             missing = [link for link in self._links.values() if not link.connected]
-            for link in missing:
-                if not link.under_way and now_s >= link.next_try_s:
-                    self._try(link)
+            self._try(link for link in missing if not link.under_way and now_s >= link.next_try_s)
             return bool(missing)
 
     def close(self) -> None:

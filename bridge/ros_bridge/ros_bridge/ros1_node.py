@@ -17,14 +17,14 @@ from socketserver import ThreadingMixIn
 from typing import Any
 from xmlrpc.server import SimpleXMLRPCRequestHandler, SimpleXMLRPCServer
 
+from ros_bridge.addresses import bind_address, in_uri
 from ros_bridge.master import OK, Connection, RefusedError, call_node
 
 logger = logging.getLogger("ros_bridge")
 
 NODE_NAME = "ros_bridge"
-ANSWER_WITHIN_S = 2.0
+ANSWER_WITHIN_S = 1.5
 FAILED = 0
-LOOPBACK = ("localhost", "127.")
 PublishersChanged = Callable[[str, list[str]], None]
 
 
@@ -33,16 +33,6 @@ def own_name(arguments: list[str]) -> str:
     told = dict(argument.split(":=", 1) for argument in arguments if ":=" in argument)
     namespace = told.get("__ns", os.environ.get("ROS_NAMESPACE", "")).strip("/")
     return "/" + "/".join(part for part in (namespace, told.get("__name", NODE_NAME)) if part)
-
-
-def own_host() -> str:
-    """Return the name or address under which other nodes reach this one: ROS_HOSTNAME, ROS_IP, else this machine's name."""
-    return os.environ.get("ROS_HOSTNAME") or os.environ.get("ROS_IP") or socket.gethostname()
-
-
-def bind_address(host: str) -> str:
-    """Return the address to listen on: loopback when that is the host name that peers get, else all."""
-    return "127.0.0.1" if host.startswith(LOOPBACK) else "0.0.0.0"  # noqa: S104 - other machines' nodes are peers
 
 
 class Kind(Enum):
@@ -76,6 +66,10 @@ class _Server(ThreadingMixIn, SimpleXMLRPCServer):
     daemon_threads = True
     block_on_close = False
 
+    def __init__(self, address: str) -> None:
+        self.address_family = socket.AF_INET6 if ":" in address else socket.AF_INET
+        super().__init__((address, 0), _Handler, logRequests=False, allow_none=True)
+
 
 class Ros1Node:
     """The node. Safe from several threads; what the master does not hear now it hears when ``register_again`` is called."""
@@ -92,9 +86,9 @@ class Ros1Node:
         self._lock = threading.Lock()
         self._registered: Counter[Registration] = Counter()  # several routes may share one
         self._untold: set[Registration] = set()
-        self._server = _Server((bind_address(host), 0), _Handler, logRequests=False, allow_none=True)
+        self._server = _Server(bind_address(host))
         self._server.register_instance(_SlaveApi(self))
-        self.uri = f"http://{host}:{self._server.server_address[1]}/"
+        self.uri = f"http://{in_uri(host)}:{self._server.server_address[1]}/"
         threading.Thread(target=self._server.serve_forever, kwargs={"poll_interval": 0.2}, name="ros1_node", daemon=True).start()
 
     @property
@@ -152,7 +146,7 @@ class Ros1Node:
 
     @property
     def _service_uri(self) -> str:
-        return f"rosrpc://{self._host}:{self._topics_port}"
+        return f"rosrpc://{in_uri(self._host)}:{self._topics_port}"
 
     def subscribe_parameters(self, changed: Callable[[], None]) -> None:
         """Call ``changed`` now, after a restart of the master, and whenever the master tells that a parameter has changed."""
@@ -175,7 +169,7 @@ class Ros1Node:
         except RefusedError:
             return None
         host, _, port = uri.removeprefix("rosrpc://").rstrip("/").rpartition(":")
-        return host, int(port)
+        return host.strip("[]"), int(port)
 
     def place_of(self, topic: str, publisher_uri: str) -> tuple[str, int]:
         """Ask a publisher where it sends a topic from: host and port. Raises OSError."""

@@ -104,8 +104,9 @@ class Lines:
 
 
 class Ros1Peer(Lines):
-    def __init__(self, master: Master, script: str = "ros_bridge_ros1_peer.py") -> None:
-        command = [str(alula_root() / "setup/in_ros1"), "python3", str(HERE / script)]
+    def __init__(self, master: Master, script: str = "ros_bridge_ros1_peer.py", *, enter: Sequence[str] = ()) -> None:
+        """``enter`` are the words that run a command on another computer."""
+        command = [*enter, str(alula_root() / "setup/in_ros1"), "python3", str(HERE / script)]
         super().__init__(command, master.environment, errors=False)
         self.expect("ready")
 
@@ -136,12 +137,20 @@ class Ros1Peer(Lines):
 
 
 class BridgeProcess(Lines):
-    def __init__(self, master: Master, folder: Path, config: str, *arguments: str, program: Sequence[str] = ("-m", "ros_bridge")) -> None:
+    def __init__(
+        self,
+        master: Master,
+        folder: Path,
+        config: str,
+        *arguments: str,
+        program: Sequence[str] = ("-m", "ros_bridge"),
+        enter: Sequence[str] = (),
+    ) -> None:
         folder.mkdir(exist_ok=True, parents=True)
         (folder / "bridge.yaml").write_text(config)
         self.stats_file = folder / "bridge_stats.json"
         command = [sys.executable, *program, "--config", str(folder / "bridge.yaml"), "--stats", str(self.stats_file), *arguments]
-        super().__init__([*command, f"__log:={folder}/bridge.log"], master.environment, errors=True)
+        super().__init__([*enter, *command, f"__log:={folder}/bridge.log"], master.environment, errors=True)
 
     def wait_running(self) -> None:
         until(lambda: any("bridging" in line for line in self.lines), f"the bridge runs: {self.lines}")

@@ -1,6 +1,7 @@
 """A ROS 1 node for the bridge's tests, in a process of the ROS 1 world: takes commands as JSON lines, reports events as JSON lines."""
 
 import os
+import socket
 import threading
 import warnings
 from collections import deque
@@ -27,16 +28,28 @@ def filled(message, values):
     return message
 
 
+def keep_alive_briefly():
+    """Have this node's ends of connections end after three seconds without an answer, not after rospy's 150."""
+    brief = {socket.TCP_KEEPIDLE: 1, socket.TCP_KEEPINTVL: 1, socket.TCP_KEEPCNT: 2}
+    plain = socket.socket.setsockopt
+
+    def set_option(self, level, option, value):
+        plain(self, level, option, brief.get(option, value) if level == socket.SOL_TCP else value)
+
+    socket.socket.setsockopt = set_option
+
+
 def subscribe(topic, type):  # noqa: A002
     message_class = roslib.message.get_message_class(type)
 
     def received(message):
         report(event="message", topic=topic, hex=serialized(message), latched=message._connection_header.get("latching") == "1")
 
-    KEEP.append(rospy.Subscriber(topic, message_class, received))
+    SUBSCRIBERS[topic] = rospy.Subscriber(topic, message_class, received)
 
 
 PUBLISHERS = {}
+SUBSCRIBERS = {}
 BAG = deque()
 
 
@@ -121,7 +134,7 @@ def play(number):
 
 
 def connections(topic):
-    report(event="connections", topic=topic, number=PUBLISHERS[topic].get_num_connections())
+    report(event="connections", topic=topic, number=(PUBLISHERS | SUBSCRIBERS)[topic].get_num_connections())
 
 
 def serve(service, type, behaviour, seconds=0.0):  # noqa: A002
@@ -156,6 +169,7 @@ def call(service, type, values):  # noqa: A002
 
 
 COMMANDS = {
+    "keep_alive_briefly": keep_alive_briefly,
     "subscribe": subscribe,
     "advertise": advertise,
     "publish": publish,

@@ -14,7 +14,15 @@ from ros_bridge.action_types import action_type, split
 from ros_bridge.actionlib_wire import GoalId, GoalStatus
 from ros_bridge.conversion import Types, ament_prefixes
 from ros_bridge.errors import TypeUnknownError, WireError
-from ros_bridge.goals_to_ros1 import KEEP_RESULT_BYTES, KEEP_RESULT_S, KEEP_RESULTS, GoalsToRos1
+from ros_bridge.goals_to_ros1 import (
+    KEEP_RESULT_BYTES,
+    KEEP_RESULT_S,
+    KEEP_RESULTS,
+    LATE_RESULT_WITHIN_S,
+    QUEUED_S,
+    RESULT_WITHIN_S,
+    GoalsToRos1,
+)
 from ros_bridge.goals_to_ros2 import GoalsToRos2
 
 LAST_NS = 0xFFFFFFFF * 1_000_000_000
@@ -91,6 +99,7 @@ class Server:
 
     def __init__(self) -> None:
         self.here = True
+        self.away = False
         self.come = False
         self.goals: list = []
         self.cancelled: list = []
@@ -102,6 +111,9 @@ class Server:
 
     def gone(self):
         return not self.here
+
+    def late(self):
+        return self.away
 
     def has_come(self):
         come, self.come = self.come, False
@@ -385,6 +397,23 @@ def test_restarted_actionlib_server_that_no_longer_lists_a_goal_aborts_it():
     table.request_cancel("cancel", goal_uuid(0), 0, 0.3)
     table.request_cancel("cancel", goal_uuid(5), 0, 0.3)
     assert clients.cancels == [(CancelCode.GOAL_TERMINATED, []), (CancelCode.UNKNOWN_GOAL_ID, [])]
+
+
+@pytest.mark.parametrize(("away", "within_s"), [(False, RESULT_WITHIN_S), (True, LATE_RESULT_WITHIN_S)])
+def test_result_that_does_not_come_is_waited_for_longer_when_the_server_was_away(away, within_s):
+    server, clients = Server(), Clients2()
+    server.away = away
+    table = GoalsToRos1("test", 5.0)
+    table.connect(server, clients)
+    table.request_goal("goal", goal_uuid(0), b"", 0.0)
+    table.on_status([GoalStatus(GoalId(goal_name(0), 9), Ros1Status.SUCCEEDED)], 0.0)
+    table.tick(QUEUED_S + 0.1)
+    assert clients.answers == {"goal": True}
+    table.request_result("result", goal_uuid(0))
+    table.tick(within_s)
+    assert clients.results == {}
+    table.tick(within_s + 0.1)
+    assert clients.results == {"result": Ros2Status.SUCCEEDED}
 
 
 def ended_goals(count, size=0):

@@ -8,9 +8,10 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
+from ros_bridge.addresses import bind_address, in_uri, resolve
 from ros_bridge.errors import WireError
 from ros_bridge.master import Connection, MasterMonitor, RefusedError, value_of
-from ros_bridge.ros1_node import Kind, Ros1Node, bind_address, own_name
+from ros_bridge.ros1_node import Kind, Ros1Node, own_name
 from ros_bridge.tcpros import decode_header, encode_header
 
 NAMES = st.text(st.characters(codec="utf-8", exclude_characters="="), min_size=1, max_size=20)
@@ -34,7 +35,23 @@ def test_name_is_what_roslaunch_says(arguments, namespace, name, monkeypatch):
 
 
 def test_a_node_that_is_reached_by_loopback_listens_there_only():
-    assert [bind_address(host) for host in ("localhost", "127.0.0.1", "robot")] == ["127.0.0.1", "127.0.0.1", "0.0.0.0"]  # noqa: S104
+    hosts = ("localhost", "127.0.0.1", "::1", "robot", "fd00::5")
+    assert [bind_address(host) for host in hosts] == ["127.0.0.1", "127.0.0.1", "::1", "0.0.0.0", "::"]  # noqa: S104
+
+
+def test_a_node_listens_on_addresses_of_both_kinds_where_ros_is_told_to(monkeypatch):
+    monkeypatch.setenv("ROS_IPV6", "on")
+    assert [bind_address(host) for host in ("127.0.0.1", "robot")] == ["127.0.0.1", "::"]
+
+
+def test_addresses_of_a_name_are_those_of_ipv4_first(monkeypatch):
+    found = [(family, 1, 6, "", (address, 5)) for family, address in ((socket.AF_INET6, "fd00::5"), (socket.AF_INET, "10.0.0.5"))]
+    monkeypatch.setattr(socket, "getaddrinfo", lambda *_: [*found, *found])
+    assert resolve("robot", 5) == ["10.0.0.5", "fd00::5"]
+
+
+def test_an_address_of_ipv6_stands_in_brackets_in_a_uri():
+    assert [in_uri(host) for host in ("robot", "10.0.0.5", "fd00::5", "[fd00::5]")] == ["robot", "10.0.0.5", "[fd00::5]", "[fd00::5]"]
 
 
 @given(st.dictionaries(NAMES, st.text(max_size=40), max_size=5))

@@ -153,6 +153,11 @@ PLANE_API void plane_python_converted(void * route, void * message, const uint8_
 
 PLANE_API void plane_python_done(void * message) { delete static_cast<PythonMessage *>(message); }
 
+PLANE_API void plane_end_older_connections(void * context, const char * subscriber) {
+  auto & all = *static_cast<Context *>(context);
+  all.loop.run_and_wait([&] { end_older(*all.server, subscriber); });
+}
+
 // Have plane_python_next return at once from here on.
 PLANE_API void plane_python_close(void * context) { static_cast<Context *>(context)->python.close(); }
 
@@ -161,6 +166,8 @@ PLANE_API void plane_route_delete(void * route) { delete static_cast<Route *>(ro
 PLANE_API uint64_t plane_route_target_peers(void * route) { return static_cast<Route *>(route)->target_peers(); }
 
 PLANE_API uint64_t plane_route_source_peers(void * route) { return static_cast<Route *>(route)->source_peers(); }
+
+PLANE_API uint64_t plane_route_late_peers(void * route) { return static_cast<Route *>(route)->late_peers(); }
 
 PLANE_API void plane_route_figures(void * route, PlaneFigures * out) {
   const Counters & counters = static_cast<Route *>(route)->counters;

@@ -19,6 +19,11 @@ enum class EventKind : int32_t {
   kBadMessage = 6,
   kBadPeer = 7,  // a peer of our server was turned away
   kCallFailed = 8,
+  kMissed = 9,         // a publisher has not been heard for three seconds
+  kSubscribed = 10,    // a subscriber is connected; the text is its topic and its name
+  kUnsubscribed = 11,  // it is not any more; behind these the text has our address, the peer's and its port
+  kUnheard = 12,       // a subscriber has not been heard for three seconds
+  kHeard = 13,         // it is heard again
 };
 
 struct Event {
@@ -32,7 +37,7 @@ class Events {
   void put(EventKind kind, uint64_t token, std::string text) {
     std::lock_guard<std::mutex> lock(mutex_);
     // Losing a report of garbage is fine, losing the end of a connection is not: those are as few as connections.
-    if (queue_.size() >= kMostWaiting && kind >= EventKind::kBadMessage) return;
+    if (queue_.size() >= kMostWaiting && dispensable(kind)) return;
     queue_.push_back({kind, token, std::move(text)});
     arrived_.notify_one();
   }
@@ -46,6 +51,8 @@ class Events {
   }
 
  private:
+  static bool dispensable(EventKind kind) { return kind >= EventKind::kBadMessage && kind <= EventKind::kCallFailed; }
+
   static constexpr size_t kMostWaiting = 1000;
   std::mutex mutex_;
   std::condition_variable arrived_;

@@ -17,7 +17,7 @@
 namespace plane {
 namespace {
 
-constexpr int kTickMs = 500;
+constexpr int kTickMs = 250;
 constexpr int kEventsAtOnce = 64;
 constexpr long kRestNs = 1'000'000;
 constexpr Key kWakeKey = 0, kTimerKey = UINT64_MAX;

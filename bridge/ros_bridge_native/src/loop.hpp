@@ -17,7 +17,7 @@ class Handler {
  public:
   virtual ~Handler() = default;
   virtual void on_ready(uint32_t epoll_events) = 0;
-  // Return whether the handler still has to be asked again; called about every half second while it is.
+  // Return whether the handler still has to be asked again; called about every quarter of a second while it is.
   virtual bool on_tick(int64_t /*now_ns*/) { return false; }
   // Called once, a millisecond after rest() was asked for.
   virtual void on_rested() {}

@@ -9,6 +9,7 @@
 #include <cstring>
 #include <utility>
 
+#include "liveness.hpp"
 #include "ros1_server.hpp"
 #include "sockets.hpp"
 
@@ -36,11 +37,23 @@ class OutConnection : public Handler, public std::enable_shared_from_this<OutCon
   }
 
   bool on_tick(int64_t now) override {
-    if (!publishers_.empty() || closed_) return false;
-    if (now - born_ns_ < kHandshakeNs) return true;
-    turn_away("it sent no connection header within 5 s");
-    return false;
+    if (closed_) return false;
+    if (publishers_.empty()) {
+      if (now - born_ns_ < kHandshakeNs) return true;
+      turn_away("it sent no connection header within 5 s");
+      return false;
+    }
+    const bool was_silent = life_.silent(), was_missed = life_.missed();
+    life_.look(fd_, now);
+    if (life_.missed() != was_missed && !subscriber_.empty()) server_->events.put(life_.missed() ? EventKind::kUnheard : EventKind::kHeard, 0, subscriber_);
+    if (life_.silent() != was_silent) {
+      for (const auto & publisher : publishers_) publisher->count();
+    }
+    return true;
   }
+
+  bool heard() const { return !life_.silent(); }
+  const std::string & subscriber() const { return subscriber_; }
 
   // Any thread. Returns how many queued frames had to go.
   size_t send(const Frame & frame, size_t depth) {
@@ -72,6 +85,7 @@ class OutConnection : public Handler, public std::enable_shared_from_this<OutCon
     if (closed_) return;
     closed_ = true;
     for (const auto & publisher : publishers_) publisher->detach(shared_from_this());
+    if (!subscriber_.empty()) server_->events.put(EventKind::kUnsubscribed, 0, subscriber_ + ' ' + ends_);
     server_->loop.remove(key_, fd_);
     ::shutdown(fd_, SHUT_RDWR);
     std::lock_guard<std::mutex> lock(mutex_);
@@ -104,7 +118,25 @@ class OutConnection : public Handler, public std::enable_shared_from_this<OutCon
     if (publishers.empty()) return turn_away("topic [" + fields["topic"] + "] is not published here");
     const std::string reason = mismatch(fields, publishers.front()->identity);
     if (!reason.empty()) return turn_away(fields["callerid"] + " on " + fields["topic"] + ": " + reason);
+    replace_missed(publishers.front(), fields["callerid"]);
     accept(publishers);
+    if (!is_name(fields["callerid"])) return;  // nobody can be asked to connect again
+    subscriber_ = fields["topic"] + ' ' + fields["callerid"];
+    ends_ = ends_of(fd_);
+    server_->events.put(EventKind::kSubscribed, 0, subscriber_);
+  }
+
+  static bool is_name(const std::string & text) {
+    constexpr size_t most = 200;
+    return !text.empty() && text.size() <= most && text.find_first_of(" \t\r\n") == std::string::npos;
+  }
+
+  // A subscriber that connects again, as its own end was gone when the network came back, has left its older connection for good.
+  void replace_missed(const std::shared_ptr<Ros1Publisher> & publisher, const std::string & name) {
+    const std::string same = publisher->identity.topic + ' ' + name;
+    for (const auto & older : publisher->connections()) {
+      if (older->subscriber_ == same && older->life_.missed()) older->shut();
+    }
   }
 
   // It is a client, not a subscriber.
@@ -191,6 +223,9 @@ class OutConnection : public Handler, public std::enable_shared_from_this<OutCon
   Key key_ = 0;
   bool closed_ = false;
   std::string header_;
+  std::string subscriber_;  // its topic and its name
+  std::string ends_;        // of the connection: our address, the peer's and its port
+  Liveness life_;
   std::vector<std::shared_ptr<Ros1Publisher>> publishers_;  // of its topic
   std::mutex mutex_;
   std::deque<Frame> queue_;
@@ -228,18 +263,36 @@ void Ros1Publisher::attach(const std::shared_ptr<OutConnection> & connection) {
   std::lock_guard<std::mutex> lock(mutex_);
   for (const auto & [sender, frame] : last_) connection->send(frame, kMostSenders + 1);
   connections_.push_back(connection);
-  counters_.peers = connections_.size();
+  count_heard();
 }
 
 void Ros1Publisher::detach(const std::shared_ptr<OutConnection> & connection) {
   std::lock_guard<std::mutex> lock(mutex_);
   connections_.erase(std::remove(connections_.begin(), connections_.end(), connection), connections_.end());
-  counters_.peers = connections_.size();
+  count_heard();
+}
+
+void Ros1Publisher::count() {
+  std::lock_guard<std::mutex> lock(mutex_);
+  count_heard();
+}
+
+void Ros1Publisher::count_heard() {
+  counters_.peers = std::count_if(connections_.begin(), connections_.end(), [](const auto & connection) { return connection->heard(); });
 }
 
 std::vector<std::shared_ptr<OutConnection>> Ros1Publisher::connections() {
   std::lock_guard<std::mutex> lock(mutex_);
   return connections_;
+}
+
+void end_older(Server & server, const std::string & subscriber) {
+  const auto publishers = server.find(subscriber.substr(0, subscriber.find(' ')));
+  if (publishers.empty()) return;
+  auto connections = publishers.front()->connections();  // the newest is the last
+  connections.erase(std::remove_if(connections.begin(), connections.end(), [&](const auto & one) { return one->subscriber() != subscriber; }),
+    connections.end());
+  for (size_t i = 0; i + 1 < connections.size(); ++i) connections[i]->shut();
 }
 
 void join(const std::shared_ptr<OutConnection> & connection, const std::shared_ptr<Ros1Publisher> & publisher) { connection->join(publisher); }

@@ -22,6 +22,9 @@ class Server;
 // Read the header of a peer that has connected to the server, and become what it asks for: a subscriber's connection, or a service's.
 void greet_peer(const std::shared_ptr<Server> & server, int fd);
 
+// End the connections of a subscriber (its topic and its name) but for the newest. The loop's thread.
+void end_older(Server & server, const std::string & subscriber);
+
 // Let a subscriber receive from one more publisher of its topic, or from one less; without any its connection ends. The loop's thread.
 void join(const std::shared_ptr<OutConnection> & connection, const std::shared_ptr<Ros1Publisher> & publisher);
 void leave(const std::shared_ptr<OutConnection> & connection, const std::shared_ptr<Ros1Publisher> & publisher);
@@ -43,8 +46,11 @@ class Ros1Publisher {
   void attach(const std::shared_ptr<OutConnection> & connection);
   void detach(const std::shared_ptr<OutConnection> & connection);
   std::vector<std::shared_ptr<OutConnection>> connections();
+  // Count the peers again: a connection has become silent, or is heard again.
+  void count();
 
  private:
+  void count_heard();
   void keep(const Frame & frame, const std::string & sender);
 
   Counters & counters_;

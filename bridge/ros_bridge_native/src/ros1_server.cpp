@@ -1,6 +1,5 @@
 #include "ros1_server.hpp"
 
-#include <arpa/inet.h>
 #include <fcntl.h>
 #include <sys/epoll.h>
 #include <unistd.h>
@@ -23,16 +22,19 @@ Server::~Server() {
 }
 
 void Server::listen_on(const std::string & address) {
-  fd_ = socket(AF_INET, SOCK_STREAM | SOCK_NONBLOCK | SOCK_CLOEXEC, 0);
+  const Place place(address, 0);
+  fd_ = socket(place.family(), SOCK_STREAM | SOCK_NONBLOCK | SOCK_CLOEXEC, 0);
   spare_ = open("/dev/null", O_RDONLY | O_CLOEXEC);
-  sockaddr_in place{};
-  place.sin_family = AF_INET;
-  socklen_t size = sizeof place;
-  if (inet_pton(AF_INET, address.c_str(), &place.sin_addr) != 1 || bind(fd_, reinterpret_cast<sockaddr *>(&place), sizeof place) != 0 ||
-      listen(fd_, SOMAXCONN) != 0 || getsockname(fd_, reinterpret_cast<sockaddr *>(&place), &size) != 0) {
+  sockaddr_in6 own{};  // the port is at the same place for both kinds of addresses
+  socklen_t size = sizeof own;
+  // A second socket of this process may have the port, too: one that asks about the other end of a connection that is no more.
+  const int yes = 1;
+  setsockopt(fd_, SOL_SOCKET, SO_REUSEPORT, &yes, sizeof yes);
+  if (!place.known() || bind(fd_, place.address(), place.size()) != 0 || listen(fd_, SOMAXCONN) != 0 ||
+      getsockname(fd_, reinterpret_cast<sockaddr *>(&own), &size) != 0) {
     throw std::runtime_error("can't listen on " + address + ": " + std::strerror(errno));
   }
-  port_ = ntohs(place.sin_port);
+  port_ = ntohs(own.sin6_port);
   key_ = loop.add(fd_, shared_from_this(), EPOLLIN);
 }
 

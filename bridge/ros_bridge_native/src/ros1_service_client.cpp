@@ -1,6 +1,5 @@
 #include "ros1_service_client.hpp"
 
-#include <arpa/inet.h>
 #include <sys/epoll.h>
 #include <unistd.h>
 
@@ -31,23 +30,26 @@ CallConnection::~CallConnection() {
 
 void CallConnection::begin(const std::string & address, uint16_t port) {
   place_ = address + ':' + std::to_string(port);
-  fd_ = socket(AF_INET, SOCK_STREAM | SOCK_NONBLOCK | SOCK_CLOEXEC, 0);
-  sockaddr_in place{};
-  place.sin_family = AF_INET;
-  place.sin_port = htons(port);
-  const bool known = inet_pton(AF_INET, address.c_str(), &place.sin_addr) == 1;
-  if (fd_ < 0 || !known) return lose(Loss::kUnreachable, known ? std::strerror(errno) : "no such address: " + address);
+  const Place place(address, port);
+  if (!place.known()) return lose(Loss::kUnreachable, "no such address: " + address);
+  fd_ = socket(place.family(), SOCK_STREAM | SOCK_NONBLOCK | SOCK_CLOEXEC, 0);
+  if (fd_ < 0) return lose(Loss::kUnreachable, std::strerror(errno));
   set_options(fd_);
-  const int code = connect(fd_, reinterpret_cast<sockaddr *>(&place), sizeof place);
+  const int code = connect(fd_, place.address(), place.size());
   if (code != 0 && errno != EINPROGRESS) return lose(Loss::kUnreachable, std::strerror(errno));
   watched_ = EPOLLOUT;
   key_ = loop_.add(fd_, shared_from_this(), watched_, true);
 }
 
 bool CallConnection::on_tick(int64_t now) {
-  if (state_ != State::kConnecting && state_ != State::kHeader) return false;
-  if (now - born_ns_ < kHandshakeNs) return true;
-  lose(Loss::kRefused, "no connection to the server at " + place_ + ": no connection header within 5 s");
+  if (state_ == State::kClosed) return false;
+  if (state_ == State::kIdle || state_ == State::kCalling) {
+    life_.look(fd_, now);
+    return true;
+  }
+  if (now - born_ns_ < (state_ == State::kConnecting ? kConnectNs : kHandshakeNs)) return true;
+  if (state_ == State::kConnecting) lose(Loss::kUnreachable, place_ + " does not answer");
+  else lose(Loss::kRefused, "no connection to the server at " + place_ + ": no connection header within 5 s");
   return false;
 }
 

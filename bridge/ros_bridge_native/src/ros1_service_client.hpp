@@ -7,6 +7,7 @@
 
 #include "buffer.hpp"
 #include "connection_header.hpp"
+#include "liveness.hpp"
 #include "loop.hpp"
 
 namespace plane {
@@ -76,6 +77,7 @@ class CallConnection : public Handler, public std::enable_shared_from_this<CallC
   uint32_t watched_ = 0;
   std::string place_;
   const int64_t born_ns_;
+  Liveness life_;
   Frame received_ = std::make_shared<Buffer>();
   Frame request_;  // on its way
   size_t sent_ = 0;

@@ -35,7 +35,7 @@ void ServiceConnection::begin(const std::string & caller_id, const Fields & head
   const std::string greeting = encode({{"callerid", caller_id}, {"md5sum", own.md5sum}, {"request_type", own.type + "Request"},
     {"response_type", own.type + "Response"}, {"service", own.service}, {"type", own.type}});
   watched_ = EPOLLIN | EPOLLRDHUP;
-  key_ = loop_.add(fd_, shared_from_this(), watched_);
+  key_ = loop_.add(fd_, shared_from_this(), watched_, true);
   handler_.on_open(shared_from_this());
   // A fresh socket takes a header of any sensible length at once.
   const ssize_t written = send(fd_, greeting.data(), greeting.size(), MSG_DONTWAIT | MSG_NOSIGNAL);
@@ -56,6 +56,11 @@ void ServiceConnection::on_ready(uint32_t epoll_events) {
     return;
   }
   if (epoll_events & (EPOLLIN | EPOLLRDHUP | EPOLLHUP | EPOLLERR)) receive();
+}
+
+bool ServiceConnection::on_tick(int64_t now) {
+  if (!closed_) life_.look(fd_, now);
+  return !closed_;
 }
 
 void ServiceConnection::receive() {

@@ -6,6 +6,7 @@
 
 #include "buffer.hpp"
 #include "connection_header.hpp"
+#include "liveness.hpp"
 #include "loop.hpp"
 
 namespace plane {
@@ -37,6 +38,7 @@ class ServiceConnection : public Handler, public std::enable_shared_from_this<Se
   void shut();
 
   void on_ready(uint32_t epoll_events) override;
+  bool on_tick(int64_t now_ns) override;
 
  private:
   void receive();
@@ -55,6 +57,7 @@ class ServiceConnection : public Handler, public std::enable_shared_from_this<Se
   bool closed_ = false;
   bool calling_ = false;  // from a request until its answer has been sent as a whole
   bool taking_ = false;
+  Liveness life_;
   Frame received_ = std::make_shared<Buffer>();  // requests, or parts of one
   Frame body_;                                   // of the answer on its way
   uint8_t good_ = 0;

@@ -1,6 +1,5 @@
 #include "ros1_subscription.hpp"
 
-#include <arpa/inet.h>
 #include <sys/epoll.h>
 #include <unistd.h>
 
@@ -34,14 +33,12 @@ InConnection::~InConnection() {
 }
 
 void InConnection::begin(const std::string & address, uint16_t port) {
-  fd_ = socket(AF_INET, SOCK_STREAM | SOCK_NONBLOCK | SOCK_CLOEXEC, 0);
-  sockaddr_in place{};
-  place.sin_family = AF_INET;
-  place.sin_port = htons(port);
-  const bool known = inet_pton(AF_INET, address.c_str(), &place.sin_addr) == 1;
-  if (fd_ < 0 || !known) return shut(known ? std::strerror(errno) : "no such address: " + address);
+  const Place place(address, port);
+  if (!place.known()) return shut("no such address: " + address);
+  fd_ = socket(place.family(), SOCK_STREAM | SOCK_NONBLOCK | SOCK_CLOEXEC, 0);
+  if (fd_ < 0) return shut(std::strerror(errno));
   set_options(fd_);
-  const int code = connect(fd_, reinterpret_cast<sockaddr *>(&place), sizeof place);
+  const int code = connect(fd_, place.address(), place.size());
   if (code != 0 && errno != EINPROGRESS) return shut(std::strerror(errno));
   key_ = loop_.add(fd_, shared_from_this(), EPOLLOUT, true);
 }
@@ -52,9 +49,16 @@ void InConnection::on_ready(uint32_t) {
 }
 
 bool InConnection::on_tick(int64_t now) {
-  if (state_ == State::kOpen || state_ == State::kClosed) return false;
-  if (now - born_ns_ < kHandshakeNs) return true;
-  shut("no connection header within 5 s");
+  if (state_ == State::kClosed) return false;
+  if (state_ == State::kOpen) {
+    const bool was_silent = life_.silent(), was_missed = life_.missed();
+    life_.look(fd_, now);
+    if (life_.silent() != was_silent) inbox_.on_heard();
+    if (life_.missed() && !was_missed) events_.put(EventKind::kMissed, token, peer);
+    return true;
+  }
+  if (now - born_ns_ < (state_ == State::kConnecting ? kConnectNs : kHandshakeNs)) return true;
+  shut(state_ == State::kConnecting ? "no connection within 1.5 s" : "no connection header within 5 s");
   return false;
 }
 

@@ -7,6 +7,7 @@
 #include "buffer.hpp"
 #include "connection_header.hpp"
 #include "events.hpp"
+#include "liveness.hpp"
 #include "loop.hpp"
 
 namespace plane {
@@ -32,6 +33,8 @@ class Inbox {
   virtual Frame buffer() = 0;
   virtual void on_large(InConnection & connection, Frame message) = 0;
   virtual void on_closed(InConnection & connection) = 0;
+  // A connection has become silent, or is heard again.
+  virtual void on_heard() = 0;
 };
 
 class InConnection : public Handler, public std::enable_shared_from_this<InConnection> {
@@ -50,10 +53,13 @@ class InConnection : public Handler, public std::enable_shared_from_this<InConne
   void on_rested() override;
 
   bool open() const { return state_ == State::kOpen; }
+  bool heard() const { return open() && !life_.silent(); }
 
   const uint64_t token;
   std::string peer;
-  size_t writer = 0;  // the inbox's
+  size_t writer = 0;      // the inbox's
+  bool replaces = false;  // the inbox's: an older connection of the same publisher is still open
+  uint64_t last = 0;      // the inbox's: digest of the last message
 
  private:
   enum class State { kConnecting, kHeader, kOpen, kClosed };
@@ -80,6 +86,7 @@ class InConnection : public Handler, public std::enable_shared_from_this<InConne
   int fd_ = -1;
   Key key_ = 0;
   int64_t born_ns_;
+  Liveness life_;
   Buffer received_;  // whole or part of a header or of small messages
   Frame large_;      // a large message on its way
   size_t large_bytes_ = 0;

@@ -2,6 +2,8 @@
 
 #include <algorithm>
 #include <cstring>
+#include <functional>
+#include <string_view>
 
 namespace plane {
 namespace {
@@ -10,6 +12,12 @@ constexpr size_t kMostWaitingBytes = 64u << 20;
 constexpr size_t kRoom = 1000, kRoomPerDepth = 10;  // small messages of a backlog
 constexpr size_t kMostWriters = 64;
 constexpr size_t kMostSendersFollowed = 256;
+constexpr size_t kDigestedBytes = 256;  // the beginning, where a header with its number and stamp is
+
+uint64_t digest(const uint8_t * message, size_t size) {
+  const std::string_view beginning(reinterpret_cast<const char *>(message), std::min(size, kDigestedBytes));
+  return std::hash<std::string_view>{}(beginning) ^ (size * 0x9e3779b97f4a7c15u);
+}
 
 }  // namespace
 
@@ -57,8 +65,9 @@ void Ros1ToRos2Route::connect(uint64_t token, const std::string & address, uint1
 // Each latching publisher has a writer of its own, so that late joiners get the last message of each of them. The writer of one that has
 // gone is kept for the next: what was written with it may still be on its way.
 bool Ros1ToRos2Route::on_open(InConnection & connection) {
+  const bool replaces = replace_older(connection);
   count_peers();
-  if (!specification_.quality.latched) return true;
+  if (replaces || !specification_.quality.latched) return true;
   std::lock_guard<std::mutex> lock(writers_mutex_);
   auto chosen = std::find_if(writers_.begin(), writers_.end(), [&](auto & writer) { return !writer.taken && writer.peer == connection.peer; });
   if (chosen == writers_.end()) chosen = std::find_if(writers_.begin(), writers_.end(), [](auto & writer) { return !writer.taken; });
@@ -72,6 +81,39 @@ bool Ros1ToRos2Route::on_open(InConnection & connection) {
   connection.writer = static_cast<size_t>(chosen - writers_.begin());
   return true;
 }
+
+// A publisher sends a topic on one connection to us, and on a second one since it was missed. On the first may come, late, what it has sent
+// while it was away; so that is kept until something comes on the second. What both bring crosses once, and nothing old after something new.
+bool Ros1ToRos2Route::replace_older(InConnection & newer) {
+  InConnection * latest = nullptr;
+  const auto connections = connections_;
+  for (const auto & [token, connection] : connections) {
+    if (connection.get() == &newer || !connection->open() || newer.peer.empty() || connection->peer != newer.peer) continue;
+    if (latest != nullptr) latest->shut("it has connected again");
+    latest = connection.get();
+  }
+  if (latest == nullptr) return false;
+  newer.replaces = true;
+  newer.writer = latest->writer;
+  return true;
+}
+
+// Return whether a message has not come on an older connection of the same publisher already; end that.
+bool Ros1ToRos2Route::is_new(InConnection & connection, const uint8_t * message, size_t size) {
+  connection.last = digest(message, size);
+  if (!connection.replaces) return true;
+  connection.replaces = false;
+  bool is_new = true;
+  const auto connections = connections_;
+  for (const auto & [token, other] : connections) {
+    if (other->token >= connection.token || other->peer != connection.peer || !other->open()) continue;
+    if (other->last == connection.last) is_new = false;
+    other->shut("it has connected again");
+  }
+  return is_new;
+}
+
+size_t Ros1ToRos2Route::late_peers() { return late_; }
 
 void Ros1ToRos2Route::grant(uint64_t token) {
   auto made = make_writer();
@@ -96,15 +138,20 @@ size_t Ros1ToRos2Route::target_peers() {
 size_t Ros1ToRos2Route::room() const { return std::max(kRoom, kRoomPerDepth * specification_.quality.depth); }
 
 void Ros1ToRos2Route::on_small(InConnection & connection, const uint8_t * message, size_t size) {
+  if (!is_new(connection, message, size)) return;
   if (!through_python() && under_way_.load(std::memory_order_acquire) == 0) return publish(connection.writer, message, size, now_ns());
   Frame copy = pool_->get();
   copy->reserve(std::max<size_t>(size, 1));
   if (size) std::memcpy(copy->data(), message, size);
   copy->set_size(size);
-  on_large(connection, std::move(copy));
+  queue(connection, std::move(copy));
 }
 
 void Ros1ToRos2Route::on_large(InConnection & connection, Frame message) {
+  if (is_new(connection, message->data(), message->size())) queue(connection, std::move(message));
+}
+
+void Ros1ToRos2Route::queue(InConnection & connection, Frame message) {
   if (through_python()) return hand_to_python(connection.writer, std::move(message));
   const size_t size = std::max<size_t>(message->size(), 1);
   const size_t most = std::max<size_t>(2, std::min(specification_.quality.depth, kMostWaitingBytes / size));
@@ -135,14 +182,28 @@ void Ros1ToRos2Route::on_converted(const PythonMessage & message, const uint8_t 
 void Ros1ToRos2Route::on_closed(InConnection & connection) {
   {
     std::lock_guard<std::mutex> lock(writers_mutex_);
-    if (connection.writer < writers_.size() && writers_[connection.writer].peer == connection.peer) writers_[connection.writer].taken = false;
+    std::vector<std::shared_ptr<InConnection>> left;
+    for (const auto & [token, other] : connections_) {
+      if (other.get() != &connection && other->open() && other->peer == connection.peer) left.push_back(other);
+    }
+    if (left.size() == 1) left.front()->replaces = false;
+    if (left.empty() && connection.writer < writers_.size() && writers_[connection.writer].peer == connection.peer) {
+      writers_[connection.writer].taken = false;
+    }
   }
   connections_.erase(connection.token);
   count_peers();
 }
 
 void Ros1ToRos2Route::count_peers() {
-  counters.peers = std::count_if(connections_.begin(), connections_.end(), [](const auto & entry) { return entry.second->open(); });
+  size_t heard = 0, late = 0;
+  for (const auto & [token, connection] : connections_) {
+    if (!connection->heard()) continue;
+    ++heard;
+    if (connection->replaces) ++late;
+  }
+  late_ = late;
+  counters.peers = heard - std::min(heard, late);
 }
 
 void Ros1ToRos2Route::work() {

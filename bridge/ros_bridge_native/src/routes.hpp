@@ -53,6 +53,8 @@ class Route {
   // How many peers the end has that messages go out of, and the one that they come from.
   virtual size_t target_peers() { return 0; }
   virtual size_t source_peers() { return 0; }
+  // How many of these may still bring, late, what they had sent while they were away.
+  virtual size_t late_peers() { return 0; }
   // Take back what Python has converted, or why it could not. Any thread.
   virtual void on_converted(const PythonMessage & message, const uint8_t * bytes, size_t size, const std::string & problem) = 0;
   Counters counters;
@@ -73,6 +75,7 @@ class Ros1ToRos2Route : public Route, public Inbox, public Job {
   void grant(uint64_t token);
   size_t target_peers() override;
   size_t source_peers() override { return counters.peers; }
+  size_t late_peers() override;
   void on_converted(const PythonMessage & message, const uint8_t * bytes, size_t size, const std::string & problem) override;
 
  private:
@@ -95,10 +98,14 @@ class Ros1ToRos2Route : public Route, public Inbox, public Job {
   Frame buffer() override { return pool_->get(); }
   void on_large(InConnection & connection, Frame message) override;
   void on_closed(InConnection & connection) override;
+  void on_heard() override { count_peers(); }
   void work() override;
   bool through_python() const { return specification_.converts || specification_.node == nullptr; }
   void hand_to_python(size_t writer, Frame message);
   void publish(size_t writer, const uint8_t * message, size_t size, int64_t arrived_ns);
+  bool replace_older(InConnection & newer);
+  bool is_new(InConnection & connection, const uint8_t * message, size_t size);
+  void queue(InConnection & connection, Frame message);
   void count_peers();
   Quality writer_quality() const;
   std::unique_ptr<Ros2Publisher> make_writer() const;
@@ -106,6 +113,7 @@ class Ros1ToRos2Route : public Route, public Inbox, public Job {
   Context & context_;
   const Specification specification_;
   std::map<uint64_t, std::shared_ptr<InConnection>> connections_;  // the loop's thread only
+  std::atomic<size_t> late_{0};
   Pace pace_;                                                      // the loop's thread only
   std::mutex writers_mutex_;
   std::vector<Writer> writers_;
