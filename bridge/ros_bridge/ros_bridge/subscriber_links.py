@@ -9,7 +9,8 @@ connection between the same two ports. The subscriber's system answers that with
 such connection, resets it (RFC 793, "Half-Open Connection Discovery").
 
 A subscriber that answers under its name although nothing is heard on its connection has another address than before. rospy keeps the old
-connection for two minutes, and makes no second one to the same URI; so it is told this node's URI in another form, with more slashes at its end.
+connection for two minutes, and makes no second one to the same URI; so it is told this node's URI in another form, with more slashes at
+its end.
 """
 
 from __future__ import annotations
