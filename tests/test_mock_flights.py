@@ -69,8 +69,8 @@ def test_a_behaviour_that_can_not_be_read_leaves_nothing_behind(tmp_path: Path) 
         assert not flight.out.exists()
 
 
-def test_the_python_example_of_the_page_on_mocks_runs() -> None:
+def test_the_python_example_of_the_page_on_mocks_runs(tmp_path: Path) -> None:
     code = "import navigation_managers.model as navigation\n" + example("docs/mocks.md", "## From a test\n")
     code += '\nassert (handle.outcome, handle.message) == ("NOT_VALIDATED", "propellers are off")'
-    done = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, timeout=60, check=False)
+    done = subprocess.run([sys.executable, "-c", code], cwd=tmp_path, capture_output=True, text=True, timeout=60, check=False)
     assert done.returncode == 0, done.stderr

@@ -5,50 +5,33 @@ from __future__ import annotations
 from pathlib import Path
 
 import pytest
-from alula.common.faults import parse_fault
-from alula.common.robots import find_robot
-from alula.common.scenarios import load_scenario
-from alula.language.load import load_robot
-from alula.missions.director import Outcome
-from alula.missions.mocked import MockedMission
-from alula.missions.scenario import inputs_of, plan_of
-from alula.mock import load_behaviour
+from alula import Mission, Outcome
 
 ROOT = Path(__file__).resolve().parents[1]
-SKILLSETS = load_robot(ROOT / "skillsets").skillsets
 
 
-def drive(monkeypatch, scenario, *faults, behaviour="", tmp_path=None):
-    """Run a mission; return it, its end, and what ended how, in order: (skill, result or state)."""
-    monkeypatch.setenv("ALULA_ROBOT", str(ROOT))
-    files = find_robot().behaviour_files
+def drive(scenario, *faults, behaviour="", tmp_path=None):
+    """Run a mission; return it, its end, what ended how, in order: (skill, result or state), and what it tells."""
+    files = []
     if behaviour:
         files.append(tmp_path / "more.yaml")
         files[-1].write_text(behaviour, encoding="utf-8")
-    scenario = load_scenario(scenario)
-    plan = plan_of(scenario, inputs_of(scenario))
-    mission = MockedMission(SKILLSETS, load_behaviour(files, SKILLSETS), plan, faults=[parse_fault(fault) for fault in faults])
-    end = mission.run()
+    mission = Mission.load(scenario, ROOT, behaviour=files).run(*faults)
     assert mission.open_executions == []
     assert mission.notes == []
-    ended = [(event.skill, event.result or event.state.value) for event in mission.events if getattr(event, "state", None) and done(event)]
-    return mission, end, ended, plan.facts()
+    return mission, mission.end, [(one.skill, one.result or one.state.value) for one in mission.ended], mission.facts
 
 
-def done(event):
-    return hasattr(event, "skill") and event.state.terminal
-
-
-def test_three_parcels_are_delivered_and_it_is_home_again(monkeypatch):
-    mission, end, ended, facts = drive(monkeypatch, "deliver")
+def test_three_parcels_are_delivered_and_it_is_home_again():
+    mission, end, ended, facts = drive("deliver")
     assert end.outcome is Outcome.ACCOMPLISHED
     assert facts["delivered"] == 3
     assert [one for one in ended if one[0] in {"load", "unload"}] == [("load", "LOADED"), ("unload", "UNLOADED")] * 3
     assert mission.state("base", "base_status") == "DOCKED"
 
 
-def test_the_laser_dies_and_it_creeps_to_the_safe_place(monkeypatch):
-    mission, end, ended, _ = drive(monkeypatch, "deliver", "laser@20")
+def test_the_laser_dies_and_it_creeps_to_the_safe_place():
+    mission, end, ended, _ = drive("deliver", "laser@20")
     assert end.outcome is Outcome.DEGRADED
     after = ended[ended.index(("scan", "works")) :]
     assert ("creep", "ARRIVED") in after
@@ -56,16 +39,16 @@ def test_the_laser_dies_and_it_creeps_to_the_safe_place(monkeypatch):
     assert mission.state("base", "wheels") == "FREE"
 
 
-def test_without_laser_and_bumper_it_stops_and_calls(monkeypatch):
-    _, end, ended, _ = drive(monkeypatch, "deliver", "bumper@10", "laser@20")
+def test_without_laser_and_bumper_it_stops_and_calls():
+    _, end, ended, _ = drive("deliver", "bumper@10", "laser@20")
     assert end.outcome is Outcome.GIVEN_UP
     assert ("creep", "ARRIVED") not in ended
     assert ended[-2:] == [("stop_here", "STANDING"), ("ask", "ANSWERED")]
 
 
 @pytest.mark.parametrize("scenario", ["deliver", "patrol"])
-def test_the_battery_fails_and_it_charges_and_goes_on_where_it_was(scenario, monkeypatch):
-    _, end, ended, facts = drive(monkeypatch, scenario, "battery@30")
+def test_the_battery_fails_and_it_charges_and_goes_on_where_it_was(scenario):
+    _, end, ended, facts = drive(scenario, "battery@30")
     assert end.outcome is Outcome.DEGRADED
     at = ended.index(("supply", "FAILING"))
     assert ("dock", "DOCKED") in ended[at:]
@@ -75,60 +58,60 @@ def test_the_battery_fails_and_it_charges_and_goes_on_where_it_was(scenario, mon
         assert ended.count(("load", "LOADED")) == 3
 
 
-def test_below_15_percent_it_charges(monkeypatch, tmp_path):
+def test_below_15_percent_it_charges(tmp_path):
     low = "data: {power.battery: {value: {percentage: 'level if t < 40 or level > 0.9 else 0.149'}}}"
-    _, end, ended, facts = drive(monkeypatch, "deliver", behaviour=low, tmp_path=tmp_path)
+    _, end, ended, facts = drive("deliver", behaviour=low, tmp_path=tmp_path)
     assert ("supply", "enough") in ended
     assert ("charge", "CHARGED") in ended
     assert (end.outcome, facts["delivered"]) == (Outcome.DEGRADED, 3)
 
 
-def test_lost_it_stops_and_turns_until_it_knows(monkeypatch):
-    _, end, ended, facts = drive(monkeypatch, "deliver", "pose@20-25")
+def test_lost_it_stops_and_turns_until_it_knows():
+    _, end, ended, facts = drive("deliver", "pose@20-25")
     at = ended.index(("drive_to", "keeps_pose"))
     order = [one for one in ended[at:] if one[0] in {"stop_here", "localise"}]
     assert order == [("stop_here", "STANDING"), ("localise", "FOUND")]
     assert (end.outcome, facts["delivered"]) == (Outcome.DEGRADED, 3)
 
 
-def test_when_turning_does_not_help_it_calls_for_help(monkeypatch):
-    _, end, ended, _ = drive(monkeypatch, "deliver", "pose@20")
+def test_when_turning_does_not_help_it_calls_for_help():
+    _, end, ended, _ = drive("deliver", "pose@20")
     at = ended.index(("drive_to", "keeps_pose"))
     assert [one[0] for one in ended[at:] if one[0] in {"localise", "ask"}] == ["localise"] * 3 + ["ask", "localise", "ask"]
     assert end.outcome is Outcome.GIVEN_UP
 
 
-def test_a_door_that_stays_shut_has_it_take_the_other_way(monkeypatch, tmp_path):
+def test_a_door_that_stays_shut_has_it_take_the_other_way(tmp_path):
     shut = "skills: {cargo.open_door: [{when: door == 'kitchen', result: SHUT}]}"
-    _, end, ended, facts = drive(monkeypatch, "deliver", behaviour=shut, tmp_path=tmp_path)
+    _, end, ended, facts = drive("deliver", behaviour=shut, tmp_path=tmp_path)
     assert facts["delivered"] == 3
     assert end.outcome is Outcome.ACCOMPLISHED
     assert ("open_door", "SHUT") in ended
 
 
-def test_a_room_that_can_not_be_reached_costs_its_parcels_only(monkeypatch, tmp_path):
+def test_a_room_that_can_not_be_reached_costs_its_parcels_only(tmp_path):
     shut = "skills: {cargo.open_door: [{when: door == 'workshop', result: SHUT}]}"
-    mission, end, ended, facts = drive(monkeypatch, "deliver", behaviour=shut, tmp_path=tmp_path)
+    mission, end, ended, facts = drive("deliver", behaviour=shut, tmp_path=tmp_path)
     assert (end.outcome, facts["delivered"], facts["handled"]) == (Outcome.DEGRADED, 1, 3)
     assert mission.state("cargo", "box") == "EMPTY"
     assert ended.count(("unload", "UNLOADED")) == 2  # one of them back at its sender
 
 
-def test_who_stands_in_the_way_home_is_asked_to_let_it_past(monkeypatch, tmp_path):
+def test_who_stands_in_the_way_home_is_asked_to_let_it_past(tmp_path):
     blocked = "memory: {tries: 0}\nskills: {base.dock: [{when: tries < 1, delay: 15, result: BLOCKED, moves: {tries: tries + 1}}]}"
-    _, end, ended, _ = drive(monkeypatch, "patrol", behaviour=blocked, tmp_path=tmp_path)
+    _, end, ended, _ = drive("patrol", behaviour=blocked, tmp_path=tmp_path)
     assert end.outcome is Outcome.ACCOMPLISHED
     home = [one for one in ended if one[0] in {"dock", "ask"}]
     assert home == [("dock", "BLOCKED"), ("ask", "ANSWERED"), ("dock", "DOCKED")]
 
 
 @pytest.mark.parametrize("fault", ["person@5", "navigation@5", "bridge@2"])
-def test_what_passes_is_waited_for(fault, monkeypatch):
-    _, end, _, facts = drive(monkeypatch, "deliver", fault)
+def test_what_passes_is_waited_for(fault):
+    _, end, _, facts = drive("deliver", fault)
     assert (end.outcome, facts["delivered"]) == (Outcome.ACCOMPLISHED, 3)
 
 
-def test_the_patrol_follows_the_corridor(monkeypatch):
-    _, end, ended, _ = drive(monkeypatch, "patrol")
+def test_the_patrol_follows_the_corridor():
+    _, end, ended, _ = drive("patrol")
     assert end.outcome is Outcome.ACCOMPLISHED
     assert ended.count(("follow_corridor", "ARRIVED")) == 4

@@ -3,7 +3,7 @@ from __future__ import annotations
 import re
 from pathlib import Path
 
-from alula.runtime.live.part import Consequence, part_of_robot
+from alula import parts
 
 ROOT = Path(__file__).resolve().parents[1]
 NODE = re.compile(r"<node\s[^>]*?>")
@@ -15,4 +15,4 @@ def test_a_run_ends_with_each_process_of_the_layer_that_is_not_started_again():
     nodes = NODE.findall(launch)
     once = {re.search(r'\bname="(\w+)"', node)[1] for node in nodes if 'respawn="true"' not in node}
     assert len(nodes) > len(once) > 0
-    assert once == {name for name, means in part_of_robot().consequences.items() if means is Consequence.END}
+    assert once == {name for name, means in parts.load_part("run", ROOT)().consequences.items() if means is parts.Consequence.END}

@@ -80,8 +80,10 @@ class MockedScenario:
         return MockedRun(mission.events, end, mission.notes, mission.open_executions, dict(mission.robot.faults), places, answers)
 
 
-def load_mocked_scenario(name: str, behaviour: Sequence[Path] = (), *, world: str = "") -> MockedScenario:
+def load_mocked_scenario(name: str, behaviour: Sequence[Path] = (), *, world: str = "", inputs: Inputs | None = None) -> MockedScenario:
     """Read what runs of a scenario over mocks need: the robot's own mocks, with behaviour files on top of them.
+
+    ``inputs``: of the mission, where they are not to be read from the world.
 
     Raises:
         AnalysisError: a file is missing or wrong, with its place.
@@ -90,8 +92,8 @@ def load_mocked_scenario(name: str, behaviour: Sequence[Path] = (), *, world: st
         scenario, robot = load_scenario(name), find_robot()
         if not scenario.mission:
             raise AnalysisError(f"the scenario {name} has no mission to be run over mocks; `alula mock` serves its skills")
-        inputs = inputs_of(scenario, world)
+        given = inputs_of(scenario, world) if inputs is None else inputs
         known = behaviour_of(robot, behaviour).of(frozenset(scenario.skillsets))
     except (ScenarioError, RobotError, InputError, SkillRuntimeError) as error:
         raise AnalysisError(str(error)) from None
-    return MockedScenario(scenario, tuple(robot_skillsets(scenario.skillsets)), known, inputs)
+    return MockedScenario(scenario, tuple(robot_skillsets(scenario.skillsets)), known, given)

@@ -11,26 +11,19 @@ import sys
 from collections import Counter
 from collections.abc import Sequence
 from dataclasses import replace
-from functools import partial
-from time import monotonic
 
-from alula.cli.check_missions import SUFFIX, check_missions, prove_missions
+from alula.api.checking import checked_files, prove_files, robot_models
+from alula.cli.saying import warner
 from alula.cli.table import parse
 from alula.common.garbage import collect_seldom
-from alula.common.robots import RobotError, RobotFolder, find_robot
-from alula.language.check.fields import check_fields
+from alula.common.robots import RobotError, find_robot
 from alula.language.errors import Diagnostic, Severity, has_errors, render
-from alula.language.models import ModelFile, check_files, models_in
+from alula.language.models import ModelFile
 from alula.language.notation import Notation
 from alula.language.printer import print_file
-from alula.model.model import Skillset
 
+COMMAND = "alula check"
 UNREADABLE = "ALU0"
-
-
-def _models_of(robot: RobotFolder) -> list[str]:
-    """Return the folder of a robot's models, or those of a fleet's robots."""
-    return [str(one.skillsets) for one in robot.robots.values()] or [str(robot.skillsets)]
 
 
 def main(arguments: Sequence[str] | None = None) -> int:
@@ -42,19 +35,14 @@ def main(arguments: Sequence[str] | None = None) -> int:
 
         return play.run(options)
     try:
-        given = options.files or _models_of(find_robot())
+        given = options.files or robot_models(find_robot())
     except RobotError as error:
-        sys.stderr.write(f"alula check: no files are named, and {error}\n")
+        sys.stderr.write(f"{COMMAND}: no files are named, and {error}\n")
         return 2
-    missions = [place for place in dict.fromkeys(given) if place.endswith(SUFFIX)]
-    paths = dict.fromkeys(path for place in given if place not in missions for path in models_in(place))
-    models, trees = check_files(list(paths), sys.stdin.buffer), check_missions(missions, options.palette)
-    for model in models:
-        check_fields(model)
-    files = [*models, *trees]
+    warn = warner(COMMAND)
+    files = checked_files(given, sys.stdin.buffer, palettes=options.palette, tell=warn)
     if options.proofs and options.to is None:
-        _prove(models, options.time, closed_world=options.closed_world)
-        prove_missions(trees, options.time)
+        prove_files(files, options.time, closed_world=options.closed_world, tell=warn)
     for file in files:
         file.findings = [_strict(finding) for finding in file.findings] if options.strict else file.findings
     findings = [finding for file in files for finding in file.findings]
@@ -70,47 +58,6 @@ def exit_code(findings: Sequence[Diagnostic]) -> int:
     if any(finding.severity is Severity.ERROR and finding.code.startswith(UNREADABLE) for finding in findings):
         return 2
     return 1 if has_errors(findings) else 0
-
-
-def _prove(files: Sequence[ModelFile], timeout_s: float, *, closed_world: bool) -> None:
-    """Add the prover's findings about every skillset of a file that is free of errors."""
-    # The prover brings its solvers along, which a conversion should not wait for.
-    from alula.prove import prove
-
-    for file in files:
-        if has_errors(file.findings) or file.damaged:
-            continue
-        found: list[Diagnostic] = []
-        end = monotonic() + timeout_s
-        for number, skillset in enumerate(file.skillsets):
-            if number and monotonic() >= end:
-                found.append(_not_begun(file.skillsets[number:], timeout_s))
-                break
-            left_s = max(0.0, end - monotonic())
-            found += prove(skillset, closed_world=closed_world, timeout_s=left_s, tell=partial(_tell, f"{file.path}: {skillset.name}"))
-        file.add(found)
-
-
-def _tell(what: str, progress: str) -> None:
-    sys.stderr.write(f"alula check: {what}: proving: {progress}\n")
-
-
-def counterexamples_of(files: Sequence[ModelFile], timeout_s: float, *, closed_world: bool) -> list[tuple[Skillset, Diagnostic]]:
-    """Prove the files; return each finding that has a counterexample with steps, in the order of the output, with its skillset."""
-    _prove(files, timeout_s, closed_world=closed_world)
-    return [
-        (max((one for one in file.skillsets if one.span.line <= finding.span.line), key=lambda one: one.span.line), finding)
-        for file in files
-        for finding in file.findings
-        if finding.counterexample.steps
-    ]
-
-
-def _not_begun(skillsets: Sequence[Skillset], timeout_s: float) -> Diagnostic:
-    """Return the prover's own finding for a lack of time, for skillsets that it was not even asked about."""
-    severity = Severity.ERROR if any(skillset.properties for skillset in skillsets) else Severity.WARNING
-    message = f"no proof was tried for this skillset and {len(skillsets) - 1} more: the {timeout_s:g} s for the file are over"
-    return Diagnostic("ALU540", message, skillsets[0].span, severity, "allow more with `--time`, or divide the file")
 
 
 def _convert(files: Sequence[ModelFile], notation: Notation, code: int) -> int:

@@ -8,31 +8,13 @@ from __future__ import annotations
 import json
 import sys
 from collections.abc import Iterator, Sequence
-from pathlib import Path
 
 from alula.cli.table import parse
-from alula.model.errors import UnsupportedModelError
-from alula.records.conformance import ConformanceVerdict, Monitor
+from alula.records.conformance import ConformanceVerdict, judge
 from alula.records.errors import AnalysisError
 from alula.records.logs import Log, read_log
-from alula.records.models import models_of
 
 CONFORMS, DIFFERS, UNREADABLE = 0, 1, 2
-
-
-def judge(log: Log, models: Sequence[Path] = ()) -> ConformanceVerdict:
-    """Hold a log against models.
-
-    Raises:
-        AnalysisError: a model is missing, has errors or can't be executed.
-    """
-    try:
-        monitor = Monitor(models_of(log.skillsets, models))
-    except UnsupportedModelError as error:
-        raise AnalysisError(str(error)) from None
-    for entry in log.entries:
-        monitor.take(entry.event, entry.instance_id)
-    return monitor.verdict
 
 
 def lines(log: Log, verdict: ConformanceVerdict) -> Iterator[str]:

@@ -10,9 +10,9 @@ import json
 import sys
 from collections.abc import Sequence
 
-from alula.cli.check import counterexamples_of
-from alula.cli.check_missions import SUFFIX
+from alula.api.checking import counterexamples_of, is_mission
 from alula.cli.play_mission import play_mission
+from alula.cli.saying import warner
 from alula.language.models import check_files, models_in
 from alula.runtime.counterexample_play import PlayedStep, play
 
@@ -22,11 +22,11 @@ def run(options: argparse.Namespace) -> int:
     if not options.files:
         sys.stderr.write("alula check: --play needs the models or missions whose counterexample is meant\n")
         return 2
-    if any(one.endswith(SUFFIX) for one in options.files):
+    if any(map(is_mission, options.files)):
         return play_mission(options)
     paths = dict.fromkeys(path for given in options.files for path in models_in(given))
     files = check_files(list(paths), sys.stdin.buffer)
-    counterexamples = counterexamples_of(files, options.time, closed_world=options.closed_world)
+    counterexamples = counterexamples_of(files, options.time, closed_world=options.closed_world, tell=warner("alula check"))
     if not 1 <= options.play <= len(counterexamples):
         sys.stderr.write(f"alula check: there is no counterexample {options.play}; these models have {len(counterexamples) or 'none'}\n")
         return 2

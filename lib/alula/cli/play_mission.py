@@ -7,8 +7,8 @@ import json
 import sys
 from pathlib import Path
 
+from alula.api.checking import checked_missions, is_mission, prove_missions
 from alula.check.robot import part_of
-from alula.cli.check_missions import SUFFIX, check_missions, prove_missions
 from alula.cli.run_request import run_folder
 from alula.cli.saying import warner
 from alula.common.robots import RobotError, find_robot
@@ -25,12 +25,12 @@ COMMAND = "alula check"
 
 def play_mission(options: argparse.Namespace) -> int:
     """Play the counterexample of a mission; return the exit code."""
-    if not all(one.endswith(SUFFIX) for one in options.files):
+    if not all(map(is_mission, options.files)):
         return _refused("--play takes missions or models, not both at once")
-    files = check_missions(options.files, [])
+    files = checked_missions(options.files, (), warner(COMMAND))
     if any(has_errors(file.findings) for file in files):
         return _refused(f"a mission has errors; `alula check {' '.join(options.files)}` shows them")
-    prove_missions(files, options.time)
+    prove_missions(files, options.time, warner(COMMAND))
     found = [(file, one) for file in files for one in file.findings if isinstance(one, MissionFinding) and one.run is not None]
     if not 1 <= options.play <= len(found):
         return _refused(f"there is no counterexample {options.play}; these missions have {len(found) or 'none'}")

@@ -13,21 +13,19 @@ import argparse
 import os
 import signal
 import sys
-import uuid
 from collections.abc import Sequence
 from pathlib import Path
 
-from alula.campaign.mocked_scenarios import load_mocked_scenario
+from alula.api.mission import Mission, note_account
 from alula.cli.options.runs import every_run
 from alula.cli.parser import Parser
-from alula.cli.run_request import check_limit, check_seed, groot_address, run_folder, shown_at, world_file
-from alula.common.faults import MOCKED, FaultError, FaultRequest, changes_of, parse_fault, spans_of
+from alula.cli.run_request import check_limit, check_seed, groot_address, run_folder, shown_at
+from alula.common.faults import FaultError, parse_fault
 from alula.common.robots import RobotError
-from alula.common.run_log import note_mocked
 from alula.common.scenarios import ScenarioError
 from alula.common.signals import Interrupts
 from alula.missions.director import EXIT_CODES, Outcome
-from alula.missions.mocked import LIMIT_S, MockedMission
+from alula.missions.mocked import MockedMission
 from alula.missions.plan import InputError
 from alula.records.conformance import Monitor
 from alula.records.errors import AnalysisError
@@ -62,28 +60,10 @@ def prepare(given: argparse.Namespace) -> tuple[MockedMission, RunSpec]:
         AnalysisError, FaultError, RequestError, RobotError, ScenarioError, InputError: it can't be run; nothing was written.
     """
     out, seed, limit_s = run_folder(given.out, given.scenario), check_seed(given.seed), check_limit(given.limit)
-    flights = load_mocked_scenario(given.scenario, given.behaviour, world=given.world)
-    faults = [parse_fault(text) for text in given.fail]
-    flights.check(faults)
+    mission = Mission.load(given.scenario, world=given.world, behaviour=given.behaviour)
     groot = groot_address(given.groot)
-    world, plan = world_file(flights.scenario, given.world), flights.plan
-    out.mkdir(parents=True, exist_ok=True)
-    spec = RunSpec(
-        scenario=given.scenario,
-        out_dir=str(out),
-        run_id=uuid.uuid4().hex,
-        seed=seed,
-        limit_s=limit_s,
-        faults=tuple(map(str, faults)),
-        world=world,
-        monitor=given.monitor,
-        groot=groot,
-        own={"mock": True},
-    )
-    spec.save(out / FILE)
-    ends_s = limit_s or LIMIT_S
-    mission = MockedMission(flights.skillsets, flights.behaviour, plan, faults=faults, seed=seed, out=out, groot=groot, limit_s=ends_s)
-    return mission, spec
+    mocked = mission.mocked(*given.fail, seed=seed, out=out, groot=groot, monitor=given.monitor, limit_s=limit_s)
+    return mocked, RunSpec.load(out / FILE)
 
 
 def run(given: argparse.Namespace) -> int:
@@ -116,13 +96,6 @@ def _abort_on_signals(mission: MockedMission, out: Path) -> None:
 
     interrupts = Interrupts(first, second)
     interrupts.install()
-
-
-def note_account(out: Path, mission: MockedMission, faults: Sequence[FaultRequest]) -> None:
-    """Note what failed and when, and how fast the mocks were."""
-    simulated_s = mission.world.now_s
-    spans = spans_of(faults, begun_s=0.0, lift_off_s=mission.departure_s, ended_s=simulated_s, first_s=mission.robot.faults)
-    note_mocked(out, simulated_s, mission.wall_s, changes_of(spans, simulated_s, MOCKED), mission.notes)
 
 
 def _say(line: str) -> None:

@@ -14,7 +14,9 @@ import re
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 
+from alula.common.errors import AlulaError
 from alula.common.located_yaml import choices
+from alula.common.public import public
 
 _SECONDS = r"\d+(?:\.\d+)?"
 _FAULT = re.compile(rf"(?P<what>[a-z0-9_]+)(?::(?P<how>[a-z0-9_]+))?(?:@(?P<begin>{_SECONDS})(?:-(?P<end>{_SECONDS}))?)?", re.ASCII)
@@ -27,10 +29,12 @@ MOCKED = "mock"
 """The mode of what failed in mocks without a word for the way of failing."""
 
 
-class FaultError(Exception):
+@public("alula.parts")
+class FaultError(AlulaError):
     """A fault can't be read, or does not exist; the message quotes it and says what would be right."""
 
 
+@public("alula.parts")
 @dataclass(frozen=True)
 class FaultRequest:
     """Something that fails.
@@ -72,6 +76,7 @@ class FaultRequest:
         return since_lift_off_s is not None and self.begin_s <= since_lift_off_s < (math.inf if self.end_s is None else self.end_s)
 
 
+@public("alula.parts")
 @dataclass(frozen=True)
 class FaultChange:
     """Something failed at ``t_s``, absolute seconds of mission clock, or works again: then the mode is MENDED."""
@@ -162,6 +167,7 @@ def parse_fault(text: str, known: Mapping[str, Sequence[str]] | None = None) -> 
     return fault
 
 
+@public("alula.parts")
 def parse_faults(text: str, known: Mapping[str, Sequence[str]] | None = None) -> list[FaultRequest]:
     """Read faults between commas; raises FaultError."""
     return [parse_fault(word, known) for word in text.split(",") if word.strip()]

@@ -7,6 +7,7 @@ from pathlib import Path
 
 import yaml
 
+from alula.common.errors import AlulaError
 from alula.common.suggestions import nearest
 
 MAX_CHARACTERS = 1_000_000
@@ -15,7 +16,7 @@ SHOWN_CHARACTERS = 40
 MakeError = Callable[[str], Exception]
 
 
-class YamlError(Exception):
+class YamlError(AlulaError):
     """A file is not as it should be; the message says where, what and what would be right."""
 
 

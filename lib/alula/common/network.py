@@ -9,6 +9,8 @@ from collections import deque
 from collections.abc import Iterable
 from dataclasses import dataclass
 
+from alula.common.errors import AlulaError
+
 # DDS derives its UDP ports from the domain (RTPS 2.5, section 9.6.2.3: 7400 + 250 * domain + ...); above 101 they fall
 # into Linux's ephemeral range. 0 is every program's default and left alone.
 DOMAINS = range(1, 102)
@@ -23,11 +25,11 @@ _claims: deque[socket.socket] = deque()
 NAMESPACE = re.compile(r"(/[A-Za-z][A-Za-z0-9_]*)+")
 
 
-class NoFreeDomainError(Exception):
+class NoFreeDomainError(AlulaError):
     """The DDS domains that a run may have, or its namespace there, are claimed by other runs on this machine."""
 
 
-class NoFreePortError(Exception):
+class NoFreePortError(AlulaError):
     """Other programs hold all UDP ports that a run of a domain may take; the message names them."""
 
 

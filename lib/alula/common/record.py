@@ -20,6 +20,7 @@ from mcap.records import Channel, Message
 from mcap.stream_reader import StreamReader
 from mcap.writer import CompressionType, IndexType, Writer
 
+from alula.common.errors import AlulaError
 from alula.common.files import strict
 
 FILE = "skills.mcap"
@@ -59,7 +60,7 @@ _FOOTER = _HEAD.pack(0x02, 20) + bytes(20) + MAGIC
 """Ends a record that is read by itself: the reader stops here."""
 
 
-class RecordError(Exception):
+class RecordError(AlulaError):
     """A file is no record; the message names it and says why."""
 
 

@@ -18,7 +18,9 @@ from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any
 
+from alula.common.errors import AlulaError
 from alula.common.located_yaml import Located, choices, read_yaml
+from alula.common.public import public
 from alula.common.robot_page import USUAL_PAGE, read_page
 
 FILE = "robot.yaml"
@@ -47,7 +49,7 @@ KEYS = (
 _NAME = re.compile(r"[a-z][a-z0-9_]*")
 
 
-class RobotError(Exception):
+class RobotError(AlulaError):
     """There is no robot, or its file is wrong; the message says where and what to do."""
 
 
@@ -181,6 +183,20 @@ def find_robot(start: Path | None = None) -> RobotFolder:
         if (folder / FILE).is_file():
             return load_robot_folder(folder)
     raise RobotError(f"there is no {FILE} in {here} or above; name the robot's folder with --robot DIR, or make one: alula new robot DIR")
+
+
+@public("alula.parts")
+def load_part(name: str, robot: str | Path | None = None) -> Any:
+    """Return what a robot's file names under ``parts``, as the commands take it; None where it names nothing.
+
+    Args:
+        name: of the part, such as ``missions`` or ``run``.
+        robot: the robot's folder; None: that of the current folder or above.
+
+    Raises:
+        RobotError: there is no robot, or what its file names does not exist.
+    """
+    return (find_robot() if robot is None else load_robot_folder(Path(robot).resolve())).part(name)
 
 
 def robots_of_fleet() -> Mapping[str, RobotFolder]:

@@ -6,6 +6,7 @@ import json
 from dataclasses import dataclass
 from pathlib import Path
 
+from alula.common.errors import AlulaError
 from alula.common.network import is_claimed
 from alula.common.processes import processes_of_run
 from alula.common.robots import RobotError, find_robot
@@ -13,7 +14,7 @@ from alula.common.robots import RobotError, find_robot
 LATEST = "latest"
 
 
-class NoRunError(Exception):
+class NoRunError(AlulaError):
     """There is no such run, or it has ended; the message says what to do."""
 
 

@@ -5,7 +5,9 @@ from __future__ import annotations
 from dataclasses import dataclass
 from pathlib import Path
 
+from alula.common.errors import AlulaError
 from alula.common.located_yaml import Located, read_yaml
+from alula.common.public import public
 from alula.common.robots import RobotError, find_robot
 from alula.common.suggestions import nearest
 
@@ -13,10 +15,11 @@ NEEDED = ("about", "skillsets")
 KEYS = ("about", "world", "mission", "skillsets", "launch", "report", "faults", "processes", "fallback", "motion", "robots")
 
 
-class ScenarioError(Exception):
+class ScenarioError(AlulaError):
     """A scenario does not exist or its file is wrong; the message says what would be right."""
 
 
+@public("alula.parts")
 @dataclass(frozen=True)
 class Scenario:
     """One scenario.

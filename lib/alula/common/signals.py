@@ -6,9 +6,12 @@ import signal
 import threading
 from collections.abc import Callable
 
+from alula.common.public import public
+
 END_SIGNALS = (signal.SIGINT, signal.SIGTERM, signal.SIGHUP)
 
 
+@public("alula.parts")
 class StopEvent(threading.Event):
     """An event that a signal's handler may set, also while the main thread waits for it, or is about to be told of another signal.
 

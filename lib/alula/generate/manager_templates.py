@@ -38,7 +38,7 @@ $inputs
 )
 
 if TYPE_CHECKING:
-$imports    from alula.runtime.core.execution import Execution
+$imports    from alula import Execution
 $classes
 
 

@@ -22,8 +22,8 @@ from alula.mock import mock_world
 from ${skillset}_managers.model import DATA_TOPICS, SKILLSET
 
 if TYPE_CHECKING:
-    from alula.runtime.local import LocalWorld
-    from alula.mock import Behaviour, Play
+    from alula import Behaviour, LocalWorld
+    from alula.mock import Play
 
 
 def in_process(behaviour: Behaviour | None = None, *, seed: int = 0) -> tuple[LocalWorld, Play]:

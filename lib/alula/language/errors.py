@@ -6,10 +6,13 @@ from collections.abc import Iterable
 from dataclasses import dataclass, field
 from enum import Enum
 
+from alula.common.errors import AlulaError
+from alula.common.public import public
 from alula.language.counterexamples import NO_COUNTEREXAMPLE, Counterexample
 from alula.model.span import NOWHERE, Span
 
 
+@public()
 class Severity(Enum):
     """An error keeps a model from being used, a warning doesn't; a note is no defect, and is never made an error."""
 
@@ -18,6 +21,7 @@ class Severity(Enum):
     NOTE = "note"
 
 
+@public()
 @dataclass(frozen=True)
 class Diagnostic:
     """One finding.
@@ -79,7 +83,8 @@ class Diagnostic:
         }
 
 
-class LanguageError(Exception):
+@public()
+class LanguageError(AlulaError):
     """All that was found in a file or robot, at least one error among it; ``str()`` is the rendered list."""
 
     def __init__(self, diagnostics: Iterable[Diagnostic]) -> None:

@@ -6,10 +6,11 @@ from collections.abc import Mapping
 from dataclasses import replace
 from pathlib import Path
 
+from alula.common.public import public
 from alula.common.suggestions import nearest
 from alula.language import side_files
 from alula.language.errors import Diagnostic, LanguageError, Severity, has_errors
-from alula.language.models import about, check_files
+from alula.language.models import ModelFile, about, check_files, check_texts
 from alula.language.notation import SUFFIXES
 from alula.language.robot import Bindings, Robot
 from alula.model.model import Skillset
@@ -17,18 +18,36 @@ from alula.model.ros_types import PRIMITIVES, RosType
 from alula.model.span import Span
 
 
+@public()
 def load_skillset(path: str | Path) -> Skillset:
     """Return the checked skillset of a file.
 
     Raises:
         LanguageError: the file can't be read, or has errors; all of them are in it, warnings too.
     """
-    skillset, findings = check_file(path)
-    if skillset is None and not has_errors(findings):
-        findings = [*findings, about(Path(path), "ALU406", "one skillset is needed, and the file holds none or several")]
-    if skillset is None or has_errors(findings):
+    (file,) = check_files([path])
+    return _only(Path(path), file)
+
+
+@public()
+def parse_skillset(text: str, name: str = "model.skill") -> Skillset:
+    """Return the checked skillset of a text; ``name`` is what findings call it, and tells the notation: ``*.skill`` or ``*.rl``.
+
+    Raises:
+        LanguageError: the text has errors, or holds none or several skillsets.
+    """
+    (file,) = check_texts([ModelFile(name, text)])
+    return _only(Path(name), file)
+
+
+def _only(path: Path, file: ModelFile) -> Skillset:
+    findings = file.findings
+    one = len(file.skillsets) == 1 and not file.damaged
+    if not one and not has_errors(findings):
+        findings = [*findings, about(path, "ALU406", "one skillset is needed, and the file holds none or several")]
+    if has_errors(findings):
         raise LanguageError(findings)
-    return skillset
+    return file.skillsets[0]
 
 
 def check_file(path: str | Path) -> tuple[Skillset | None, list[Diagnostic]]:

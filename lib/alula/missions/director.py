@@ -11,6 +11,7 @@ from py_trees.behaviour import Behaviour
 from py_trees.behaviours import Failure
 from py_trees.common import Status
 
+from alula.common.public import public
 from alula.missions.blackboard import Blackboard
 from alula.missions.conditions import Condition
 from alula.missions.pausing import Pause, PauseRefusedError
@@ -21,6 +22,7 @@ START_TIMEOUT_S = 90.0
 """An autopilot that was just switched on has a position after 42 s, sometimes later."""
 
 
+@public()
 class Outcome(Enum):
     """How a mission can be, in a mission's account."""
 

@@ -3,11 +3,12 @@
 from __future__ import annotations
 
 import time
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from pathlib import Path
 from typing import Protocol
 
 from alula.common.faults import FaultRequest
+from alula.common.public import public
 from alula.missions.director import Director, End, Outcome
 from alula.missions.driver import TICK_PERIOD_S, Job, MissionDriver
 from alula.missions.plan import MissionPlan
@@ -17,6 +18,7 @@ from alula.mock import Behaviour, MockRobot, mock_world
 from alula.model.execution_state import ExecutionState
 from alula.model.model import Skillset
 from alula.runtime.core.events import EngineEvent, ExecutionEvent
+from alula.runtime.core.records import ExecutionRecord, executions_of
 from alula.runtime.local import LocalWorld
 
 LATENCY_S = 0.005
@@ -34,6 +36,7 @@ class Listener(Recorder, Protocol):
         ...
 
 
+@public()
 class MockedMission:
     """A mission from power-up to its end.
 
@@ -72,11 +75,14 @@ class MockedMission:
         self.events: list[EngineEvent] = []
         self.places: dict[str, tuple[str, ...]] = {}
         """Where in the tree each execution was started, by its id: the names of the nodes from the root down."""
+        self.end: End | None = None
+        """How it ended; None before."""
         self.wall_s = 0.0
         for fault in faults:
             self.robot.fail(fault)
         self._tick_period_s = tick_period_s
         self._limit_s = limit_s
+        self._facts = plan.facts
         clock_ns = lambda: self.world.clock.now_ns  # noqa: E731
         record = self._record = None if out is None else MissionRecord(out, plan, clock_ns, plan.parameters)
         client = lambda name, wake: MissionClient(self.world.client(name), wake, record or listener)  # noqa: E731
@@ -102,11 +108,37 @@ class MockedMission:
         end = self._driver.end or End(Outcome.ABORTED, "the stop did not end")
         self.wall_s = time.perf_counter() - begun
         self._driver.finish(end)
+        self.end = end
         return end
 
     def abort(self, reason: str) -> None:
         """Have the robot stop at the next tick; may be called by a signal's handler."""
         self._driver.ask_abort(reason)
+
+    @property
+    def outcome(self) -> Outcome:
+        """How it ended; RUNNING before."""
+        return Outcome.RUNNING if self.end is None else self.end.outcome
+
+    @property
+    def reason(self) -> str:
+        """Why it ended so, in words; empty where there is nothing to be said."""
+        return "" if self.end is None else self.end.reason
+
+    @property
+    def facts(self) -> Mapping[str, object]:
+        """What the mission's account says beyond the outcome: the output ports of its tree."""
+        return self._facts()
+
+    @property
+    def executions(self) -> list[ExecutionRecord]:
+        """All executions of skills, by age."""
+        return executions_of(self.events)
+
+    @property
+    def ended(self) -> list[ExecutionEvent]:
+        """The end of each execution that has ended, in their order."""
+        return [event for event in self.events if isinstance(event, ExecutionEvent) and event.state.terminal]
 
     @property
     def director(self) -> Director:

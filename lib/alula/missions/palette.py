@@ -18,6 +18,6 @@ def mission_palette(skillsets: Sequence[Skillset], part: MissionPart, crew: Crew
     """Return BehaviorTree.CPP's nodes, Alula's, the robot's own, its skills and resources; without a crew the last can't be ticked."""
     memory = Blackboard(clock_ns=int, pending=PendingInterrupts(int)) if crew is None else crew.memory
     palette = standard_palette() | mission_nodes(memory) | robot_nodes(skillsets, crew)
-    for name, node in part.nodes:
-        palette.register(node, name)
+    for node in part.nodes:
+        palette.register(node)
     return palette

@@ -5,19 +5,21 @@ from __future__ import annotations
 from collections.abc import Callable
 from dataclasses import dataclass
 
+from alula.common.public import public
 from alula.missions.blackboard import Blackboard
 from alula.missions.plan import Inputs
 from alula.trees.node import Node
 
 
+@public("alula.parts")
 @dataclass(frozen=True)
 class MissionPart:
-    """Nodes of its own by their names in files, and the memory of its missions.
+    """Nodes of its own, which files call as `alula.trees.register` has it, and the memory of its missions.
 
     ``check_inputs`` raises InputError for inputs that the robot's missions can't use: before the run, not in the middle of it.
     """
 
-    nodes: tuple[tuple[str, type[Node]], ...] = ()
+    nodes: tuple[type[Node], ...] = ()
     memory: type[Blackboard] = Blackboard
     check_inputs: Callable[[Inputs], object] = dict
 

@@ -6,6 +6,7 @@ from functools import partial
 
 from py_trees.behaviour import Behaviour
 
+from alula.common.errors import AlulaError
 from alula.missions.leaves import skill_leaf
 from alula.runtime.handle import SkillHandle
 from alula.runtime.waiting import Pending
@@ -15,7 +16,7 @@ AGAIN_S = 0.5
 """A skill that is just being started refuses; it is asked again after so long, mission clock."""
 
 
-class PauseRefusedError(Exception):
+class PauseRefusedError(AlulaError):
     """The mission can't be paused, or can't go on, now; the message says why."""
 
 

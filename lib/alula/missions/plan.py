@@ -6,6 +6,8 @@ from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field
 from typing import Any
 
+from alula.common.errors import AlulaError
+from alula.common.public import public
 from alula.missions.blackboard import Blackboard
 from alula.missions.director import Mission
 from alula.missions.skillset import Client, Clock
@@ -51,5 +53,6 @@ class MissionPlan:
         return self.places.get(skillset, ("", skillset))
 
 
-class InputError(Exception):
+@public("alula.parts")
+class InputError(AlulaError):
     """The inputs of a mission can't be used; the message says what is wrong and where."""

@@ -11,6 +11,7 @@ from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 
 from alula.common.faults import FaultRequest
+from alula.common.public import public
 from alula.mock.formula import Formula
 from alula.model.model import ResultKind, Skill
 from alula.runtime.core.errors import SkillRuntimeError
@@ -113,6 +114,7 @@ class DataScript:
     source: str = ""
 
 
+@public()
 @dataclass(frozen=True, kw_only=True)
 class Behaviour:
     """All of it, for all skillsets of a robot. ``beside``: of other robots of a fleet, each with a memory of its own."""

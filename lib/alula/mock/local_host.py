@@ -6,6 +6,7 @@ import functools
 from collections.abc import Iterable, Mapping, Sequence
 from types import SimpleNamespace
 
+from alula.common.public import public
 from alula.mock.behaviour import Behaviour
 from alula.mock.robot import MakeSkill, MockRobot
 from alula.mock.skill import MockSkill
@@ -54,6 +55,7 @@ class LocalMockHost:
         self.notes.append(error)
 
 
+@public()
 def mock_world(
     skillsets: Iterable[Skillset], behaviour: Behaviour | None = None, *, seed: int = 0, start_s: float = 0.0, latency_s: float = 0.0
 ) -> tuple[LocalWorld, MockRobot]:

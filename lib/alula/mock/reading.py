@@ -9,6 +9,7 @@ from pathlib import Path
 from typing import TypeVar
 
 from alula.common.located_yaml import Located, choices, read_yaml
+from alula.common.public import public
 from alula.mock.behaviour import NEVER, Behaviour, DataScript, Ending, MockChange, MockFault, Place, Rule, TimelineEvent, Value
 from alula.mock.errors import BehaviourError
 from alula.mock.formula import Formula, FormulaError
@@ -22,13 +23,14 @@ DEFAULT_PERIOD_S = 0.5
 T = TypeVar("T")
 
 
-def load_behaviour(paths: Sequence[Path], skillsets: Sequence[Skillset]) -> Behaviour:
+@public()
+def load_behaviour(paths: Sequence[str | Path], skillsets: Sequence[Skillset]) -> Behaviour:
     """Read behaviour files; what a later one says comes before what an earlier one says.
 
     Raises:
         BehaviourError: with file, line, what is wrong and what would be right.
     """
-    documents = [(path, read_yaml(path, BehaviourError)) for path in paths]
+    documents = [(path, read_yaml(path, BehaviourError)) for path in map(Path, paths)]
     sections = [(path, {} if top is None else top.record("a behaviour file", SECTIONS)) for path, top in documents]
     memory: dict[str, object] = {}
     for _, parts in sections:

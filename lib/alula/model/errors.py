@@ -2,8 +2,10 @@
 
 from __future__ import annotations
 
+from alula.common.errors import AlulaError
 
-class SkillModelError(Exception):
+
+class SkillModelError(AlulaError):
     """Root of the errors of this package."""
 
 

@@ -4,7 +4,10 @@ from __future__ import annotations
 
 from enum import Enum
 
+from alula.common.public import public
 
+
+@public()
 class ExecutionState(Enum):
     """Where an execution is. PAUSED and INTERRUPTING are phases of running: invariants are watched and resources held."""
 

@@ -16,6 +16,7 @@ from enum import Enum
 from functools import cache, lru_cache
 from typing import Any
 
+from alula.model import model
 from alula.model.errors import ModelFormatError
 from alula.model.expressions import And, Constant, DataIs, Expression, Implies, Not, Or, ResourceIs, SkillRuns
 from alula.model.model import Skillset
@@ -150,4 +151,4 @@ def _decode_object(value: object, cls: type, where: str, depth: int) -> object:
 
 @cache
 def _annotations(cls: type) -> dict[str, Any]:
-    return typing.get_type_hints(cls)
+    return typing.get_type_hints(cls, localns=vars(model))  # where a public class is defined, not where users import it from

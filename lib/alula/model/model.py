@@ -12,6 +12,7 @@ from dataclasses import dataclass, field, replace
 from enum import Enum
 from functools import cached_property
 
+from alula.common.public import public
 from alula.model.expressions import TRUE, Comparison, DataIs, Expression
 from alula.model.span import NOWHERE, Span
 
@@ -285,6 +286,7 @@ class Property:
     span: Span = field(default=NOWHERE, compare=False)
 
 
+@public()
 @dataclass(frozen=True)
 class Skillset:
     """Skills of one subsystem with the data and resources that they share (paper, section 4.1).

@@ -6,6 +6,8 @@ import time
 from collections.abc import Callable
 from dataclasses import dataclass, field, replace
 
+from alula.common.errors import AlulaError
+
 DEFAULT_TIME_S = 30.0
 """How long the proofs of a file may take."""
 
@@ -14,7 +16,7 @@ EVERY_S = 5.0
 """How often a long search says how far it is."""
 
 
-class OutOfTimeError(Exception):
+class OutOfTimeError(AlulaError):
     """The time given is over."""
 
 

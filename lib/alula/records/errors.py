@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from alula.common.errors import AlulaError
 
-class AnalysisError(Exception):
+
+class AnalysisError(AlulaError):
     """A file can't be read, or a request does not fit it; the message names the place and the remedy."""

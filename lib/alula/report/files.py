@@ -8,8 +8,10 @@ from collections.abc import Iterator
 from contextlib import contextmanager
 from pathlib import Path
 
+from alula.common.errors import AlulaError
 
-class ReportError(Exception):
+
+class ReportError(AlulaError):
     """Something in the run's folder can't be used; the message names it."""
 
 

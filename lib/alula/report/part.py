@@ -8,6 +8,7 @@ from pathlib import Path
 from typing import Any, Protocol
 
 from alula.common.faults import FaultChange
+from alula.common.public import public
 from alula.common.robots import find_robot
 from alula.common.scenarios import Scenario
 from alula.records.causes.effects import EffectsByFault
@@ -24,6 +25,7 @@ Entry = tuple[str, float | None, object]
 """An entry of the page: topic, seconds of mission clock, value."""
 
 
+@public("alula.parts")
 @dataclass(frozen=True)
 class ReportedRun:
     """What a report is about."""
@@ -39,6 +41,11 @@ class ReportedRun:
         return self.facts.out_dir
 
     @property
+    def world(self) -> Path:
+        """The file of the world that its scenario names."""
+        return find_robot().world(self.scenario.world)
+
+    @property
     def title(self) -> str:
         """Return what stands above its pictures."""
         facts = self.facts
@@ -48,6 +55,7 @@ class ReportedRun:
         return f"{facts.scenario}, seed {facts.seed}{failing}{', over mocks' if facts.mock else ''}"
 
 
+@public("alula.parts")
 @dataclass(frozen=True)
 class Task:
     """Something that the mission was sent out for, such as a parcel; ``why`` says of one that is not done what came between."""
@@ -57,6 +65,7 @@ class Task:
     why: str = ""
 
 
+@public("alula.parts")
 @dataclass(frozen=True)
 class Findings:
     """What the parts of a report have found. ``landed``: came back as far as more is known than the skillsets tell; None: nothing more."""
@@ -67,6 +76,7 @@ class Findings:
     tasks: Sequence[Task] = ()
 
 
+@public("alula.parts")
 class ReportPart(Protocol):
     """A robot's part of a report; its methods are called once each, in this order. Errors become problems of the report."""
 
@@ -87,6 +97,7 @@ class ReportPart(Protocol):
         ...
 
 
+@public("alula.parts")
 class NoPart:
     """The report of a robot that adds nothing."""
 

@@ -4,12 +4,14 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 
+from alula.common.public import public
 from alula.common.robots import RobotError, find_robot
 from alula.report.history import History
 from alula.report.observed import Observed
 from alula.runtime.core.events import TransitionEvent
 
 
+@public("alula.parts")
 @dataclass(frozen=True)
 class Phases:
     """Absolute seconds of mission clock. ``zero_s`` is the origin of all times of a report: the departure where it is known.

@@ -6,6 +6,8 @@ from collections.abc import Callable, Mapping
 from types import SimpleNamespace
 from typing import TYPE_CHECKING, ClassVar, TypeVar
 
+from alula.common.public import public
+
 if TYPE_CHECKING:
     from alula.runtime.core.execution import Execution
 
@@ -24,6 +26,7 @@ def is_written(hooks: SkillHooks, name: str) -> bool:
     return not getattr(getattr(hooks, name), "unwritten", False)
 
 
+@public()
 class SkillHooks:
     """Base of all hooks; every method may be overridden, ``on_dispatch`` should be.
 

@@ -7,6 +7,7 @@ from collections.abc import Callable, Collection, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from pathlib import Path
 
+from alula.common.errors import AlulaError
 from alula.trees.blackboard import Clock
 from alula.trees.document import Element
 from alula.trees.errors import TickError, did_you_mean
@@ -24,7 +25,7 @@ NO_CHILDREN = CHILDREN[Category.ACTION]
 WORDS = {name: answer for name, answer in ANSWERS.items() if answer is not IDLE}
 
 
-class AnswersError(Exception):
+class AnswersError(AlulaError):
     """A file of answers is wrong, or does not fit the tree; the message names it and says what to write."""
 
 

@@ -6,6 +6,9 @@ import difflib
 from collections.abc import Callable, Iterable
 from dataclasses import dataclass
 
+from alula.common.errors import AlulaError
+from alula.common.public import public
+
 
 @dataclass(frozen=True)
 class Place:
@@ -38,10 +41,12 @@ class Problem:
         return f"{self.place}: {self.message}" + (f"; {self.cure}" if self.cure else "")
 
 
-class TreeError(Exception):
+@public("alula.trees")
+class TreeError(AlulaError):
     """A tree can't be read, built or ticked; the message is one line that says what and where."""
 
 
+@public("alula.trees")
 class FileError(TreeError):
     """A tree's file is wrong; ``problem`` says where."""
 
@@ -50,6 +55,7 @@ class FileError(TreeError):
         self.problem = problem
 
 
+@public("alula.trees")
 class TickError(TreeError):
     """A node can't be ticked: a port has no value, a script fails, a child answers what it may not."""
 

@@ -8,10 +8,11 @@ from __future__ import annotations
 
 from collections.abc import Callable, Iterator, Mapping
 from dataclasses import dataclass, field
-from typing import ClassVar, Protocol
+from typing import ClassVar, Protocol, TypeVar
 
 from py_trees.behaviour import Behaviour
 
+from alula.common.public import public
 from alula.trees.blackboard import Blackboard, Clock, Entry
 from alula.trees.document import Element
 from alula.trees.errors import TickError
@@ -23,6 +24,7 @@ Watcher = Callable[["Node", Status, Status], None]
 """Told of a node, what it was, and what it is now: at each change, in their order."""
 
 
+@public("alula.trees")
 class Script(Protocol):
     """A script that was read, over a node's blackboard; raises TickError."""
 
@@ -93,10 +95,13 @@ def pointer(text: str, name: str) -> str | None:
     return stripped[1:-1] if len(stripped) >= 3 and stripped[0] == "{" and stripped[-1] == "}" else None
 
 
+@public("alula.trees")
 class Node(Behaviour):  # type: ignore[misc]  # py_trees is seen untyped
     """One node of a tree. A class of one's own derives from one of those below, and declares its ports."""
 
     category: ClassVar[Category]
+    registered_name: ClassVar[str] = ""
+    """What files call it, as `register` has it; empty: the name of the class."""
     ports: ClassVar[tuple[Port, ...]] = ()
     child_count: ClassVar[tuple[int, int | None] | None] = None
     """How many children it may have, from and to; None: as its category."""
@@ -115,6 +120,9 @@ class Node(Behaviour):  # type: ignore[misc]  # py_trees is seen untyped
         self.uid = wiring.uid
         self._shared = wiring.shared
         self._constants: dict[str, object] = {}
+
+    def setup(self) -> None:
+        """Prepare what ticks need, such as the scripts of ports; called once, when the tree is built. What it raises says where."""
 
     # --- ticks ---------------------------------------------------------------------------------------------------------
 
@@ -236,12 +244,26 @@ class Node(Behaviour):  # type: ignore[misc]  # py_trees is seen untyped
         except ValueError as error:
             raise TickError(f"{self.place()}: the port '{port}': {error}") from None
 
+    def script(self, port: str, default: str | None = None) -> Script:
+        """Compile the script that a port holds; to be called in `setup`. Raises FileError where it can't be read, TickError without one."""
+        text = self.wiring.ports.get(port, default)
+        if text is None:
+            raise TickError(f"{self.place()}: the port '{port}' is not given")
+        return self.wiring.compile(text, port)
+
     def number(self, port: str) -> int:
         """Return the value of an input that is a whole number."""
         value = self.get(port)
         if isinstance(value, int):
             return value
         raise TickError(f"{self.place()}: the port '{port}' is no whole number")
+
+    def real(self, port: str) -> float:
+        """Return the value of an input that is a number."""
+        value = self.get(port)
+        if isinstance(value, int | float):
+            return float(value)
+        raise TickError(f"{self.place()}: the port '{port}' is no number")
 
     def put(self, port: str, value: object) -> None:
         """Write an output; nothing is written where the file gives no entry for it."""
@@ -263,6 +285,21 @@ class Node(Behaviour):  # type: ignore[misc]  # py_trees is seen untyped
         return f"{self.wiring.element.place} ({self.name})"
 
 
+NodeT = TypeVar("NodeT", bound=Node)
+
+
+@public("alula.trees")
+def register(name: str) -> Callable[[type[NodeT]], type[NodeT]]:
+    """Give a class of nodes the name by which files have it, such as ``rover.NextDoor``; what is not registered has its class's name."""
+
+    def named(node: type[NodeT]) -> type[NodeT]:
+        node.registered_name = name
+        return node
+
+    return named
+
+
+@public("alula.trees")
 class Leaf(Node):
     """A node without children that ends in each tick."""
 
@@ -273,6 +310,7 @@ class Leaf(Node):
         self.become(IDLE)
 
 
+@public("alula.trees")
 class SyncAction(Leaf):
     """An action that is done in one tick."""
 
@@ -284,12 +322,14 @@ class SyncAction(Leaf):
         return answer
 
 
+@public("alula.trees")
 class Condition(Leaf):
     """A leaf that asks, and changes nothing."""
 
     category = Category.CONDITION
 
 
+@public("alula.trees")
 class Action(Leaf):
     """An action that may take several ticks."""
 
@@ -319,6 +359,7 @@ class Action(Leaf):
         """Interrupt what runs; must not wait for its end."""
 
 
+@public("alula.trees")
 class Control(Node):
     """A node with children."""
 
@@ -344,6 +385,7 @@ class Control(Node):
         child.become(IDLE)
 
 
+@public("alula.trees")
 class Decorator(Control):
     """A node with one child."""
 

@@ -7,6 +7,7 @@ from dataclasses import dataclass, field
 from enum import Enum
 from typing import TYPE_CHECKING
 
+from alula.common.public import public
 from alula.trees.values import ANY, PortType
 
 if TYPE_CHECKING:
@@ -31,6 +32,7 @@ class Direction(Enum):
     INOUT = "inout_port"
 
 
+@public("alula.trees")
 @dataclass(frozen=True)
 class Port:
     """A port: ``default`` is text as in a file, None where there is none; ``unit`` is of a number, as ``m/s``."""
@@ -45,16 +47,19 @@ class Port:
     """A file has to give it; else a node does without it, or says so when it is ticked."""
 
 
+@public("alula.trees")
 def input_port(name: str, type_: PortType = ANY, default: str | None = None, doc: str = "", *, unit: str = "") -> Port:
     """Return a port that is read."""
     return Port(name, type_, Direction.INPUT, default, doc, unit)
 
 
+@public("alula.trees")
 def output_port(name: str, type_: PortType = ANY, default: str | None = None, doc: str = "", *, unit: str = "") -> Port:
     """Return a port that is written; it has to name an entry of the blackboard."""
     return Port(name, type_, Direction.OUTPUT, default, doc, unit)
 
 
+@public("alula.trees")
 def inout_port(name: str, type_: PortType = ANY, default: str | None = None, doc: str = "", *, unit: str = "") -> Port:
     """Return a port that is read and written."""
     return Port(name, type_, Direction.INOUT, default, doc, unit)
@@ -73,11 +78,13 @@ class NodeType:
     """How many it may have, from and to; None: any number."""
 
     def wired(self, wiring: Wiring) -> Node:
-        """Make a node."""
+        """Make a node, ready to be ticked; raises FileError."""
         if self.make is None:
             msg = f"{self.name} is known from a model only, there is nothing to tick"
             raise TypeError(msg)
-        return self.make(wiring)
+        node = self.make(wiring)
+        node.setup()
+        return node
 
 
 CHILDREN: Mapping[Category, tuple[int, int | None]] = {
@@ -94,6 +101,12 @@ def node_type(
 ) -> NodeType:
     """Return a type that nothing can be made of yet, with the number of children that its category has."""
     return NodeType(name, category, {port.name: port for port in ports}, doc, None, children or CHILDREN[category])
+
+
+def name_in_files(node: type[Node]) -> str:
+    """Return what files call a class of nodes."""
+    own = vars(node).get("registered_name", "")  # that of a base is the base's
+    return str(own) or node.__name__
 
 
 class Palette:
@@ -113,10 +126,10 @@ class Palette:
         self._types[one.name] = one
 
     def register(self, make: type[Node], name: str = "") -> NodeType:
-        """Add a class of one's own under a name, that of the class unless another is given; its ports are what it declares."""
+        """Add a class of one's own, whose ports are what it declares, under a name: as it was registered unless another is given."""
         doc = (make.__doc__ or "").strip().partition("\n")[0]
         ports = {port.name: port for port in make.ports}
-        one = NodeType(name or make.__name__, make.category, ports, doc, make, make.child_count or CHILDREN[make.category])
+        one = NodeType(name or name_in_files(make), make.category, ports, doc, make, make.child_count or CHILDREN[make.category])
         self.add(one)
         return one
 

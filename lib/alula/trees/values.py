@@ -7,6 +7,7 @@ import re
 from collections.abc import Callable
 from dataclasses import dataclass, field
 
+from alula.common.public import public
 from alula.trees.status import ANSWERS, NAMES, Skipped, Status
 
 LARGEST_UINT = 2**32 - 1
@@ -29,6 +30,7 @@ def literal(text: str) -> object:
     return number if math.isfinite(number) else text
 
 
+@public("alula.trees")
 @dataclass(frozen=True, eq=False)
 class PortType:
     """A type: ``parse`` reads text, ``cast`` takes a value that is no text; both raise ValueError."""
@@ -139,6 +141,7 @@ NUMBERS = (INT, UINT, DOUBLE, BOOL, *SIZED.values())
 TYPES = {one.name: one for one in (*NUMBERS, STRING, STATUS, ANY)}
 
 
+@public("alula.trees")
 def list_of(item: PortType) -> PortType:
     """Return the type of a list, whose items stand in text between semicolons."""
     name = f"std::vector<{item.name}>"

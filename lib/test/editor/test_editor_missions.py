@@ -97,16 +97,17 @@ OWN = """
 import pathlib
 
 from alula.missions.part import MissionPart
-from alula.trees.node import SyncAction
+from alula.trees.node import SyncAction, register
 
 pathlib.Path(__file__).with_name("imported").touch()
 
 
+@register("robot.Wait")
 class Wait(SyncAction):
     pass
 
 
-PART = MissionPart(nodes=(("robot.Wait", Wait),))
+PART = MissionPart(nodes=(Wait,))
 """
 
 

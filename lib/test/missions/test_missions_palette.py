@@ -36,10 +36,17 @@ skillset arm {
 """
 
 NODES = """
-from alula.missions.part import MissionPart
-from alula.trees.nodes.leaves import AlwaysSuccess
+from alula.parts import MissionPart
+from alula.trees import SUCCESS, SyncAction, register
 
-PART = MissionPart((("arm.Choose", AlwaysSuccess),))
+
+@register("arm.Choose")
+class Choose(SyncAction):
+    def update(self):
+        return SUCCESS
+
+
+PART = MissionPart((Choose,))
 """
 
 

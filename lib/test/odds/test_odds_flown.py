@@ -11,7 +11,6 @@ from fetch_and_carry import by_hand
 from odds_flights import Flights, only
 
 from alula.campaign.mocked_scenarios import load_mocked_scenario
-from alula.cli.odds import steps_of
 from alula.common.robots import find_robot
 from alula.language.models import check_files, models_in
 from alula.missions.director import Outcome
@@ -23,6 +22,7 @@ from alula.odds.figures import Figures
 from alula.odds.graph import explore
 from alula.odds.odds import Odds, odds_of
 from alula.odds.reading import load_figures
+from alula.odds.robot import steps_of
 from alula.records.causes.fault_file import effects_of_robot
 
 CARRIER = Path(__file__).parent / "carrier"

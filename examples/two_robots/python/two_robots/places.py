@@ -7,23 +7,18 @@ from pathlib import Path
 
 import yaml
 
-from alula.missions.part import MissionPart
-from alula.missions.plan import InputError, Inputs
-from alula.trees.errors import TickError
-from alula.trees.node import SyncAction, Wiring
-from alula.trees.palette import Port, input_port, output_port
-from alula.trees.status import FAILURE, SUCCESS, Answer
-from alula.trees.values import ANY, STRING
+from alula import parts
+from alula.trees import ANY, FAILURE, STRING, SUCCESS, Answer, Port, SyncAction, TickError, input_port, output_port, register
 
 
-def inputs_of(path: Path) -> Inputs:
+def inputs_of(path: Path) -> parts.Inputs:
     """Read ``landing``, [x, y, z] in the drone's map, and ``T_rover_drone``, {x, y, theta}; raises InputError."""
     try:
         said = yaml.safe_load(path.read_text(encoding="utf-8"))
         landing = _numbers(said["drone"])
         x, y, theta = _numbers(said["maps"])
     except (OSError, yaml.YAMLError, KeyError, TypeError, ValueError) as error:
-        raise InputError(f"{path}: needs `drone: [x, y, z]` and `maps: [x, y, theta]`: {' '.join(str(error).split())}") from error
+        raise parts.InputError(f"{path}: needs `drone: [x, y, z]` and `maps: [x, y, theta]`: {' '.join(str(error).split())}") from error
     return {"landing": landing, "T_rover_drone": {"x": x, "y": y, "theta": theta}}
 
 
@@ -33,6 +28,7 @@ def _numbers(said: object) -> list[float]:
     return [float(number) for number in said]
 
 
+@register("two_robots.InRoversMap")
 class InRoversMap(SyncAction):
     """Brings a place from the drone's map into the rover's, as a pose there that is turned as the maps are; fails while it is not known."""
 
@@ -43,9 +39,9 @@ class InRoversMap(SyncAction):
         output_port("target", ANY, doc="x, y, theta in the rover's map"),
     )
 
-    def __init__(self, wiring: Wiring) -> None:
-        super().__init__(wiring)
-        self._place = [wiring.compile(wiring.ports[port], port) for port in ("x", "y")]
+    def setup(self) -> None:
+        """Read the scripts."""
+        self._place = [self.script(port) for port in ("x", "y")]
 
     def update(self) -> Answer:
         """Write it."""
@@ -67,4 +63,4 @@ class InRoversMap(SyncAction):
         return SUCCESS
 
 
-PART = MissionPart((("two_robots.InRoversMap", InRoversMap),))
+PART = parts.MissionPart((InRoversMap,))

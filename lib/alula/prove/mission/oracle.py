@@ -5,13 +5,15 @@ from __future__ import annotations
 from collections.abc import Callable, Hashable, Sequence
 from dataclasses import dataclass
 
+from alula.common.errors import AlulaError
+
 Question = tuple[Hashable, ...]
 Answer = Hashable
 View = Callable[[Question], Answer]
 """Answers the observations of a tick."""
 
 
-class UndecidedError(Exception):
+class UndecidedError(AlulaError):
     """A node needs a value that the search does not know; the message names it."""
 
 

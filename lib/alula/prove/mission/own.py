@@ -13,8 +13,8 @@ from alula.prove.mission.robot import Memory, Robot
 from alula.prove.mission.runnable import names_in, remembered, why_not
 from alula.prove.mission.unknown import Unknown, UnknownText, is_unknown, unknown
 from alula.trees.errors import TickError
-from alula.trees.node import Condition, Control, Node, SyncAction, pointer
-from alula.trees.palette import CHILDREN, Category, Direction, NodeType, Port
+from alula.trees.node import Condition, Control, Node, SyncAction, pointer, register
+from alula.trees.palette import CHILDREN, Category, Direction, NodeType, Port, name_in_files
 from alula.trees.status import FAILURE, IDLE, RUNNING, SKIPPED, SUCCESS, Answer, Skipped
 
 DECLARED = "the file declares it, and no class is known"
@@ -66,7 +66,8 @@ def own_nodes(robot: Robot, part: MissionPart, declared: Sequence[NodeType], why
     nodes: list[tuple[str, type[Node]]] = []
     taken: list[Taken] = []
     leaves: list[str] = []
-    for name, real in part.nodes:
+    for real in part.nodes:
+        name = name_in_files(real)
         if has_children(real.category, real.child_count):
             reason = why_not(real) or why
             nodes.append((name, _any_order(robot, real) if reason else _run(real)))
@@ -83,7 +84,7 @@ def own_nodes(robot: Robot, part: MissionPart, declared: Sequence[NodeType], why
     run = {one.name for one in taken if not one.why_not}
     free = tuple(leaves) if known else ()
     unread = tuple(name for name, _ in nodes if name not in run and name not in free)
-    return OwnNodes(MissionPart(tuple(nodes), memory=Memory), tuple(taken), unread, free, why)
+    return OwnNodes(MissionPart(tuple(register(name)(node) for name, node in nodes), memory=Memory), tuple(taken), unread, free, why)
 
 
 def has_children(category: Category, count: tuple[int, int | None] | None) -> bool:

@@ -17,10 +17,28 @@ from types import FunctionType
 from alula.trees.node import Control, Decorator, Node
 from alula.trees.status import Skipped, Status
 
-OURS = ("alula.trees.node", "alula.trees.nodes", "alula.missions")
+OURS = ("alula.trees.node.", "alula.trees.nodes.", "alula.missions.", "py_trees.")
 """Modules of classes that are known to be so."""
+FACE = "alula.trees"
+"""What says that it defines the classes of `alula.trees.node`, which are public there."""
 OF_THE_NODE = frozenset(
-    {"child", "children", "status", "name", "now_ns", "get", "put", "given", "number", "place", "update", "execute", "halt", "halt_node"}
+    {
+        "child",
+        "children",
+        "status",
+        "name",
+        "now_ns",
+        "get",
+        "put",
+        "given",
+        "number",
+        "real",
+        "place",
+        "update",
+        "execute",
+        "halt",
+        "halt_node",
+    }
     | {"become", "give_way", "reset_child", "reset_children"}
 )
 """What code may use of its own node."""
@@ -47,7 +65,7 @@ EXPRESSIONS = (
 )
 PARTS = (ast.arguments, ast.arg, ast.keyword, ast.comprehension, ast.expr_context, ast.operator, ast.boolop, ast.unaryop, ast.cmpop)
 SYNTAX = (*STATEMENTS, *EXPRESSIONS, *PARTS)
-DECLARED = frozenset({"ports", "category", "child_count", "remembers", "remembers_running"})
+DECLARED = frozenset({"ports", "category", "child_count", "remembers", "remembers_running", "registered_name"})
 WORDS = "feedback_message"
 """What nodes say of themselves, which decides nothing."""
 CONSTANT = (type(None), bool, int, float, str, Status, Skipped)
@@ -66,11 +84,11 @@ def why_not(real: type[Node]) -> str:
         for one in _of_others(real):
             for name, value in vars(one).items():
                 _member(real, sets, name, value)
-        late = sets - _assigned(real, "__init__")
+        late = sets - _assigned(real, "__init__") - _assigned(real, "setup")
     except _RefusedError as error:
         return str(error)
     missing = [name for name in sorted(late) if not hasattr(real, name)]
-    return f"`self.{missing[0]}` is not there from the begin: set it in `__init__`" if missing else ""
+    return f"`self.{missing[0]}` is not there from the begin: set it in `setup`" if missing else ""
 
 
 def remembered(real: type[Node]) -> tuple[str, ...]:
@@ -91,7 +109,7 @@ def names_in(real: type[Node]) -> frozenset[str]:
 
 def _of_others(real: type[Node]) -> Iterator[type]:
     """Yield the classes that a robot's author has written."""
-    ours = (one for one in real.__mro__ if one.__module__.startswith((*OURS, "py_trees.")) or one is object)
+    ours = (one for one in real.__mro__ if one is object or one.__module__ == FACE or f"{one.__module__}.".startswith(OURS))
     known = frozenset(ours)
     yield from (one for one in real.__mro__ if one not in known)
 
@@ -202,7 +220,7 @@ class _Code:
 
     def _name(self, node: ast.Name) -> None:
         value = self._value(node)
-        if isinstance(value, FunctionType) and not value.__module__.startswith("alula."):
+        if isinstance(value, FunctionType) and not f"{value.__module__}.".startswith("alula."):
             if value not in self._above:
                 _Code(self._real, self._sets, value, method=False, above=self._above).look()
         elif not (_is_constant(value) or value is math or self._is_harmless(value)):
@@ -211,7 +229,7 @@ class _Code:
     @staticmethod
     def _is_harmless(value: object) -> bool:
         """Tell whether it is a function or a class of Python's or of ours that keeps nothing."""
-        if isinstance(value, type) and value.__module__.startswith(("builtins", "alula.", "py_trees.")):
+        if isinstance(value, type) and f"{value.__module__}.".startswith(("builtins.", "alula.", "py_trees.")):
             return value in _BUILTINS or issubclass(value, Exception | Node | Status | Skipped)
         return any(value is one for one in _BUILTINS)
 

@@ -13,7 +13,7 @@ from alula.records.causes.failures import SkillFailure
 from alula.records.causes.faults import EARLY_S
 from alula.records.causes.wording import in_words, state_text, why_of
 from alula.runtime.core.events import EngineEvent, ExecutionEvent, TransitionEvent
-from alula.runtime.core.records import ExecutionRecord
+from alula.runtime.core.records import ExecutionRecord, executions_of
 
 REACTION_S = 3.0
 """For so long after a failure the mission's reaction is looked for; in a pause, after its end."""
@@ -164,10 +164,5 @@ def _reaction(failure: SkillFailure, scene: Scene, failures: Sequence[SkillFailu
 
 def _others(events: Sequence[EngineEvent], failure: SkillFailure) -> list[ExecutionRecord]:
     """Return the executions of a run but for the one that failed."""
-    found: dict[tuple[str, str, str], ExecutionRecord] = {}
-    for event in events:
-        if isinstance(event, ExecutionEvent):
-            key = (event.skillset, event.skill, event.id)
-            found[key] = found[key].then(event) if key in found else ExecutionRecord.begun(event)
-    found.pop((failure.end.skillset, failure.end.skill, failure.end.id), None)
-    return list(found.values())
+    ended = (failure.end.skillset, failure.end.skill, failure.end.id)
+    return [one for one in executions_of(events) if (one.skillset, one.skill, one.id) != ended]

@@ -8,6 +8,7 @@ from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any
 
+from alula.common.errors import AlulaError
 from alula.common.record import BLACKBOARD, DATA, DECISIONS, EVENTS, FILE, MISSION, REPORTS, TICKS, TREE, Entry, RecordError, RecordFollower
 from alula.model.execution_state import ExecutionState
 from alula.records.tree import path_to
@@ -16,7 +17,7 @@ from alula.runtime.core.events import EngineEvent, ExecutionEvent, read_event
 EXTERN = "extern"
 
 
-class ReplayError(Exception):
+class ReplayError(AlulaError):
     """A replay can't be made as it was asked for; the message says why, in one line."""
 
 

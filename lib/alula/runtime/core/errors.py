@@ -2,6 +2,10 @@
 
 from __future__ import annotations
 
+from alula.common.errors import AlulaError
+from alula.common.public import public
 
-class SkillRuntimeError(Exception):
+
+@public()
+class SkillRuntimeError(AlulaError):
     """Root of the errors of this package."""

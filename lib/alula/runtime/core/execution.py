@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Mapping
 from typing import Protocol
 
+from alula.common.public import public
 from alula.model.execution_state import ExecutionState
 from alula.model.unmet import Unmet
 
@@ -29,6 +30,7 @@ class Controller(Protocol):
         ...
 
 
+@public()
 class Execution:
     """One execution of a skill. Its attributes are written by the engine only, and read from any thread.
 

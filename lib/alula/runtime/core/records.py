@@ -6,6 +6,7 @@ from collections import deque
 from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass, replace
 
+from alula.common.public import public
 from alula.model.execution_state import ExecutionState
 from alula.model.model import ResultKind, Skillset
 from alula.runtime.core.events import NANOSECONDS, EngineEvent, ExecutionEvent, TransitionEvent
@@ -27,6 +28,7 @@ class ResourceStatus:
     reason: str = ""
 
 
+@public("alula.parts")
 @dataclass(frozen=True)
 class ExecutionRecord:
     """One execution, open or ended, by its events. Stamps are mission clock; None: that has not happened.
@@ -80,6 +82,16 @@ class ExecutionRecord:
             started_ns=event.stamp_ns if starts else self.started_ns,
             ended_ns=event.stamp_ns if event.state.terminal else None,
         )
+
+
+def executions_of(events: Iterable[EngineEvent]) -> list[ExecutionRecord]:
+    """Return the executions that events tell of, by age."""
+    found: dict[tuple[str, str, str], ExecutionRecord] = {}
+    for event in events:
+        if isinstance(event, ExecutionEvent):
+            key = (event.skillset, event.skill, event.id)
+            found[key] = found[key].then(event) if key in found else ExecutionRecord.begun(event)
+    return list(found.values())
 
 
 @dataclass(frozen=True)

@@ -7,11 +7,13 @@ from collections.abc import Callable, Mapping, Sequence
 from enum import Enum
 from typing import Any, Protocol
 
+from alula.common.public import public
 from alula.common.robots import find_robot
 from alula.common.scenarios import Scenario
 from alula.runtime.live.spec import RunSpec
 
 
+@public("alula.parts")
 class Consequence(Enum):
     """What the supervisor does when a process has died by itself."""
 
@@ -25,6 +27,7 @@ DEAD_S = 10.0
 """Mission clock: a node that was not started again for so long stays dead."""
 
 
+@public("alula.parts")
 class Clock(Protocol):
     """The mission clock as the supervisor sees it."""
 
@@ -44,6 +47,7 @@ class Clock(Protocol):
         ...
 
 
+@public("alula.parts")
 class RunPart:
     """Adds nothing; a robot's part overrides what it needs.
 

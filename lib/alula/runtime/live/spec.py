@@ -8,15 +8,19 @@ from dataclasses import asdict, dataclass, field, fields
 from pathlib import Path
 from typing import Any
 
+from alula.common.errors import AlulaError
 from alula.common.files import write_json
+from alula.common.public import public
 
 FILE = "run.json"
 
 
-class RequestError(Exception):
+@public("alula.parts")
+class RequestError(AlulaError):
     """The command line asks for something that can't be; the message names it and the remedy in one line."""
 
 
+@public("alula.parts")
 @dataclass(frozen=True)
 class RunSpec:
     """One run.

@@ -6,6 +6,7 @@ import functools
 from collections.abc import Callable, Coroutine, Iterable, Mapping
 from typing import TypeVar
 
+from alula.common.public import public
 from alula.model.model import Skillset
 from alula.runtime.client import Client
 from alula.runtime.core.events import EngineEvent
@@ -27,6 +28,7 @@ class LocalClient(Client):
         super().__init__(VirtualMiddleware(bus, name), name)
 
 
+@public()
 class LocalWorld:
     """Serves skillsets and hands out clients; deterministic: the same calls make the same run.
 

@@ -5,6 +5,7 @@ from __future__ import annotations
 import socket
 from dataclasses import dataclass
 
+from alula.common.errors import AlulaError
 from alula.common.network import free_port
 from alula.trees.groot.protocol import DEFAULT_PORT
 
@@ -14,7 +15,7 @@ PORTS_IN_A_ROW = 2
 """Replies and what is published, as Groot2's protocol has it."""
 
 
-class ServerError(Exception):
+class ServerError(AlulaError):
     """The tree can't be served; the message names the address and the remedy."""
 
 

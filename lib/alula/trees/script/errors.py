@@ -2,8 +2,10 @@
 
 from __future__ import annotations
 
+from alula.common.errors import AlulaError
 
-class ScriptError(Exception):
+
+class ScriptError(AlulaError):
     """A script that can't be read, or that fails as it runs.
 
     ``offset`` counts characters from the script's begin, 0-based; ``end`` is exclusive. ``excess``: it is longer or deeper than any

@@ -6,7 +6,7 @@ import random
 from typing import Any, ClassVar
 
 from alula.missions.part import MissionPart
-from alula.trees.node import Action, Control, Decorator, SyncAction, Wiring
+from alula.trees.node import Action, Control, Decorator, SyncAction, Wiring, register
 from alula.trees.palette import input_port, output_port
 from alula.trees.status import FAILURE, IDLE, RUNNING, SKIPPED, SUCCESS, Answer
 from alula.trees.values import ANY, DOUBLE, INT
@@ -14,6 +14,7 @@ from alula.trees.values import ANY, DOUBLE, INT
 SECOND_NS = 1e9
 
 
+@register("robot.Guard")
 class Guard(Decorator):
     """Ticks its child."""
 
@@ -22,6 +23,7 @@ class Guard(Decorator):
         return self.child.execute()
 
 
+@register("robot.Limit")
 class Limit(Decorator):
     """Begins its child once in a while only, and runs in between; declares nothing of what it remembers."""
 
@@ -40,6 +42,7 @@ class Limit(Decorator):
         return RUNNING if answer is SUCCESS else answer
 
 
+@register("robot.Recovery")
 class Recovery(Control):
     """As Nav2's: when the first child fails the second one is ticked, and then the first one again."""
 
@@ -75,6 +78,7 @@ class Recovery(Control):
         self._tried, self._mends = 0, False
 
 
+@register("robot.ByTurns")
 class ByTurns(Control):
     """Ticks another child each time that it begins, through a function of its own that knows the last one."""
 
@@ -102,6 +106,7 @@ def following(last: int, count: int) -> int:
     return (last + 1) % count
 
 
+@register("robot.Careless")
 class Careless(Control):
     """Succeeds when all of its children have begun, and leaves them running, also when it is halted."""
 
@@ -117,6 +122,7 @@ class Careless(Control):
         self.become(IDLE)
 
 
+@register("robot.Moody")
 class Moody(Control):
     """Does anything with its children, by chance, and answers anything."""
 
@@ -145,6 +151,7 @@ class Moody(Control):
         self.become(IDLE)
 
 
+@register("robot.Counted")
 class Counted(Decorator):
     """Ticks its child as many times as a number says that only the world knows."""
 
@@ -165,6 +172,7 @@ class Counted(Decorator):
         return RUNNING if answer is SUCCESS else answer
 
 
+@register("robot.Seldom")
 class Seldom(Decorator):
     """Ticks its child in each tick of a hundred, and counts all of them."""
 
@@ -178,6 +186,7 @@ class Seldom(Decorator):
         return self.child.execute() if self.child.status is RUNNING or self.ticks % 7 == 0 else RUNNING
 
 
+@register("robot.Shy")
 class Shy(Action):
     """A leaf that may be skipped."""
 
@@ -197,9 +206,10 @@ RUN = {"robot.Guard": Guard, "robot.Limit": Limit, "robot.Recovery": Recovery, "
 """Those whose class the search runs."""
 ANYHOW = {"robot.Moody": Moody, "robot.Counted": Counted, "robot.Seldom": Seldom}
 """Those that may do anything there."""
-PART = MissionPart((*RUN.items(), *ANYHOW.items(), ("robot.Shy", Shy)))
+PART = MissionPart((*RUN.values(), *ANYHOW.values(), Shy))
 
 
+@register("robot.Place")
 class Place(SyncAction):
     """Computes with what it is given: succeeds where that is near."""
 

@@ -23,7 +23,7 @@ from alula.prove.mission.prover import LOOKED_AT
 from alula.prove.mission.state import State
 from alula.prove.mission.system import System
 from alula.runtime.core.events import ExecutionEvent
-from alula.trees.node import SyncAction
+from alula.trees.node import SyncAction, register
 from alula.trees.palette import output_port
 from alula.trees.status import Answer
 from alula.trees.values import INT
@@ -91,6 +91,7 @@ def test_numbers_that_the_search_does_not_know_are_not_said_to_be_equal(tmp_path
         assert verdict(tmp_path, COUNTS, COUNTS.replace(before, after)).verdict != EQUAL, after
 
 
+@register("robot.Wishes")
 class Wishes(SyncAction):
     """A node of a robot's own that says how many rounds there are."""
 
@@ -113,7 +114,7 @@ ROUNDS = """<Sequence>
 def test_rounds_by_a_number_of_the_world_are_told_from_one_round_by_a_flight(tmp_path: Path) -> None:
     """The flight counts: it meets 1 where the search has met a number that it did not know."""
     (tmp_path / "example.xml").write_text(whole(ROUNDS))
-    judge = Judge(Robot(tmp_path, (DRONE,), MissionPart((("robot.Wishes", Wishes),)), {}), "example")
+    judge = Judge(Robot(tmp_path, (DRONE,), MissionPart((Wishes,)), {}), "example")
     once = next(text for kind, _, text in trees.altered(whole(ROUNDS)) if kind == trees.RETRY_DROPPED)
     one = judge.judge(Mutant("example", "by hand", "", "example.xml", once))
     assert (one.verdict, one.by, one.flown) == (FOUND, ANOTHER_RUN, True), one

@@ -27,7 +27,7 @@ from alula.prove.mission.regions import Regions
 from alula.prove.mission.run import MissionFinding
 from alula.prove.mission.runnable import why_not
 from alula.prove.mission.system import System
-from alula.trees.node import Control, Decorator, Node
+from alula.trees.node import Control, Decorator, Node, register
 from alula.trees.status import FAILURE, RUNNING, SUCCESS, Answer
 from finding_pages.mission_checks import whole
 
@@ -70,6 +70,7 @@ def test_a_property_is_held_against_what_is_below_a_node_of_the_robots_own(kind:
     assert not play(tmp_path / "mission.xml", against.run, PART).left
 
 
+@register("robot.Never")
 class Never(Decorator):
     """Does not tick its child."""
 
@@ -79,7 +80,7 @@ class Never(Decorator):
 
 
 def test_a_class_that_is_run_is_known_exactly(tmp_path: Path) -> None:
-    several = found(tmp_path, f"<robot.Never {STILL}><r1.drive/></robot.Never>", MissionPart((("robot.Never", Never),)))
+    several = found(tmp_path, f"<robot.Never {STILL}><r1.drive/></robot.Never>", MissionPart((Never,)))
     assert codes(several) == {"ALU703", "ALU715"}
 
 
@@ -160,7 +161,7 @@ def known_to(folder: Path, text: str, inputs: Mapping[str, object]) -> System:
     names = "".join(f'<input_port name="{name}"/>' for name in inputs)
     path = folder / "mission.xml"
     path.write_text(whole(text).replace("</root>", f'<TreeNodesModel><SubTree ID="mission">{names}</SubTree></TreeNodesModel></root>'))
-    part = MissionPart((("robot.Place", own_nodes.Place),))
+    part = MissionPart((own_nodes.Place,))
     return System.read(path, (eyes,), part, Failures(refusals=False, hooks=False, aborts=False), known=inputs)
 
 

@@ -40,7 +40,7 @@ from alula.records.causes.fault_file import states_of_faults
 from alula.runtime.core.execution import Execution
 from alula.runtime.hooks import SkillHooks
 from alula.runtime.local import LocalManagers, LocalWorld
-from alula.trees.node import Condition, SyncAction
+from alula.trees.node import Condition, SyncAction, register
 from alula.trees.palette import input_port, output_port
 from alula.trees.status import FAILURE, RUNNING, SUCCESS, Answer
 from alula.trees.values import ANY, INT, STRING
@@ -114,6 +114,7 @@ ROUND = (
 )
 
 
+@register("robot.Pick")
 class Pick(SyncAction):
     """A node of the robot's own, which the search sees nothing of but its ports."""
 
@@ -128,6 +129,7 @@ class Pick(SyncAction):
         return SUCCESS if self.chance.random() < 0.8 else FAILURE
 
 
+@register("robot.Use")
 class Use(Condition):
     """Another, which reads what the other has written."""
 
@@ -138,7 +140,7 @@ class Use(Condition):
         return SUCCESS if isinstance(self.get("thing"), dict) else FAILURE
 
 
-PART = MissionPart((("robot.Pick", Pick), ("robot.Use", Use)))
+PART = MissionPart((Pick, Use))
 
 
 def test_every_code_has_an_example() -> None:

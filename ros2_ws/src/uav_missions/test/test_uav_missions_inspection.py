@@ -5,42 +5,25 @@ from __future__ import annotations
 import itertools
 import random
 from dataclasses import replace
-from pathlib import Path
 
 import pytest
 
-from alula.common.faults import FaultRequest, parse_fault
-from alula.common.scenarios import load_scenario
-from alula.missions.director import Outcome
-from alula.missions.mocked import MockedMission
-from alula.missions.scenario import plan_of
-from alula.mock import load_behaviour
-from alula.records.models import robot_skillsets
-from alula.runtime.core import ExecutionEvent
-from uav_missions.route import inputs_of, route_of
+from alula import Mission, MockedMission, Outcome
+from uav_missions.route import route_of
 
-ALULA_ROOT = Path(__file__).resolve().parents[4]
-SCENARIO = load_scenario("inspection")
-WORLD = ALULA_ROOT / "ros1_ws/src/uav_simulator/worlds/building.yaml"
-INPUTS = inputs_of(WORLD)
-PLAN = plan_of(SCENARIO, INPUTS)
-ROUTE = route_of(INPUTS).waypoints
-SKILLSETS = robot_skillsets(SCENARIO.skillsets)
-BEHAVIOUR = load_behaviour([ALULA_ROOT / "skillsets/uav/mock.yaml"], robot_skillsets()).of(frozenset(SCENARIO.skillsets))
+MISSION = Mission.load("inspection")
+ROUTE = route_of(MISSION.plan.inputs).waypoints
 
 
 def fly(*faults: str, seed: int = 0, tick_period_s: float = 0.1) -> MockedMission:
-    requests: list[FaultRequest] = [parse_fault(fault) for fault in faults]
-    mission = MockedMission(SKILLSETS, BEHAVIOUR, PLAN, faults=requests, seed=seed, tick_period_s=tick_period_s)
-    mission.end = mission.run()
+    mission = MISSION.mocked(*faults, seed=seed, tick_period_s=tick_period_s)
+    mission.run()
     return mission
 
 
 def ends(mission: MockedMission) -> list[tuple[str, str, str]]:
     """Return how the executions ended, in the order in which they did."""
-    found = [event for event in mission.events if isinstance(event, ExecutionEvent)]
-    begun = {"REQUESTED", "RUNNING", "INTERRUPTING"}
-    return [(event.skill, event.state.name, event.result) for event in found if event.state.name not in begun]
+    return [(event.skill, event.state.name, event.result) for event in mission.ended]
 
 
 def on_ground(mission: MockedMission) -> bool:
@@ -48,7 +31,7 @@ def on_ground(mission: MockedMission) -> bool:
 
 
 def test_the_plan_has_the_scenarios_name_and_skillsets():
-    assert (PLAN.scenario, PLAN.skillsets) == ("inspection", SCENARIO.skillsets)
+    assert (MISSION.plan.scenario, MISSION.plan.skillsets) == ("inspection", tuple(one.name for one in MISSION.skillsets))
 
 
 def test_a_nominal_flight_goes_all_around_with_the_nose_to_the_walls():
@@ -75,8 +58,9 @@ def test_a_lost_video_stops_hovers_and_lands_in_this_order():
 
 def test_from_the_stream_s_failure_to_hover_takes_less_than_a_second():
     mission = fly("radio@40")
-    stamps = {(e.skill, e.state.name): e.stamp_ns for e in mission.events if isinstance(e, ExecutionEvent)}
-    assert 0 < stamps["hover", "RUNNING"] - stamps["stream", "RESOURCE_INVARIANT_VIOLATED"] < 1e9
+    hover, stream = ([one for one in mission.executions if one.skill == skill][-1] for skill in ("hover", "stream"))
+    assert stream.state.name == "RESOURCE_INVARIANT_VIOLATED"
+    assert 0 < hover.started_ns - stream.ended_ns < 1e9
 
 
 def test_a_dead_encoder_is_told_as_such_and_ends_the_flight_as_a_lost_video_does():
@@ -141,8 +125,8 @@ def test_without_a_ground_station_the_drone_does_not_take_off():
 
 def test_an_encoder_that_was_never_heard_of_is_named_and_not_the_radio_alone():
     link = ("video", "link")
-    silent = replace(BEHAVIOUR, timeline=tuple(event for event in BEHAVIOUR.timeline if link not in event.states))
-    end = MockedMission(SKILLSETS, silent, PLAN).run()
+    silent = replace(MISSION.behaviour, timeline=tuple(event for event in MISSION.behaviour.timeline if link not in event.states))
+    end = replace(MISSION, behaviour=silent).run()
     assert end.outcome is Outcome.NOT_STARTED
     assert "neither the video encoder nor the ground station" in end.reason
 

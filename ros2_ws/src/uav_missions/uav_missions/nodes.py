@@ -4,12 +4,22 @@ from __future__ import annotations
 
 import math
 
-from alula.missions.part import MissionPart
-from alula.trees.errors import TickError
-from alula.trees.node import Condition, SyncAction
-from alula.trees.palette import input_port, output_port
-from alula.trees.status import FAILURE, SUCCESS, Answer
-from alula.trees.values import ANY, DOUBLE, INT, PortType
+from alula import parts
+from alula.trees import (
+    ANY,
+    DOUBLE,
+    FAILURE,
+    INT,
+    SUCCESS,
+    Answer,
+    Condition,
+    PortType,
+    SyncAction,
+    TickError,
+    input_port,
+    output_port,
+    register,
+)
 from uav_missions.route import Route, route_of, wrap_rad
 
 
@@ -29,6 +39,7 @@ def _heights(value: object) -> list[float]:
 HEIGHTS = PortType("std::vector<double>", _heights, _heights)
 
 
+@register("uav.NextWaypoint")
 class NextWaypoint(SyncAction):
     """Writes the waypoint that is next on the route (paper, Figure 10), and the heading across the leg to it; fails when there is none.
 
@@ -72,6 +83,7 @@ class NextWaypoint(SyncAction):
         return route
 
 
+@register("uav.PointsTo")
 class PointsTo(Condition):
     """Succeeds when a heading that was taken is another one, within a tolerance; fails also when none was taken yet."""
 
@@ -86,10 +98,8 @@ class PointsTo(Condition):
         entry = self.entry("taken")
         if entry is None or entry.value is None:
             return FAILURE
-        taken, heading, tolerance = (self.get(port) for port in ("taken", "heading", "tolerance"))
-        if not isinstance(taken, float) or not isinstance(heading, float) or not isinstance(tolerance, float):
-            return FAILURE
-        return SUCCESS if abs(wrap_rad(taken - heading)) < tolerance else FAILURE
+        apart_rad = abs(wrap_rad(self.real("taken") - self.real("heading")))
+        return SUCCESS if apart_rad < self.real("tolerance") else FAILURE
 
 
-PART = MissionPart((("uav.NextWaypoint", NextWaypoint), ("uav.PointsTo", PointsTo)), check_inputs=route_of)
+PART = parts.MissionPart((NextWaypoint, PointsTo), check_inputs=route_of)

@@ -10,13 +10,13 @@ from pathlib import Path
 
 import yaml
 
-from alula.missions.plan import InputError, Inputs
+from alula import parts
 
 Waypoint = tuple[float, float, float]
 SHORT_LEG_M = 0.1  # a leg shorter than this on the ground has no heading of its own
 
 
-class RouteError(InputError):
+class RouteError(parts.InputError):
     """A route can't be used; the message says what is wrong with it and where."""
 
 
@@ -66,7 +66,7 @@ def wrap_rad(angle_rad: float) -> float:
     return math.pi if wrapped == -math.pi else wrapped
 
 
-def route_of(inputs: Inputs) -> Route:
+def route_of(inputs: parts.Inputs) -> Route:
     """Return the route of a mission's inputs, a list of [x, y, z]; raises RouteError."""
     waypoints = inputs.get("route")
     if not isinstance(waypoints, list) or not waypoints:
@@ -74,7 +74,7 @@ def route_of(inputs: Inputs) -> Route:
     return Route([_read_waypoint(number, entry) for number, entry in enumerate(waypoints, start=1)])
 
 
-def inputs_of(path: Path) -> Inputs:
+def inputs_of(path: Path) -> parts.Inputs:
     """Read the inputs of a mission of the drone from a world: the key ``route`` of a YAML or JSON file, a list of [x, y, z].
 
     Raises:

@@ -18,7 +18,7 @@ from std_srvs.srv import SetBool, Trigger
 from uav_msgs.msg import GuidanceState, MappingState, Obstacle, VideoState
 from uav_msgs.srv import Command, SetHeadingReference, SetPositionReference, Stream, Takeoff
 
-from skillset_ros2.base import QUIET
+from skillset_ros2 import QUIET
 from uav_skills.calls import CallQueue, Reply, ignore_response
 
 WATCH_PERIOD_S = 0.1

@@ -13,14 +13,14 @@ import threading
 from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any, ClassVar
 
-from alula.runtime.hooks import SkillHooks
+from alula import SkillHooks
 from uav_skills.calls import Reply, Response, ignore_response
 from uav_skills.decisions import DEFAULT_THRESHOLDS, SkillEnd, Thresholds, remaining_part, speaks_of
 
 if TYPE_CHECKING:
     from uav_msgs.msg import GuidanceState
 
-    from alula.runtime.core.execution import Execution
+    from alula import Execution
     from uav_skills.functional import GuidanceApi
 
 AUTHORITY_INVARIANT = "keep_sdk_authority"

@@ -15,8 +15,7 @@ from uav_skills.watched import WatchedSkill
 if TYPE_CHECKING:
     from rclpy.node import Node
 
-    from alula.runtime.core.execution import Execution
-    from alula.runtime.hooks import SkillHooks
+    from alula import Execution, SkillHooks
     from uav_skills.decisions import SkillEnd
 
 

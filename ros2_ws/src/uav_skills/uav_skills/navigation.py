@@ -29,8 +29,7 @@ if TYPE_CHECKING:
     from rclpy.node import Node
     from uav_msgs.msg import GuidanceState
 
-    from alula.runtime.core.execution import Execution
-    from alula.runtime.hooks import SkillHooks
+    from alula import Execution, SkillHooks
 
 LOCK_RATE_RAD_S = 0.6
 

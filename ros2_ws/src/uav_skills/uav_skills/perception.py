@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING
 
 from perception_managers.hooks import AbstractLidarDepthmapSkill, AbstractZedDepthmapSkill
 
-from alula.runtime.hooks import SkillHooks
+from alula import SkillHooks
 from uav_skills.decisions import decide_watch
 from uav_skills.functional import DepthApi
 from uav_skills.serve import serve
@@ -16,7 +16,7 @@ from uav_skills.watched import WatchedSkill
 if TYPE_CHECKING:
     from rclpy.node import Node
 
-    from alula.runtime.core.execution import Execution
+    from alula import Execution
     from uav_skills.decisions import SkillEnd
 
 

@@ -12,7 +12,7 @@ if TYPE_CHECKING:
 
     from rclpy.node import Node
 
-    from alula.runtime.hooks import SkillHooks
+    from alula import SkillHooks
 
 
 def serve(skillset: str, make_hooks: Callable[[Node], Mapping[str, SkillHooks]]) -> None:

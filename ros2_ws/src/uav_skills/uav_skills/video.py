@@ -17,8 +17,7 @@ if TYPE_CHECKING:
     from rclpy.node import Node
     from video_managers.inputs import StreamInputs
 
-    from alula.runtime.core.execution import Execution
-    from alula.runtime.hooks import SkillHooks
+    from alula import Execution, SkillHooks
     from uav_skills.decisions import SkillEnd
 
 

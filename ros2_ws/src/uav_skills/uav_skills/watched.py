@@ -5,10 +5,10 @@ from __future__ import annotations
 import threading
 from typing import TYPE_CHECKING
 
-from alula.runtime.hooks import SkillHooks
+from alula import SkillHooks
 
 if TYPE_CHECKING:
-    from alula.runtime.core.execution import Execution
+    from alula import Execution
     from uav_skills.calls import Response
     from uav_skills.decisions import SkillEnd
     from uav_skills.functional import FunctionalPart

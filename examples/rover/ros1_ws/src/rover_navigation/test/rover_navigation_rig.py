@@ -5,7 +5,7 @@ from __future__ import annotations
 from pathlib import Path
 
 import numpy as np
-from alula.common.faults import parse_faults
+from alula import parts
 
 from rover_navigation.geometry import compose, inverse, points_of
 from rover_navigation.grid_map import load_map
@@ -24,7 +24,7 @@ class Rig:
     def __init__(self, faults="", *, doors=("kitchen", "office", "workshop", "store", "side")):
         self.world = load_world(WORLDS / "office.yaml")
         self.grid = load_map(WORLDS / "office_map.yaml")
-        self.simulation = Simulation(self.world, seed=1, faults=parse_faults(faults))
+        self.simulation = Simulation(self.world, seed=1, faults=parts.parse_faults(faults))
         for door in doors:
             self.simulation.open_door(door, wide=True)
         self.around = Surroundings(self.grid)

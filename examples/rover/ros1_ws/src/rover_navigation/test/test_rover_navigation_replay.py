@@ -10,7 +10,7 @@ import sys
 import pytest
 import rosbag
 from actionlib_msgs.msg import GoalID, GoalStatus
-from alula.common.faults import parse_faults
+from alula import parts
 from move_base_msgs.msg import MoveBaseActionGoal, MoveBaseActionResult
 from rover_navigation_rig import WORLDS
 from std_msgs.msg import Bool, Float32
@@ -42,7 +42,7 @@ def searched(bag, simulation, *, ends):
 def drive(tmp_path_factory):
     """A rover that leaves its dock, is carried away, and turns round once: its measurements, a search, and what nodes said then."""
     path = tmp_path_factory.mktemp("drive") / "functional.bag"
-    simulation = Simulation(load_world(WORLD), seed=1, faults=parse_faults(f"pose:lost@{CARRIED_S}"))
+    simulation = Simulation(load_world(WORLD), seed=1, faults=parts.parse_faults(f"pose:lost@{CARRIED_S}"))
     with rosbag.Bag(str(path), "w") as bag:
         for step in range(round(END_S / 0.05)):
             simulation.step()

@@ -6,7 +6,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from alula.common.faults import FaultError, parse_faults
+from alula import parts
 
 from rover_simulator.drawing import draw
 from rover_simulator.errors import WorldError
@@ -20,7 +20,7 @@ WORLD = Path(__file__).parents[4] / "worlds/office.yaml"
 
 
 def driven(faults="", seconds=10.0, v=-0.3, w=0.2):
-    simulation = Simulation(load_world(WORLD), seed=4, faults=parse_faults(faults, FAULTS))
+    simulation = Simulation(load_world(WORLD), seed=4, faults=parts.parse_faults(faults, FAULTS))
     while simulation.now_s < seconds:
         simulation.wheels.command(v, w, simulation.now_s)
         simulation.step()
@@ -103,8 +103,8 @@ def test_a_person_who_waits_before_the_rover_goes_back_when_asked():
 
 
 def test_what_can_not_be_read_is_refused(tmp_path):
-    with pytest.raises(FaultError, match="laser can't be 'purple'"):
-        parse_faults("laser:purple", FAULTS)
+    with pytest.raises(parts.FaultError, match="laser can't be 'purple'"):
+        parts.parse_faults("laser:purple", FAULTS)
     with pytest.raises(WorldError, match="No such file"):
         load_world(tmp_path / "no.yaml")
     (tmp_path / "bad.yaml").write_text(WORLD.read_text(encoding="utf-8").replace("dock: [0.57, 5.4, 3.14]", "dock: [0.57]"))

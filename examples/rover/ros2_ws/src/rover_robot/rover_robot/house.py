@@ -8,13 +8,13 @@ from pathlib import Path
 from typing import Any
 
 import yaml
-from alula.missions.plan import InputError, Inputs
+from alula import parts
 
 Pose = dict[str, float]
 """``x``, ``y`` (m) and ``theta`` (rad) in the frame ``map``: a geometry_msgs/Pose2D."""
 
 
-def inputs_of(path: Path) -> Inputs:
+def inputs_of(path: Path) -> parts.Inputs:
     """Read what the missions are given from a world: ``parcels`` with the rooms of both ends, ``rounds``, all doors of the ``house``.
 
     A room is ``{name, inside, ways}``, a way a list of doors ``{door, at, safe}``; all poses as `Pose`.
@@ -29,11 +29,11 @@ def inputs_of(path: Path) -> Inputs:
         rounds = [house.place(name) for name in said["rounds"]]
         return {"parcels": parcels, "rounds": rounds, "safe": rounds[-1], "house": house.doors()}
     except OSError as error:
-        raise InputError(f"{path}: {error.strerror}") from error
+        raise parts.InputError(f"{path}: {error.strerror}") from error
     except KeyError as error:
-        raise InputError(f"{path}: there is no {error}; worlds/office.yaml has all that a world needs") from error
+        raise parts.InputError(f"{path}: there is no {error}; worlds/office.yaml has all that a world needs") from error
     except (yaml.YAMLError, TypeError, ValueError) as error:
-        raise InputError(f"{path}: {' '.join(str(error).split())}") from error
+        raise parts.InputError(f"{path}: {' '.join(str(error).split())}") from error
 
 
 class House:

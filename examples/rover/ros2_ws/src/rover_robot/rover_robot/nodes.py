@@ -4,12 +4,8 @@ from __future__ import annotations
 
 from typing import Any, ClassVar
 
-from alula.missions.part import MissionPart
-from alula.trees.errors import TickError
-from alula.trees.node import SyncAction
-from alula.trees.palette import Port, input_port, output_port
-from alula.trees.status import FAILURE, SUCCESS, Answer
-from alula.trees.values import ANY, INT, STRING
+from alula import parts
+from alula.trees import ANY, FAILURE, INT, STRING, SUCCESS, Answer, Port, SyncAction, TickError, input_port, output_port, register
 
 COUNT = input_port("done", INT, doc="how many of them are behind")
 MANY = output_port("count", INT, doc="how many there are")
@@ -44,6 +40,7 @@ class Next(SyncAction):
         return {port.name for port in self.ports}
 
 
+@register("rover.NextParcel")
 class NextParcel(Next):
     """The parcel that is next, and the rooms at its two ends."""
 
@@ -72,6 +69,7 @@ class NextParcel(Next):
         return str(entry["name"])
 
 
+@register("rover.NextWay")
 class NextWay(Next):
     """A way into a room that was not tried yet: its doors; and the place in the room."""
 
@@ -96,6 +94,7 @@ class NextWay(Next):
         return f"{room['name']} by {' and '.join(door['door'] for door in entry)}"
 
 
+@register("rover.NextDoor")
 class NextDoor(Next):
     """The next door on a way: where the rover stands before it, and the safe place near it."""
 
@@ -120,6 +119,7 @@ class NextDoor(Next):
         return str(entry["door"])
 
 
+@register("rover.NextPlace")
 class NextPlace(Next):
     """The next place of a round."""
 
@@ -136,6 +136,4 @@ class NextPlace(Next):
         return f"({entry['x']:g}, {entry['y']:g})"
 
 
-PART = MissionPart(
-    (("rover.NextParcel", NextParcel), ("rover.NextWay", NextWay), ("rover.NextDoor", NextDoor), ("rover.NextPlace", NextPlace))
-)
+PART = parts.MissionPart((NextParcel, NextWay, NextDoor, NextPlace))

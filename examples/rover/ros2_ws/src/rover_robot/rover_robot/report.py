@@ -6,17 +6,10 @@ import json
 import math
 from typing import TYPE_CHECKING, Any
 
-from alula.common.record import BLACKBOARD, MISSION, read_record
-from alula.common.record import Entry as RecordEntry
-from alula.model.execution_state import ExecutionState
-from alula.report.part import Findings, NoPart, Task
+from alula import ExecutionState, Record, parts
 
 if TYPE_CHECKING:
     from collections.abc import Iterator, Sequence
-
-    from alula.report.part import Entry, ReportedRun
-    from alula.report.phases import Phases
-    from alula.runtime.core.records import ExecutionRecord
 
 BAG, TRUTH, STATE = "functional.bag", "/truth/odom", "/truth/state"
 PERIOD_S = 0.2
@@ -27,29 +20,29 @@ Place = tuple[float, float, float]
 """Seconds of mission clock, x and y in metres, frame map."""
 
 
-class RoverReport(NoPart):
+class RoverReport(parts.NoPart):
     """Of a run over mocks there is nothing to show: there is no floor."""
 
-    def __init__(self, run: ReportedRun) -> None:
+    def __init__(self, run: parts.ReportedRun) -> None:
         self._run = run
         self._way: list[Place] = []
 
-    def measure(self, phases: Phases, *_: object) -> Findings:
+    def measure(self, phases: parts.Phases, *_: object) -> parts.Findings:
         """Read where the rover truly was; ``distance_m``: how far it went since it left its dock; ``collisions``: how often it hit something."""
-        tasks: list[Task] = []
+        tasks: list[parts.Task] = []
         with self._run.problems.survive("the parcels"):
-            tasks = list(parcels(read_record(self._run.folder), self._run.history.executions))
+            tasks = list(parcels(Record(self._run.folder), self._run.history.executions))
         if self._run.facts.mock:
-            return Findings({"distance_m": None}, tasks=tasks)
+            return parts.Findings({"distance_m": None}, tasks=tasks)
         collisions: int | None = None
         with self._run.problems.survive(BAG):
             self._way, collisions = _truth(str(self._run.folder / BAG))
         since = phases.zero_s
         away = [place[1:] for place in self._way if place[0] >= since]
         driven_m = round(sum(map(math.dist, away, away[1:])), 2) if away else None
-        return Findings({"distance_m": driven_m, "collisions": collisions}, tasks=tasks)
+        return parts.Findings({"distance_m": driven_m, "collisions": collisions}, tasks=tasks)
 
-    def entries(self) -> Iterator[Entry]:
+    def entries(self) -> Iterator[parts.Entry]:
         """Return the outlines of what stands on the floor, and the way."""
         if self._run.facts.mock:
             return
@@ -62,31 +55,32 @@ class RoverReport(NoPart):
                 yield "/path", round(t_s, 3), [round(x, 3), round(y, 3), 0.0]
 
 
-def parcels(entries: Sequence[RecordEntry], executions: Sequence[ExecutionRecord]) -> Iterator[Task]:
+def parcels(record: Record, executions: Sequence[parts.ExecutionRecord]) -> Iterator[parts.Task]:
     """Return what became of each parcel that the mission was given, by what it counted; none for a mission that was given none."""
-    given = [entry.value.get("inputs") for entry in entries if entry.topic == MISSION]
+    given = [entry.value.get("inputs") for entry in record.topic("/mission")]
     names = [parcel["name"] for parcel in given[0].get("parcels", ())] if given and isinstance(given[0], dict) else []
     dealt: list[tuple[float, bool]] = []  # by parcel: until when it was the one that was dealt with, and whether it was delivered
     handled = delivered = 0
-    for entry in entries:
-        if entry.topic == BLACKBOARD:
-            before, delivered = delivered, int(entry.value.get("delivered", delivered))
-            if (handled := int(entry.value.get("handled", handled))) > len(dealt):
-                dealt.append((entry.stamp_s, delivered > before))
+    for entry in record.topic("/blackboard"):
+        before, delivered = delivered, int(entry.value.get("delivered", delivered))
+        if (handled := int(entry.value.get("handled", handled))) > len(dealt):
+            dealt.append((entry.stamp_s, delivered > before))
     since_s = -math.inf
     for name, (until_s, done) in zip(names, dealt, strict=False):
-        yield Task(name, done, "" if done else _why(executions, since_s, until_s))
+        yield parts.Task(name, done, "" if done else _why(executions, since_s, until_s))
         since_s = until_s
     for name in names[len(dealt) :]:
         moved = [one.result for one in executions if _parcel_of(one) == name and one.result in {"LOADED", "UNLOADED"}]
-        yield Task(name, done=False, why="the mission ended with it in the box" if moved[-1:] == ["LOADED"] else "the mission ended before")
+        yield parts.Task(
+            name, done=False, why="the mission ended with it in the box" if moved[-1:] == ["LOADED"] else "the mission ended before"
+        )
 
 
-def _parcel_of(execution: ExecutionRecord) -> object:
+def _parcel_of(execution: parts.ExecutionRecord) -> object:
     return execution.inputs.get("parcel") if isinstance(execution.inputs, dict) else None
 
 
-def _why(executions: Sequence[ExecutionRecord], since_s: float, until_s: float) -> str:
+def _why(executions: Sequence[parts.ExecutionRecord], since_s: float, until_s: float) -> str:
     """Return what ended otherwise than it should, the last of these, while a parcel was dealt with."""
     ended = [one for one in executions if one.ended_s is not None and since_s < one.ended_s <= until_s and one.skill in DONE]
     failed = [one for one in ended if one.state is ExecutionState.TERMINATED and one.result != DONE[one.skill]]
@@ -108,14 +102,13 @@ def _truth(bag: str) -> tuple[list[Place], int | None]:
     return way, collisions
 
 
-def _edges(run: ReportedRun) -> list[list[float]]:
+def _edges(run: parts.ReportedRun) -> list[list[float]]:
     import shapely
-    from alula.common.robots import find_robot
 
     from rover_simulator.drawing import outlines
     from rover_simulator.world import load_world
 
-    standing: Any = outlines(load_world(find_robot().world(run.scenario.world)))
+    standing: Any = outlines(load_world(run.world))
     rings = [ring for part in shapely.get_parts(standing) for ring in (part.exterior, *part.interiors)]
     lines = [(one, other) for ring in rings for one, other in zip(list(ring.coords), list(ring.coords)[1:], strict=False)]
     return [[round(value, 2) for x, y in line for value in (x, y, 0.0)] for line in lines]

@@ -10,7 +10,7 @@ from actionlib_msgs.msg import GoalID
 from nav_msgs.msg import Odometry
 
 if TYPE_CHECKING:
-    from alula.runtime.live.part import Clock
+    from alula import parts
 
 SERVERS = ("move_base", "follow_corridor", "creep", "dock", "localize")
 STANDS_M_S, STANDS_RAD_S = 0.01, 0.02
@@ -38,7 +38,7 @@ class Standing:
         return self._since_s is not None and self.now_s - self._since_s >= STANDING_S
 
 
-def stand(clock: Clock) -> None:
+def stand(clock: parts.Clock) -> None:
     """Return when the rover stands, or when that takes too long."""
     cancels = [rospy.Publisher(f"/{server}/cancel", GoalID, queue_size=1) for server in SERVERS]
     standing, begin_s = Standing(), clock.now_s or 0.0

@@ -5,42 +5,37 @@ from __future__ import annotations
 from collections.abc import Mapping
 from typing import TYPE_CHECKING, Any
 
-from alula.runtime.live.part import Consequence, RunPart
-from alula.runtime.live.spec import RequestError
+from alula import parts
 
 if TYPE_CHECKING:
     from argparse import ArgumentParser, Namespace
 
-    from alula.common.scenarios import Scenario
-    from alula.runtime.live.part import Clock
-    from alula.runtime.live.spec import RunSpec
-
 MAX_RATE = 1000.0
 
 
-class RoverRun(RunPart):
+class RoverRun(parts.RunPart):
     """Adds ``--rate``, which the launch file takes by that name."""
 
     # Time ends with the simulator. All else is started again. Without a bridge no mission decides; of a navigation that stays dead the
     # mission hears by its hooks: README, Drives.
-    consequences: Mapping[str, Consequence] = {"simulator": Consequence.END}
-    stays_dead: Mapping[str, Consequence] = {"ros_bridge": Consequence.REST}
+    consequences: Mapping[str, parts.Consequence] = {"simulator": parts.Consequence.END}
+    stays_dead: Mapping[str, parts.Consequence] = {"ros_bridge": parts.Consequence.REST}
 
     def add_options(self, parser: ArgumentParser) -> None:
         """Add it."""
         parser.add_argument("--rate", type=float, default=1.0, help="simulated seconds per second at most, 0: no limit (default 1)")
 
-    def read(self, given: Namespace, scenario: Scenario) -> Mapping[str, Any]:
+    def read(self, given: Namespace, scenario: parts.Scenario) -> Mapping[str, Any]:
         """Return it; raises RequestError."""
         if not 0.0 <= given.rate <= MAX_RATE:  # also refuses nan
-            raise RequestError(f"--rate {given.rate:g}: must be 0 (no limit) or a positive factor up to {MAX_RATE:g}")
+            raise parts.RequestError(f"--rate {given.rate:g}: must be 0 (no limit) or a positive factor up to {MAX_RATE:g}")
         return {"rate": given.rate}
 
-    def clock_source(self, spec: RunSpec) -> str:
+    def clock_source(self, spec: parts.RunSpec) -> str:
         """Say where ``/clock`` comes from."""
         return "the simulator"
 
-    def bring_to_rest(self, clock: Clock) -> None:
+    def bring_to_rest(self, clock: parts.Clock) -> None:
         """Have it stand where it is."""
         from rover_robot.resting import stand  # late: it needs ROS 1
 

@@ -12,8 +12,7 @@ from pathlib import Path
 
 import rosgraph
 import rospy
-from alula.common.faults import FaultError, parse_faults
-from alula.common.signals import StopEvent
+from alula import parts
 from geometry_msgs.msg import Twist
 from nav_msgs.msg import Odometry
 from resource_reporter import ToldService
@@ -49,7 +48,7 @@ class SimulatorNode:
 
     def __init__(self) -> None:
         param = rospy.get_param
-        faults = parse_faults(param("~faults", ""), FAULTS)
+        faults = parts.parse_faults(param("~faults", ""), FAULTS)
         self._simulation = Simulation(load_world(Path(param("~world"))), seed=int(param("~seed", 0)), faults=faults)
         self._rate = float(param("~rate", 1.0))  # simulated seconds a second at most; 0: as fast as it can
         self._start_timeout_s = float(param("~start_timeout_s", 45.0))
@@ -59,7 +58,7 @@ class SimulatorNode:
         self._steps = 0
         self._told = ""
         self._left_out: list[str] = []
-        self._stopping = StopEvent()
+        self._stopping = parts.StopEvent()
         self._inbox: queue.SimpleQueue[Callable[[], None]] = queue.SimpleQueue()  # what other threads want done between two steps
         self._clock = rospy.Publisher("/clock", Clock, queue_size=20)
         self._odom = rospy.Publisher("/odom", Odometry, queue_size=20)
@@ -205,7 +204,7 @@ def main() -> None:
     rospy.init_node("simulator", disable_signals=True)
     try:
         node = SimulatorNode()
-    except (WorldError, FaultError) as error:
+    except (WorldError, parts.FaultError) as error:
         rospy.logfatal(str(error))
         raise SystemExit(2) from error
     for number in (signal.SIGINT, signal.SIGTERM):

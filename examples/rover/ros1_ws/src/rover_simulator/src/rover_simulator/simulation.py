@@ -8,7 +8,7 @@ from dataclasses import asdict, dataclass, field, replace
 from typing import Any
 
 import numpy as np
-from alula.common.faults import FaultRequest
+from alula import parts
 
 from rover_simulator.battery import Battery
 from rover_simulator.faults import FaultBoard
@@ -41,7 +41,7 @@ class Truth:
 class Simulation:
     """Steps everything; the caller decides when, and asks for the measurements that it wants."""
 
-    def __init__(self, world: World, *, seed: int, faults: Sequence[FaultRequest] = ()) -> None:
+    def __init__(self, world: World, *, seed: int, faults: Sequence[parts.FaultRequest] = ()) -> None:
         self._world = world
         self.floor = Floor(world, seed)
         self.wheels = Wheels(np.random.default_rng([seed, 1]))

@@ -19,8 +19,7 @@ from rover_robot.hooks.clock import Watch
 from rover_robot.hooks.journey import Journey
 
 if TYPE_CHECKING:
-    from alula.runtime.core.execution import Execution
-    from alula.runtime.hooks import SkillHooks
+    from alula import Execution, SkillHooks
     from rclpy.node import Node
 
 STANDS_M_S, STANDS_RAD_S = 0.01, 0.02

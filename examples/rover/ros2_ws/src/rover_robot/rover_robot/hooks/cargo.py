@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING
 
-from alula.runtime.hooks import SkillHooks
+from alula import SkillHooks
 from cargo_managers.hooks import AbstractAskSkill, AbstractLoadSkill, AbstractOpenDoorSkill, AbstractUnloadSkill
 from std_msgs.msg import String
 from std_srvs.srv import SetBool
@@ -12,7 +12,7 @@ from std_srvs.srv import SetBool
 from rover_robot.hooks.clock import Watch
 
 if TYPE_CHECKING:
-    from alula.runtime.core.execution import Execution
+    from alula import Execution
     from rclpy.client import Client
     from rclpy.node import Node
 

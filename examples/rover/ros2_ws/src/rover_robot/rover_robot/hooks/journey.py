@@ -7,13 +7,13 @@ import threading
 from typing import TYPE_CHECKING, Any
 
 from action_msgs.msg import GoalStatus
-from alula.runtime.hooks import SkillHooks
+from alula import SkillHooks
 from geometry_msgs.msg import Pose2D
 from move_base_msgs.action import MoveBase
 from skillset_ros2 import ActionClient
 
 if TYPE_CHECKING:
-    from alula.runtime.core.execution import Execution
+    from alula import Execution
     from rclpy.node import Node
 
     from rover_robot.hooks.clock import Watch

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING, Any
 
-from alula.runtime.hooks import SkillHooks
+from alula import SkillHooks
 from perception_managers.hooks import AbstractBumperSkill, AbstractScanSkill
 from sensor_msgs.msg import LaserScan
 from std_msgs.msg import Bool
@@ -12,7 +12,7 @@ from std_msgs.msg import Bool
 from rover_robot.hooks.clock import Watch
 
 if TYPE_CHECKING:
-    from alula.runtime.core.execution import Execution
+    from alula import Execution
     from rclpy.node import Node
 
 SILENT_S = 2.0

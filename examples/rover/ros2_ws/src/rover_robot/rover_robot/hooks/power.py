@@ -11,8 +11,7 @@ from sensor_msgs.msg import BatteryState
 from rover_robot.hooks.clock import Watch
 
 if TYPE_CHECKING:
-    from alula.runtime.core.execution import Execution
-    from alula.runtime.hooks import SkillHooks
+    from alula import Execution, SkillHooks
     from power_managers.inputs import ChargeInputs
     from rclpy.node import Node
 
