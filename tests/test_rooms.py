@@ -210,3 +210,80 @@ def test_the_bridge_uses_only_what_both_worlds_share() -> None:
         if name.startswith("alula.") and not name.startswith("alula.common")
     ]
     assert not found, "\n".join(found)
+
+
+PUBLIC = {"alula", "alula.trees", "alula.parts", "skillset_ros2", "skillset_ros1"}
+"""What a robot's own code may import of Alula, by name and not below."""
+ROBOTS = ("examples", "lib/alula/generate/scaffold/robot", "ros2_ws/src/uav_missions", "ros2_ws/src/uav_skills")
+HELPERS = "alula_testing"
+"""Of the checkout's tests."""
+INSIDE = {
+    "uav_missions_fakes.py": "clients that a test ends",
+    "test_uav_missions_director.py": "the director around the drone's tree",
+    "test_uav_missions_live.py": "the record while it is written",
+    "test_uav_skills_decisions.py": "a robot's folder without its parts",
+}
+"""Tests of the drone that look below the API, each at what."""
+PRIVATE_IMPORT = re.compile(r"^\s*(?:from|import) +(alula[\w.]*|skillset_ros[12][\w.]*)(?: +import +(.*))?", re.MULTILINE)
+
+
+def robots_texts() -> Iterator[Path]:
+    """Yield the files of robots that are or become Python, tests too."""
+    for room in ROBOTS:
+        for path in sorted((ALULA_ROOT / room).rglob("*")):
+            # Scripts of ROS packages have no suffix.
+            if path.is_file() and path.suffix in {".py", ".in", ""} and not {"__pycache__", ".alula", "runs"} & set(path.parts):
+                yield path
+
+
+def imported_by(text: str) -> Iterator[tuple[int, str]]:
+    """Yield the modules of Alula that a text imports, with their lines; one that is imported `from alula` counts as its own name."""
+    for match in PRIVATE_IMPORT.finditer(text):
+        line = text.count("\n", 0, match.start(1)) + 1
+        module, names = match[1], re.findall(r"\w+", (match[2] or "").partition(" as ")[0])
+        yield line, module
+        if module == "alula":
+            yield from ((line, f"alula.{name}") for name in names if (ALULA_ROOT / "lib/alula" / name).is_dir())
+
+
+def private_imports(path: Path) -> list[str]:
+    """Return what a file imports that is not public."""
+    text = path.read_text(encoding="utf-8", errors="ignore")
+    return [f"{path}:{line}: {name}" for line, name in imported_by(text) if name not in PUBLIC and name.partition(".")[0] != HELPERS]
+
+
+def test_a_robots_own_code_imports_only_what_is_public() -> None:
+    paths = [path for path in robots_texts() if path.name not in INSIDE]
+    assert len([path for path in paths if PRIVATE_IMPORT.search(path.read_text(encoding="utf-8", errors="ignore"))]) > 20
+    assert [line for path in paths for line in private_imports(path)] == []
+
+
+def test_what_looks_below_the_api_is_needed_and_starts_no_command_line() -> None:
+    looked = {path.name: private_imports(path) for path in robots_texts() if path.name in INSIDE}
+    assert {name for name, found in looked.items() if found} == set(INSIDE), "one that needs nothing private any more can go"
+    assert not [line for found in looked.values() for line in found if re.search(r"alula\.(commands|cli|api)", line)]
+
+
+@pytest.mark.parametrize(
+    ("line", "private"),
+    [
+        ("from alula import Mission, parts", []),
+        ("from alula.trees import register", []),
+        ("    from alula.parts import RunPart", []),
+        ("from skillset_ros2 import Robot", []),
+        ("from alula.trees.node import Action", ["alula.trees.node"]),
+        ("from alula import missions", ["alula.missions"]),
+        ("import alula.runtime.local as local", ["alula.runtime.local"]),
+        ("from skillset_ros2.base import QUIET", ["skillset_ros2.base"]),
+    ],
+)
+def test_what_is_private_is_seen(line: str, private: list[str]) -> None:
+    assert [name for _, name in imported_by(line) if name not in PUBLIC] == private
+
+
+def test_the_pages_for_users_import_only_what_is_public() -> None:
+    pages = [ALULA_ROOT / "README.md", *(ALULA_ROOT / "docs" / f"{name}.md" for name in ("tutorial", "client", "mocks"))]
+    found = [
+        f"{page}:{line}: {name}" for page in pages for line, name in imported_by(page.read_text(encoding="utf-8")) if name not in PUBLIC
+    ]
+    assert found == []
