@@ -28,6 +28,7 @@ ROS1_PACKAGES = (
 ROS2_PACKAGES = ("skillset_ros2", "skill_panel", "uav_skills", "uav_missions")
 TYPED = [
     "lib/alula",
+    *map(str, sorted((ALULA_ROOT / "examples").glob("e[0-9]*.py"))),
     "flight/alula_flight",
     "bridge/ros_bridge/ros_bridge",
     "tools/bridge_tools",
@@ -41,6 +42,7 @@ TYPED = [
     "tools/finding_pages",
     "tools/log_mutations",
     "tools/mission_mutations",
+    "tools/api_page",
     *(f"ros2_ws/src/{name}/{name}" for name in ROS2_PACKAGES),
     *(f"ros1_ws/src/{name}/src/{name}" for name in ROS1_PACKAGES),
     "examples/rover/ros2_ws/src/rover_robot/rover_robot",

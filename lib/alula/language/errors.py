@@ -24,7 +24,7 @@ class Severity(Enum):
 @public()
 @dataclass(frozen=True)
 class Diagnostic:
-    """One finding.
+    """A finding about a model or a mission: its code, place (``span``), message, severity and what to do about it (``hint``).
 
     ``expected`` lists what the parser could have gone on with; ``source_line`` is the line that it is about.
     ``example``: conditions that must hold together for the finding; ``counterexample``: a run in which they do. Both are of proofs.

@@ -24,7 +24,10 @@ START_TIMEOUT_S = 90.0
 
 @public()
 class Outcome(Enum):
-    """How a mission can be, in a mission's account."""
+    """How a mission ended, or RUNNING.
+
+    DEGRADED: accomplished in another way than the best. GIVEN_UP: the tree failed. SERVED: there was no mission, only skills to serve.
+    """
 
     RUNNING = "running"
     ACCOMPLISHED = "accomplished"

@@ -117,7 +117,10 @@ class DataScript:
 @public()
 @dataclass(frozen=True, kw_only=True)
 class Behaviour:
-    """All of it, for all skillsets of a robot. ``beside``: of other robots of a fleet, each with a memory of its own."""
+    """What the mocks of a robot do: the rules of skills, what happens by the clock, faults, data, and a memory that they share.
+
+    ``beside``: of other robots of a fleet, each with a memory of its own.
+    """
 
     memory: Mapping[str, object] = field(default_factory=dict)
     rules: Mapping[Place, tuple[Rule, ...]] = field(default_factory=dict)

@@ -15,6 +15,7 @@ import pytest
 
 import alula
 from alula import AlulaError, Mission, Outcome, Record, Severity, check_files, load_behaviour, load_skillset, open_run, parse_skillset
+from alula.common.public import lazy_names
 from alula.trees import FAILURE, RUNNING, STRING, SUCCESS, Action, Answer, Condition, input_port, register
 
 ROOT = Path(__file__).resolve().parents[3]
@@ -98,6 +99,16 @@ def test_an_error_is_called_by_its_public_name(tmp_path):
     assert isinstance(raised.value, AlulaError)
     with pytest.raises(AttributeError, match="module 'alula' has no attribute 'Skilset'"):
         _ = alula.Skilset
+
+
+def test_a_name_that_is_to_go_warns_and_is_the_new_one():
+    look, names = lazy_names("alula", {}, {}, renamed={"Skilset": "Skillset"})
+    with pytest.warns(
+        DeprecationWarning, match="alula.Skilset is alula.Skillset now; the old name goes with the next minor version"
+    ) as told:
+        assert look("Skilset") is alula.Skillset
+    assert told[0].filename == __file__
+    assert "Skilset" not in names()
 
 
 def test_the_import_loads_nothing_of_the_library():

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
-from typing import Protocol
+from typing import Any, Protocol
 
 from alula.common.public import public
 from alula.model.execution_state import ExecutionState
@@ -43,7 +43,7 @@ class Execution:
         self._controller = controller
         self.id = execution_id
         self.skill = skill
-        self.inputs = inputs
+        self.inputs: Any = inputs  # of the class that the skill's hooks make
         self.state = ExecutionState.REQUESTED
         self.result = ""
         self.message = ""

@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections import deque
 from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass, replace
+from typing import Any
 
 from alula.common.public import public
 from alula.model.execution_state import ExecutionState
@@ -41,7 +42,7 @@ class ExecutionRecord:
     state: ExecutionState
     result: str
     message: str
-    inputs: object
+    inputs: Any
     outputs: Mapping[str, object]
     requested_ns: int
     started_ns: int | None = None

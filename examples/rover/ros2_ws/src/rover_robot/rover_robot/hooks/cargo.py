@@ -57,7 +57,7 @@ class Question(SkillHooks):
 
     def _look(self) -> None:
         execution = self._execution
-        if execution is not None and self._watch.now_s - self._asked_s > execution.inputs.patience:  # type: ignore[attr-defined]
+        if execution is not None and self._watch.now_s - self._asked_s > execution.inputs.patience:
             self._execution = None
             execution.terminate("NOBODY", message=f"no answer to: {self.text(execution.inputs)}")
 
@@ -99,7 +99,7 @@ class OpenDoor(AbstractOpenDoorSkill):
     def on_dispatch(self, execution: Execution) -> None:
         """Call it."""
         self._called_s, self._execution = self._watch.now_s, execution
-        service = self._client(execution.inputs.door)  # type: ignore[attr-defined]
+        service = self._client(execution.inputs.door)
         service.call_async(SetBool.Request(data=True)).add_done_callback(lambda future: self._on_answer(execution, future.result()))
 
     def on_interrupt(self, execution: Execution) -> None:

@@ -104,7 +104,7 @@ class Charge(AbstractChargeSkill):
 
     def progress(self, execution: Execution) -> float:
         """Return the part of the wanted level that is there."""
-        wanted: float = execution.inputs.level  # type: ignore[attr-defined]
+        wanted: float = execution.inputs.level
         return min((self._battery.level or 0.0) / wanted, 1.0)
 
     def _look(self) -> None:
@@ -113,7 +113,7 @@ class Charge(AbstractChargeSkill):
             return
         if level > self._best:
             self._best, self._best_s = level, now_s
-        if level >= execution.inputs.level:  # type: ignore[attr-defined]
+        if level >= execution.inputs.level:
             self._execution = None
             self.terminated_CHARGED(execution)
         elif now_s - self._best_s > NO_RISE_S:

@@ -1,0 +1,1 @@
+"""Writes docs/api.md, the reference of the public names, from their docstrings."""
