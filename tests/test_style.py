@@ -60,6 +60,18 @@ def test_tree_is_clean(name: str) -> None:
     assert done.returncode == 0, done.stdout[-4000:] + done.stderr[-2000:]
 
 
+def test_a_type_checker_knows_the_public_names_and_no_others() -> None:
+    program = (
+        "from alula import Mission, parts\nfrom alula.trees import Action, register\nreveal_type(Mission.load)\nfrom alula import Misson"
+    )
+    done = subprocess.run(["mypy", "-c", program], cwd=ALULA_ROOT, capture_output=True, text=True, timeout=280, check=False)
+    said = done.stdout.splitlines()
+    assert [line for line in said if "error" in line and "Found" not in line] == [
+        '<string>:4: error: Module "alula" has no attribute "Misson"; maybe "Mission"?  [attr-defined]'
+    ]
+    assert any("-> alula.api.mission.Mission" in line for line in said)
+
+
 @pytest.mark.parametrize(
     ("language", "source"), [("skill", "skillsets/uav/navigation.skill"), ("python", "ros2_ws/src/uav_skills/uav_skills/navigation.py")]
 )
