@@ -25,10 +25,9 @@ from alula.prove.mission.play import play
 from alula.prove.mission.prover import prove_mission
 from alula.prove.mission.regions import Regions
 from alula.prove.mission.run import MissionFinding
-from alula.prove.mission.runnable import why_not
+from alula.prove.mission.runnable import remembered, why_not
 from alula.prove.mission.system import System
-from alula.trees.node import Control, Decorator, Node, register
-from alula.trees.status import FAILURE, RUNNING, SUCCESS, Answer
+from alula.trees import DOUBLE, FAILURE, RUNNING, SUCCESS, Answer, Control, Decorator, Node, TickError, input_port, register
 from finding_pages.mission_checks import whole
 
 ROVER = """
@@ -196,6 +195,28 @@ def test_a_leaf_whose_code_breaks_on_what_is_known_is_named(tmp_path: Path) -> N
 @pytest.mark.parametrize("kind", own_nodes.RUN.values())
 def test_code_that_hangs_on_nothing_else_is_run(kind: type[Node]) -> None:
     assert why_not(kind) == ""
+
+
+@register("robot.Doubled")
+class Doubled(Decorator):
+    """Sets up what it counts, and gives up where its port is too small: all by what is public."""
+
+    ports = (input_port("least", DOUBLE, "1"),)
+
+    def setup(self) -> None:
+        """Begin to count."""
+        self.count = 0
+
+    def update(self) -> Answer:
+        """Tick the child in each second tick."""
+        self.count = 1 - self.count
+        if self.real("least") < 1.0:
+            raise TickError("too small")
+        return self.child.execute() if self.count else RUNNING
+
+
+def test_code_over_the_public_names_is_run_and_remembers_what_it_has_set_up() -> None:
+    assert (why_not(Doubled), remembered(Doubled)) == ("", ("count",))
 
 
 TABLE = {"SUCCESS": SUCCESS}
