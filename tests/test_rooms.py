@@ -261,7 +261,7 @@ def test_a_robots_own_code_imports_only_what_is_public() -> None:
 def test_what_looks_below_the_api_is_needed_and_starts_no_command_line() -> None:
     looked = {path.name: private_imports(path) for path in robots_texts() if path.name in INSIDE}
     assert {name for name, found in looked.items() if found} == set(INSIDE), "one that needs nothing private any more can go"
-    assert not [line for found in looked.values() for line in found if re.search(r"alula\.(commands|cli|api)", line)]
+    assert not [line for found in looked.values() for line in found if re.search(r"alula\.(cli|api)", line)]
 
 
 @pytest.mark.parametrize(
