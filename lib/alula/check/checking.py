@@ -9,6 +9,7 @@ from itertools import islice
 
 from alula.check import entries
 from alula.check.entries import Writers
+from alula.check.exclusion import exclude
 from alula.check.problems import of_element
 from alula.check.reach import Reach, never_reached, several_run, unreached, waits_in_vain
 from alula.check.scripts import Scripts, after, before, within
@@ -142,7 +143,7 @@ def _unreached(whole: Whole) -> Iterator[Problem]:
 
 
 def _several_run(whole: Whole) -> Iterator[Problem]:
-    return several_run(whole.root, whole.reach)
+    return several_run(whole.root, whole.reach, lambda one, other: exclude(one, other, whole.scripts, whole.traits))
 
 
 def _entries(whole: Whole) -> Iterator[Problem]:

@@ -8,17 +8,17 @@ from dataclasses import dataclass
 
 from alula.check.checking import Whole
 from alula.check.problems import of_element, of_value
-from alula.check.reach import BRANCHES, IN_TURN, is_parallel
+from alula.check.reach import is_parallel
 from alula.check.resources import clash
 from alula.check.sites import Site
 from alula.check.skills import Skills, named_results
-from alula.check.traits import F
 from alula.common.suggestions import nearest, quoted
 from alula.missions.skill_types import OUTCOME_PORT, SUCCESS_PORT
 from alula.model.model import Skill
 from alula.model.units import KIND_OF_UNIT, UNIT_IN_SI
 from alula.trees.document import Attribute
 from alula.trees.errors import Problem
+from alula.trees.status import FAILURE
 
 _NUMBER_WITH_UNIT = re.compile(r"\s*[-+]?[0-9.]+(?:[eE][-+]?[0-9]+)?\s*([A-Za-z%/]+)\s*")
 
@@ -79,17 +79,18 @@ def _deals(parent: Site, child: Site) -> bool:
     place = parent.children.index(child)
     if "_onFailure" in child.element.attributes:
         return True
-    if IN_TURN.get(parent.kind) == F:
+    if parent.goes_on is FAILURE:
         return place + 1 < len(parent.children)
-    if parent.kind in BRANCHES:
+    if parent.kind in _BRANCHES:
         return place == 0
     if parent.kind in {"Parallel", "ParallelAll"}:
         return (parent.given("failure_count" if parent.kind == "Parallel" else "max_failures") or "1").strip() != "1"
     if parent.kind == "TryCatch":
         return place + 1 < len(parent.children)
-    return parent.kind not in IN_TURN and parent.kind not in _PASSING
+    return parent.goes_on is None and parent.kind not in _PASSING
 
 
+_BRANCHES = frozenset({"IfThenElse", "WhileDoElse"})
 _PASSING = frozenset({"SubTree", "Repeat", "Until", "Delay", "Timeout", "RunOnce", "Precondition", "SkipUnlessUpdated", "WaitValueUpdate"})
 """Nodes that fail when their child fails; of a node of another one's, nobody knows."""
 
@@ -127,7 +128,7 @@ def _at_once(parallel: Site, leaf: Site) -> bool:
     for parent, child in leaf.above():
         if parent is parallel:
             return True
-        first = parent.children[0] is child and (parent.kind in IN_TURN or parent.kind in {"SubTree", "Repeat", "RetryUntilSuccessful"})
+        first = parent.children[0] is child and (parent.goes_on is not None or parent.kind in {"SubTree", "Repeat", "RetryUntilSuccessful"})
         if not first or guards & set(parent.element.attributes):
             return False
     return False

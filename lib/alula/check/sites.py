@@ -4,12 +4,15 @@ from __future__ import annotations
 
 from collections.abc import Iterator
 from dataclasses import dataclass, field
+from typing import TypeAlias
 
 from alula.trees.document import Attribute, Element
-from alula.trees.node import pointer
+from alula.trees.node import Node, pointer
 from alula.trees.palette import NodeType, Palette
 from alula.trees.reading import AUTOREMAP, TreeFiles, is_port, node_name, type_name
+from alula.trees.status import Answer
 
+NodeClass: TypeAlias = type[Node]
 Key = tuple[int, str]
 """An entry: the number of the blackboard that it stands on, and its name there."""
 
@@ -61,6 +64,20 @@ class Site:
     def kind(self) -> str:
         """The name of its type; that of every subtree is SubTree."""
         return "SubTree" if self.element.tag == "SubTree" else type_name(self.element)
+
+    @property
+    def described(self) -> NodeClass | None:
+        """The class that tells how it ticks its children and ends; None where nobody does, or where it has not the children for that."""
+        known = self.type.described if self.type else None
+        if known is None or self.type is None:
+            return None
+        least, most = self.type.children
+        return known if least <= len(self.children) <= (len(self.children) if most is None else most) else None
+
+    @property
+    def goes_on(self) -> Answer | None:
+        """The answer after which its next child's turn comes, None where it does not tick its children in turn."""
+        return self.described.goes_on if self.described else None
 
     @property
     def place(self) -> int:

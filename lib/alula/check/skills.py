@@ -6,10 +6,11 @@ from collections.abc import Collection, Iterable, Mapping
 from functools import cached_property
 
 from alula.check.sites import Site
-from alula.check.traits import F, PlainTraits, S
+from alula.check.traits import PlainTraits
 from alula.language.messages import NO_MESSAGES, Messages
 from alula.missions.skill_types import SEPARATOR, SUCCESS_PORT
 from alula.model.model import ResultKind, Skill, Skillset
+from alula.trees.ends import ENDS, FAILS, Ends
 from alula.trees.node import pointer
 
 
@@ -70,10 +71,6 @@ def named_results(site: Site) -> frozenset[str] | None:
     return frozenset(attribute.value.split(SEPARATOR)) - {""}
 
 
-_NEVER_FAIL = frozenset({"WaitFor", "NoteReason"})
-_AGAIN = frozenset({"Until", "RetryAfter"})
-
-
 class SkillTraits(PlainTraits):
     """What is known of BehaviorTree.CPP's nodes and of the robot's skills."""
 
@@ -81,17 +78,15 @@ class SkillTraits(PlainTraits):
         super().__init__({*names, *skills.states})
         self._skills = skills
 
-    def ends(self, site: Site) -> frozenset[str]:
+    def ends(self, site: Site) -> Ends | None:
         """Any skill may fail: it may be refused, interrupted, or stopped by an invariant."""
-        if site.kind in _NEVER_FAIL:
-            return frozenset({S})
         if self._skills.of(site) is None:
             return super().ends(site)
-        return frozenset({F, S} if self._skills.successes(site) else {F})
+        return ENDS if self._skills.successes(site) else FAILS
 
     def runs(self, site: Site) -> bool | None:
-        """Every skill takes several ticks, and so do decorators that run their child again a tick later."""
-        return True if self._skills.of(site) is not None or site.kind in _AGAIN else super().runs(site)
+        """Every skill takes several ticks."""
+        return True if self._skills.of(site) is not None else super().runs(site)
 
     def endless(self, site: Site) -> bool:
         """Tell whether none of its results is a success."""

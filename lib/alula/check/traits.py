@@ -6,28 +6,15 @@ from collections.abc import Collection
 from typing import Protocol
 
 from alula.check.sites import Site
-from alula.trees.node import Action
+from alula.trees.ends import Ends
 from alula.trees.palette import Category
-
-S, F, K = "succeeds", "fails", "is skipped"
-"""Ends of a tick; to run is none."""
-ENDS = frozenset({S, F})
-
-_ENDS = {
-    "AlwaysSuccess": {S},
-    "AlwaysFailure": {F},
-    "Script": {S},
-    "Sleep": {S},
-    "UnsetBlackboard": {S},
-}
-_RUNS = frozenset({"Sleep", "KeepRunningUntilFailure", "Delay", "AsyncSequence", "AsyncFallback", "WaitValueUpdate"})
 
 
 class Traits(Protocol):
     """What is known of leaves, and of names in scripts."""
 
-    def ends(self, site: Site) -> frozenset[str]:
-        """Return how a leaf may end."""
+    def ends(self, site: Site) -> Ends | None:
+        """Return how a node may end where more is known than its type tells, None where not."""
 
     def runs(self, site: Site) -> bool | None:
         """Tell whether a node may take several ticks by itself, its children aside; None: nobody knows."""
@@ -48,17 +35,15 @@ class PlainTraits:
     def __init__(self, names: Collection[str] = ()) -> None:
         self._names = names
 
-    def ends(self, site: Site) -> frozenset[str]:
-        """Return how a leaf may end: either way unless it is one of BehaviorTree.CPP's that never do."""
-        return frozenset(_ENDS.get(site.kind, ENDS))
+    def ends(self, site: Site) -> Ends | None:  # noqa: ARG002
+        """Know no more than the types."""
+        return None
 
     def runs(self, site: Site) -> bool | None:
-        """Tell what is known of BehaviorTree.CPP's nodes and of classes; an action that only a model tells of may."""
-        if site.kind in _RUNS:
-            return True
-        if site.type is None or site.type.category is not Category.ACTION:
+        """Tell what the type does; a subtree is what is in it, and a condition answers at once."""
+        if site.kind == "SubTree" or (site.type is not None and site.type.category is Category.CONDITION):
             return False
-        return issubclass(site.type.make, Action) if isinstance(site.type.make, type) else None
+        return site.described.may_run if site.described else None
 
     def endless(self, site: Site) -> bool:  # noqa: ARG002
         """Know none."""

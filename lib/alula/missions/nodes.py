@@ -3,8 +3,10 @@
 from __future__ import annotations
 
 import math
+from collections.abc import Sequence
 
 from alula.missions.blackboard import Blackboard
+from alula.trees.ends import ENDS, FAILS, SUCCEEDS, Ends, Given, whole_number
 from alula.trees.errors import TickError
 from alula.trees.node import Action, Condition, Decorator, Script, SyncAction, Wiring
 from alula.trees.palette import Palette, input_port
@@ -33,6 +35,7 @@ class WaitFor(Action):
     """Runs until a condition holds."""
 
     ports = (IF,)
+    ends = SUCCEEDS
 
     def __init__(self, wiring: Wiring) -> None:
         super().__init__(wiring)
@@ -51,6 +54,7 @@ class Stays(Action):
     """Succeeds when a condition has held for a time without a break, fails as soon as it does not."""
 
     ports = (IF, input_port("for", DOUBLE, doc="how long", unit="s"))
+    ends = ENDS
 
     remembers_running = ("_since_ns",)
 
@@ -79,6 +83,7 @@ class Awaits(Action):
         input_port("within", DOUBLE, doc="how long to wait", unit="s"),
         input_port("for", DOUBLE, "0", "how long it holds", unit="s"),
     )
+    ends = ENDS
 
     remembers_running = ("_since_ns", "_holds_since_ns")
 
@@ -109,6 +114,12 @@ class Until(Decorator):
     """Runs its child again, a tick after it has succeeded, until a condition holds after a success; fails with its child."""
 
     ports = (IF,)
+    may_run = True
+
+    @classmethod
+    def may_end(cls, given: Given, children: Sequence[Ends]) -> Ends:  # noqa: ARG003
+        """End as the child."""
+        return children[0]
 
     def __init__(self, wiring: Wiring) -> None:
         super().__init__(wiring)
@@ -136,8 +147,15 @@ class RetryAfter(Decorator):
         input_port(port, INT, "2", "how many chances it has in all; -1: any number"),
         input_port("wait", DOUBLE, "0", "how long after the failure", unit="s"),
     )
+    may_run = True
 
     remembers_running = ("_left", "_again_ns")
+
+    @classmethod
+    def may_end(cls, given: Given, children: Sequence[Ends]) -> Ends:
+        """End as the child; fail without it where the number may leave no chance."""
+        attempts = whole_number(given, cls.port)
+        return children[0] if attempts is not None and (attempts > 0 or attempts == FOR_EVER) else children[0] | FAILS
 
     def __init__(self, wiring: Wiring) -> None:
         super().__init__(wiring)
@@ -174,6 +192,7 @@ class Needs(Condition):
     """What a mission needs to start: its name says it, ``otherwise`` is a script of a text that says what is so instead."""
 
     ports = (IF, input_port("otherwise", STRING, doc="a script of a text"))
+    ends = ENDS
 
     def __init__(self, wiring: Wiring) -> None:
         super().__init__(wiring)
@@ -194,6 +213,7 @@ class Needs(Condition):
 class NoteReason(SyncAction):
     """Keeps what went wrong up to here as the mission's reason."""
 
+    ends = SUCCEEDS
     memory: Blackboard
 
     def update(self) -> Answer:

@@ -6,7 +6,7 @@ has neither answers that are no state (SKIPPED) nor BehaviorTree.CPP's halts: a 
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator, Mapping
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field
 from typing import ClassVar, Protocol, TypeVar
 
@@ -15,6 +15,7 @@ from py_trees.behaviour import Behaviour
 from alula.common.public import public
 from alula.trees.blackboard import Blackboard, Clock, Entry
 from alula.trees.document import Element
+from alula.trees.ends import ANY_END, Ends, Given, stops_at
 from alula.trees.errors import TickError
 from alula.trees.palette import Category, NodeType, Port
 from alula.trees.status import FAILURE, IDLE, RUNNING, SKIPPED, SUCCESS, Answer, Status
@@ -95,6 +96,10 @@ def pointer(text: str, name: str) -> str | None:
     return stripped[1:-1] if len(stripped) >= 3 and stripped[0] == "{" and stripped[-1] == "}" else None
 
 
+_TELLS = frozenset({"goes_on", "ends", "may_end", "never_ticked"})
+_ANSWERS = ("execute", "update", "on_start", "on_running")
+
+
 @public("alula.trees")
 class Node(Behaviour):  # type: ignore[misc]  # py_trees is seen untyped
     """One node of a tree. A class of one's own derives from one of those below, and declares its ports."""
@@ -109,6 +114,12 @@ class Node(Behaviour):  # type: ignore[misc]  # py_trees is seen untyped
     """The attributes that one tick leaves for the next, besides the status; what takes a tree to another moment needs all of them."""
     remembers_running: ClassVar[tuple[str, ...]] = ()
     """Those of them that are set anew when the node begins: while it does not run, nothing hangs on them."""
+    goes_on: ClassVar[Status | None] = None
+    """The answer of a child after which the next child's turn comes; None where it does not tick its children in turn."""
+    ends: ClassVar[Ends] = ANY_END
+    """The ends that it may have, where they hang neither on ports nor on children."""
+    may_run: ClassVar[bool | None] = None
+    """Whether it may take several ticks, its children aside; None: nobody knows."""
     status: Status
     children: list[Node]
 
@@ -123,6 +134,34 @@ class Node(Behaviour):  # type: ignore[misc]  # py_trees is seen untyped
 
     def setup(self) -> None:
         """Prepare what ticks need, such as the scripts of ports; called once, when the tree is built. What it raises says where."""
+
+    # --- before anything is ticked -------------------------------------------------------------------------------------
+
+    @classmethod
+    def may_end(cls, given: Given, children: Sequence[Ends]) -> Ends:  # noqa: ARG003
+        """Return all ends that it may ever have, with these ports, and children that may have these ends."""
+        return cls.ends
+
+    @classmethod
+    def never_ticked(cls, given: Given, children: Sequence[Ends]) -> Iterator[tuple[int, int]]:  # noqa: ARG003
+        """Yield children that are never ticked, each with the child that does not end as it would have to for that.
+
+        Of several in a row, the first. A node that does not tick its children in turn is taken to tick all, unless its class tells more.
+        """
+        if cls.goes_on is not None and (last := stops_at(children, cls.goes_on)) is not None and last + 1 < len(children):
+            yield last + 1, last
+
+    @classmethod
+    def is_described(cls) -> bool:
+        """Tell whether what is told of its ends is of this class: one that derives from it, answers otherwise and tells nothing does not.
+
+        `goes_on`, `ends`, `may_end`, `never_ticked` belong to what answers: `execute`, `update`, `on_start`, `on_running`.
+        """
+        teller = next(one for one in cls.__mro__ if not _TELLS.isdisjoint(vars(one)))
+        if teller is Node:
+            return True
+        answering = ((getattr(cls, name, None), getattr(teller, name, None)) for name in _ANSWERS)
+        return all(mine is told or told in {None, Node.update} for mine, told in answering)
 
     # --- ticks ---------------------------------------------------------------------------------------------------------
 
@@ -314,6 +353,8 @@ class Leaf(Node):
 class SyncAction(Leaf):
     """An action that is done in one tick."""
 
+    may_run = False
+
     def execute(self) -> Answer:
         """Tick it; raises TickError when it answers RUNNING."""
         answer = super().execute()
@@ -327,11 +368,14 @@ class Condition(Leaf):
     """A leaf that asks, and changes nothing."""
 
     category = Category.CONDITION
+    may_run = False
 
 
 @public("alula.trees")
 class Action(Leaf):
     """An action that may take several ticks."""
+
+    may_run = True
 
     def update(self) -> Answer:
         """Start it, or follow it; one that has ended, and that its parent has not reset, answers the same again."""

@@ -5,7 +5,8 @@ from __future__ import annotations
 from collections.abc import Callable, Iterable, Iterator, Mapping
 from dataclasses import dataclass, field
 from enum import Enum
-from typing import TYPE_CHECKING
+from functools import cached_property
+from typing import TYPE_CHECKING, TypeGuard
 
 from alula.common.public import public
 from alula.trees.values import ANY, PortType
@@ -77,6 +78,11 @@ class NodeType:
     children: tuple[int, int | None] = (0, 0)
     """How many it may have, from and to; None: any number."""
 
+    @cached_property
+    def described(self) -> type[Node] | None:
+        """The class of its nodes where that tells how they end (`Node.is_described`), else None: they may do anything."""
+        return self.make if _is_class(self.make) and self.make.is_described() else None
+
     def wired(self, wiring: Wiring) -> Node:
         """Make a node, ready to be ticked; raises FileError."""
         if self.make is None:
@@ -85,6 +91,10 @@ class NodeType:
         node = self.make(wiring)
         node.setup()
         return node
+
+
+def _is_class(make: object) -> TypeGuard[type[Node]]:
+    return isinstance(make, type)
 
 
 CHILDREN: Mapping[Category, tuple[int, int | None]] = {

@@ -67,6 +67,7 @@ class Theirs:
                 story.ticked(RAISED)
                 break
             story.ticked(root)
+        story.entries = set(tree.root_blackboard().get_keys())
         self._leaves.story = Story(answers)  # what a tree does as it goes is nobody's
         _kept.append(tree)
         return story

@@ -18,6 +18,8 @@ class Story:
     ticks: list[tuple[str, list[tuple[str, str]]]] = field(default_factory=list)
     calls: list[tuple[str, str]] = field(default_factory=list)
     error: str = ""
+    entries: set[str] = field(default_factory=set)
+    """Names on the root's blackboard in the end, of BehaviorTree.CPP."""
     _asked: dict[str, int] = field(default_factory=dict)
 
     def answer(self, call: str, path: str, name: str) -> str:

@@ -2,6 +2,9 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterator, Sequence
+
+from alula.trees.ends import ENDS, FAILS, SKIPS, SUCCEEDS, Ends, Given, stops_at, together
 from alula.trees.errors import TickError
 from alula.trees.node import Control, Wiring
 from alula.trees.palette import inout_port, input_port
@@ -12,7 +15,16 @@ from alula.trees.values import BOOL, INT, STRING
 class PipelineSequence(Control):
     """Ticks its children in order, and those before the one that runs again in each tick, until the last one succeeds."""
 
+    goes_on = SUCCESS
+    may_run = False
     remembers = ("_reached",)
+
+    @classmethod
+    def may_end(cls, given: Given, children: Sequence[Ends]) -> Ends:  # noqa: ARG003
+        """Fail with a child, or get past all."""
+        last = stops_at(children, SUCCESS)
+        failed = together(children[: None if last is None else last + 1]) & FAILS
+        return failed if last is not None else failed | SUCCEEDS | (together(children) & SKIPS)
 
     def __init__(self, wiring: Wiring) -> None:
         super().__init__(wiring)
@@ -143,6 +155,15 @@ class RoundRobin(Control):
 
 class NonblockingSequence(Control):
     """Ticks all children in each tick, also those after one that runs, until all succeed at once."""
+
+    goes_on = SUCCESS
+    may_run = False
+    ends = ENDS
+
+    @classmethod
+    def never_ticked(cls, given: Given, children: Sequence[Ends]) -> Iterator[tuple[int, int]]:  # noqa: ARG003
+        """Yield none: while one runs, those after it are ticked, too."""
+        yield from ()
 
     def update(self) -> Answer:
         """Tick all, up to one that fails; raises TickError at one that is skipped, which Nav2 does not allow here."""

@@ -2,6 +2,9 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterator, Sequence
+
+from alula.trees.ends import FAILS, NO_END, Ends, Given, together
 from alula.trees.errors import TickError
 from alula.trees.node import Control, Wiring
 from alula.trees.palette import input_port
@@ -12,10 +15,29 @@ EPSILON = 2.0**-23
 """Of a C float: within it two numbers are one."""
 
 
-class IfThenElse(Control):
-    """Ticks the first child until it has ended; then the second if it succeeded, else the third, and answers as that one."""
+class _Chooses(Control):
+    """Ticks the second child after a success of the first, the third after its failure; fails where it has none."""
 
     child_count = (2, 3)
+    may_run = False
+
+    @classmethod
+    def may_end(cls, given: Given, children: Sequence[Ends]) -> Ends:  # noqa: ARG003
+        """End as what is chosen; a condition that is skipped raises."""
+        asked, then, *otherwise = children
+        failed = otherwise[0] if otherwise else FAILS
+        return (then if SUCCESS in asked else NO_END) | (failed if FAILURE in asked else NO_END)
+
+    @classmethod
+    def never_ticked(cls, given: Given, children: Sequence[Ends]) -> Iterator[tuple[int, int]]:  # noqa: ARG003
+        """Yield the branch that the condition never chooses."""
+        for number, end in ((1, SUCCESS), (2, FAILURE)):
+            if number < len(children) and end not in children[0]:
+                yield number, 0
+
+
+class IfThenElse(_Chooses):
+    """Ticks the first child until it has ended; then the second if it succeeded, else the third, and answers as that one."""
 
     remembers = ("_chosen",)
 
@@ -47,10 +69,8 @@ class IfThenElse(Control):
         super().halt()
 
 
-class WhileDoElse(Control):
+class WhileDoElse(_Chooses):
     """Asks the first child in each tick: the second runs while it succeeds, the third while it fails."""
-
-    child_count = (2, 3)
 
     def update(self) -> Answer:
         """Ask, and tick one of the others."""
@@ -75,7 +95,13 @@ class WhileDoElse(Control):
 class Switch(Control):
     """Ticks the child of the case that equals the variable, else the last child; asks again in each tick."""
 
+    may_run = False
     remembers = ("_running",)
+
+    @classmethod
+    def may_end(cls, given: Given, children: Sequence[Ends]) -> Ends:  # noqa: ARG003
+        """End as any of them."""
+        return together(children)
 
     def __init__(self, wiring: Wiring) -> None:
         super().__init__(wiring)
@@ -145,6 +171,7 @@ class TryCatch(Control):
     """Ticks all but the last child as a Sequence; when one fails, the last one cleans up, and it fails."""
 
     child_count = (2, None)
+    may_run = True
     ports = (input_port("catch_on_halt", BOOL, "false", "have the last child tick once when it is halted, too"),)
 
     remembers = ("_index", "_skipped", "_cleans_up")

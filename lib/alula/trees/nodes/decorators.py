@@ -2,8 +2,10 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from typing import ClassVar
 
+from alula.trees.ends import FAILS, SKIPS, Ends, Given, answer_in, whole_number
 from alula.trees.node import NANOSECONDS_PER_MS, Decorator, Script, Wiring
 from alula.trees.palette import input_port
 from alula.trees.status import FAILURE, IDLE, RUNNING, SKIPPED, SUCCESS, Answer
@@ -13,7 +15,13 @@ from alula.trees.values import BOOL, INT, STATUS, STRING, UINT
 class _Changed(Decorator):
     """Answers something else than its child."""
 
+    may_run = False
     instead: ClassVar[dict[Answer, Answer]] = {}
+
+    @classmethod
+    def may_end(cls, given: Given, children: Sequence[Ends]) -> Ends:  # noqa: ARG003
+        """Change the child's."""
+        return frozenset(cls.instead.get(end, end) for end in children[0])
 
     def update(self) -> Answer:
         """Tick the child."""
@@ -46,7 +54,13 @@ class ForceFailure(_Changed):
 class KeepRunningUntilFailure(_Changed):
     """Runs its child again and again, and fails with it."""
 
+    may_run = True
     instead: ClassVar[dict[Answer, Answer]] = {SUCCESS: RUNNING, FAILURE: FAILURE}
+
+    @classmethod
+    def may_end(cls, given: Given, children: Sequence[Ends]) -> Ends:  # noqa: ARG003
+        """Fail."""
+        return children[0] & FAILS
 
     def update(self) -> Answer:
         """Tick the child; one that is skipped is asked again in the next tick."""
@@ -57,6 +71,7 @@ class KeepRunningUntilFailure(_Changed):
 class _Again(Decorator):
     """Ticks its child again after one of its answers, so often at most; the count survives skipping."""
 
+    may_run = False
     again: ClassVar[Answer]
     port: ClassVar[str]
 
@@ -65,6 +80,14 @@ class _Again(Decorator):
     def __init__(self, wiring: Wiring) -> None:
         super().__init__(wiring)
         self._count = 0
+
+    @classmethod
+    def may_end(cls, given: Given, children: Sequence[Ends]) -> Ends:
+        """End as the child; but for ever never so that it would go on, and so without the child where the number may be 0."""
+        number, again = whole_number(given, cls.port), frozenset({cls.again})
+        if number == -1:
+            return children[0] - again
+        return children[0] | (again if number is None or number <= 0 else frozenset())
 
     def update(self) -> Answer:
         """Tick the child as long as it ends and is to begin again."""
@@ -115,7 +138,13 @@ class RunOnce(Decorator):
 
     ports = (input_port("then_skip", BOOL, "true", "skip afterwards; else answer as the first time"),)
 
+    may_run = False
     remembers = ("_answer",)
+
+    @classmethod
+    def may_end(cls, given: Given, children: Sequence[Ends]) -> Ends:  # noqa: ARG003
+        """End as the child, or be skipped."""
+        return children[0] | SKIPS
 
     def __init__(self, wiring: Wiring) -> None:
         super().__init__(wiring)
@@ -138,7 +167,13 @@ class Precondition(Decorator):
 
     ports = (input_port("if", STRING, doc="the script"), input_port("else", STATUS, "FAILURE", "what it answers when the script says no"))
 
+    may_run = None
     remembers = ("_begun",)
+
+    @classmethod
+    def may_end(cls, given: Given, children: Sequence[Ends]) -> Ends:
+        """End as the child, or as `else` says."""
+        return children[0] | answer_in(given, "else")
 
     def __init__(self, wiring: Wiring) -> None:
         super().__init__(wiring)
@@ -173,9 +208,16 @@ def _answer(value: object) -> Answer:
 class Delay(Decorator):
     """Ticks its child after some time."""
 
+    may_run = True
+
     ports = (input_port("delay_msec", UINT, doc="after how long", unit="ms"),)
 
     remembers = ("_until_ns",)
+
+    @classmethod
+    def may_end(cls, given: Given, children: Sequence[Ends]) -> Ends:  # noqa: ARG003
+        """End as the child."""
+        return children[0]
 
     def __init__(self, wiring: Wiring) -> None:
         super().__init__(wiring)
@@ -205,7 +247,13 @@ class Timeout(Decorator):
 
     ports = (input_port("msec", UINT, doc="for how long at most", unit="ms"),)
 
+    may_run = False
     remembers = ("_until_ns",)
+
+    @classmethod
+    def may_end(cls, given: Given, children: Sequence[Ends]) -> Ends:
+        """End as the child, or fail after the time."""
+        return children[0] if whole_number(given, "msec") == 0 else children[0] | FAILS
 
     def __init__(self, wiring: Wiring) -> None:
         super().__init__(wiring)

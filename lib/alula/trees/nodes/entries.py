@@ -2,9 +2,11 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from typing import ClassVar
 
 from alula.trees.blackboard import type_of
+from alula.trees.ends import ENDS, SUCCEEDS, Ends, Given
 from alula.trees.errors import TickError
 from alula.trees.node import Decorator, SyncAction, Wiring, pointer
 from alula.trees.palette import inout_port, input_port
@@ -16,6 +18,8 @@ class SetBlackboard(SyncAction):
     """Writes a value, or what another entry has, into an entry."""
 
     ports = (input_port("value", doc="what is written"), inout_port("output_key", doc="the entry's name"))
+
+    ends = ENDS
 
     def update(self) -> Answer:
         """Write."""
@@ -42,6 +46,8 @@ class UnsetBlackboard(SyncAction):
 
     ports = (input_port("key", STRING, doc="the entry's name"),)
 
+    ends = SUCCEEDS
+
     def update(self) -> Answer:
         """Take it away."""
         self.blackboard.unset(str(self.get("key")))
@@ -57,6 +63,8 @@ class WasEntryUpdated(SyncAction):
     ports = ENTRY
 
     remembers = ("_seen",)
+
+    ends = ENDS
 
     def __init__(self, wiring: Wiring) -> None:
         super().__init__(wiring)
@@ -78,6 +86,11 @@ class _IfUpdated(Decorator):
     otherwise: ClassVar[Answer]
 
     remembers = ("_seen", "_running")
+
+    @classmethod
+    def may_end(cls, given: Given, children: Sequence[Ends]) -> Ends:  # noqa: ARG003
+        """End as the child, or as it does without it."""
+        return children[0] | (frozenset({cls.otherwise}) - {RUNNING})
 
     def __init__(self, wiring: Wiring) -> None:
         super().__init__(wiring)
@@ -104,10 +117,12 @@ class _IfUpdated(Decorator):
 class SkipUnlessUpdated(_IfUpdated):
     """Ticks its child when an entry was written since it asked last, else it is skipped."""
 
+    may_run = False
     otherwise = SKIPPED
 
 
 class WaitValueUpdate(_IfUpdated):
     """Waits until an entry is written, then ticks its child."""
 
+    may_run = True
     otherwise = RUNNING

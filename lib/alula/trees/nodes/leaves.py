@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from alula.trees.ends import ENDS, FAILS, SUCCEEDS
 from alula.trees.node import NANOSECONDS_PER_MS, Action, Condition, Node, Script, SyncAction, Wiring
 from alula.trees.palette import input_port
 from alula.trees.status import FAILURE, RUNNING, SUCCESS, Answer
@@ -13,6 +14,8 @@ CODE = (input_port("code", STRING, doc="the script"),)
 class AlwaysSuccess(SyncAction):
     """Succeeds."""
 
+    ends = SUCCEEDS
+
     def update(self) -> Answer:
         """Succeed."""
         return SUCCESS
@@ -20,6 +23,8 @@ class AlwaysSuccess(SyncAction):
 
 class AlwaysFailure(SyncAction):
     """Fails."""
+
+    ends = FAILS
 
     def update(self) -> Answer:
         """Fail."""
@@ -49,6 +54,8 @@ class ScriptNode(SyncAction):
 
     ports = CODE
 
+    ends = SUCCEEDS
+
     def __init__(self, wiring: Wiring) -> None:
         super().__init__(wiring)
         self._code = _Code(self)
@@ -63,6 +70,8 @@ class ScriptCondition(Condition):
     """Succeeds when a script says yes."""
 
     ports = CODE
+
+    ends = ENDS
 
     def __init__(self, wiring: Wiring) -> None:
         super().__init__(wiring)
@@ -82,6 +91,8 @@ class Sleep(Action):
     ports = (input_port("msec", UINT, doc="for how long", unit="ms"),)
 
     remembers_running = ("_until_ns",)
+
+    ends = SUCCEEDS
 
     def __init__(self, wiring: Wiring) -> None:
         super().__init__(wiring)

@@ -2,6 +2,9 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
+
+from alula.trees.ends import FAILS, Ends, Given, answer_in
 from alula.trees.errors import TickError
 from alula.trees.node import Decorator, Wiring, pointer
 from alula.trees.palette import inout_port, input_port, output_port
@@ -15,7 +18,13 @@ class Loop(Decorator):
     A list of the file begins anew each time; one of the blackboard is used up.
     """
 
+    may_run = True
     remembers = ("_running", "_items")
+
+    @classmethod
+    def may_end(cls, given: Given, children: Sequence[Ends]) -> Ends:
+        """Fail with the child, or end as `if_empty` says."""
+        return (children[0] & FAILS) | answer_in(given, "if_empty")
 
     def __init__(self, wiring: Wiring) -> None:
         super().__init__(wiring)

@@ -2,6 +2,9 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
+
+from alula.trees.ends import ENDS, FAILS, NO_END, SKIPS, SUCCEEDS, Ends, Given, whole_number
 from alula.trees.errors import TickError
 from alula.trees.node import Control, Wiring
 from alula.trees.palette import input_port
@@ -10,6 +13,7 @@ from alula.trees.values import INT
 
 
 class _AtOnce(Control):
+    may_run = False
     remembers = ("_done", "_failed")
 
     def __init__(self, wiring: Wiring) -> None:
@@ -27,12 +31,17 @@ class _AtOnce(Control):
         self._failed = 0
 
     def _threshold(self, port: str, given: int, never: str) -> int:
-        """Return a number of children; one below zero counts from all of them, -1 for all."""
+        """Return a number of children."""
         count = len(self.children)
-        threshold = max(count + given + 1, 0) if given < 0 else given
+        threshold = threshold_of(given, count)
         if threshold > count:
             raise TickError(f"{self.place()}: {port} is {given} and it has {count} children: it can never {never}")
         return threshold
+
+
+def threshold_of(number: int, children: int) -> int:
+    """Return a number of children; one below zero counts from all of them, -1 for all."""
+    return max(children + number + 1, 0) if number < 0 else number
 
 
 class Parallel(_AtOnce):
@@ -42,6 +51,20 @@ class Parallel(_AtOnce):
         input_port("success_count", INT, "-1", "how many have to succeed; -1: all"),
         input_port("failure_count", INT, "1", "how many have to fail for it to fail"),
     )
+
+    @classmethod
+    def may_end(cls, given: Given, children: Sequence[Ends]) -> Ends:
+        """Count those that may succeed, or fail."""
+        successes, failures, count = whole_number(given, "success_count"), whole_number(given, "failure_count"), len(children)
+        skipped = SKIPS if all(child & SKIPS for child in children) else NO_END
+        if successes is None or failures is None:
+            return ENDS | skipped
+        enough, too_many = threshold_of(successes, count), threshold_of(failures, count)
+        counted = SUCCEEDS | SKIPS if successes < 0 else SUCCEEDS
+        succeeding = sum(bool(child & counted) for child in children)
+        failing = sum(FAILURE in child for child in children)
+        fails = failing >= too_many or count - failing < enough
+        return (SUCCEEDS if succeeding >= enough else NO_END) | (FAILS if fails else NO_END) | skipped
 
     def update(self) -> Answer:
         """Tick those that have not ended."""
@@ -75,6 +98,20 @@ class ParallelAll(_AtOnce):
     """Ticks all children until each has ended; fails when too many failed."""
 
     ports = (input_port("max_failures", INT, "1", "how many have to fail for it to fail; -1: all"),)
+
+    @classmethod
+    def may_end(cls, given: Given, children: Sequence[Ends]) -> Ends:
+        """Count those that may fail, and those that have to."""
+        failures = whole_number(given, "max_failures")
+        if not all(children):
+            return NO_END
+        skipped = SKIPS if all(child & SKIPS for child in children) else NO_END
+        if failures is None:
+            return ENDS | skipped
+        too_many = threshold_of(failures, len(children))
+        succeeds = sum(child == FAILS for child in children) < too_many
+        fails = sum(FAILURE in child for child in children) >= too_many
+        return (SUCCEEDS if succeeds else NO_END) | (FAILS if fails else NO_END) | skipped
 
     def update(self) -> Answer:
         """Tick those that have not ended."""

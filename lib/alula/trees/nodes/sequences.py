@@ -2,8 +2,10 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence as Listed
 from typing import ClassVar
 
+from alula.trees.ends import ENDS, NO_END, SKIPS, Ends, Given, stops_at, together
 from alula.trees.node import Control, Wiring
 from alula.trees.status import FAILURE, IDLE, RUNNING, SKIPPED, SUCCESS, Answer, Status
 
@@ -15,8 +17,12 @@ class _InTurn(Control):
     """
 
     goes_on: ClassVar[Status] = SUCCESS
+    may_run = False
     gives_way: ClassVar[bool] = False
     """After a child that has ended in its first tick it answers RUNNING, so that it can be halted between quick children."""
+
+    keeps_place: ClassVar[bool] = False
+    """Whether it begins where it was when it was halted."""
 
     remembers = ("_index", "_skipped")
 
@@ -24,6 +30,19 @@ class _InTurn(Control):
         super().__init__(wiring)
         self._index = 0
         self._skipped = 0
+
+    @classmethod
+    def may_end(cls, given: Given, children: Listed[Ends]) -> Ends:  # noqa: ARG003
+        """Go on or not with each. How many were skipped is kept after a child that ends it, where nobody resets it."""
+        last = stops_at(children, cls.goes_on)
+        ticked = together(children[: None if last is None else last + 1])
+        over = ticked & (ENDS - {cls.goes_on})
+        if last is not None:
+            return over
+        counts_on = bool(over or cls.keeps_place)
+        passed = cls.goes_on in ticked or (counts_on and bool(ticked & SKIPS))
+        skipped = bool(over and ticked & SKIPS) or all(child & SKIPS for child in children)
+        return over | (frozenset({cls.goes_on}) if passed else NO_END) | (SKIPS if skipped else NO_END)
 
     def update(self) -> Answer:
         """Tick the child whose turn it is, and those after it as long as they end."""
@@ -73,11 +92,15 @@ class Fallback(_InTurn):
 class AsyncSequence(Sequence):
     """A Sequence that can be halted between children that end at once."""
 
+    may_run = True
+
     gives_way = True
 
 
 class AsyncFallback(Fallback):
     """A Fallback that can be halted between children that end at once."""
+
+    may_run = True
 
     gives_way = True
 
@@ -85,6 +108,8 @@ class AsyncFallback(Fallback):
 class SequenceWithMemory(_InTurn):
     """A Sequence that begins again with the child that failed, also after it was halted."""
 
+    may_run = True
+    keeps_place = True
     gives_way = True
 
     def halt(self) -> None:
@@ -99,6 +124,16 @@ class _Reactive(Control):
     """Ticks all children from the first in each tick; the first that runs has the others halted."""
 
     goes_on: ClassVar[Status] = SUCCESS
+    may_run = False
+
+    @classmethod
+    def may_end(cls, given: Given, children: Listed[Ends]) -> Ends:  # noqa: ARG003
+        """Go on or not with each, in one tick."""
+        last = stops_at(children, cls.goes_on)
+        ticked = together(children[: None if last is None else last + 1])
+        over = ticked & (ENDS - {cls.goes_on})
+        skipped = last is None and all(child & SKIPS for child in children)
+        return over | (ticked & {cls.goes_on} if last is None else NO_END) | (SKIPS if skipped else NO_END)
 
     def update(self) -> Answer:
         """Tick them until one runs, or ends it."""
