@@ -25,6 +25,14 @@ CHARACTER = re.compile(r"&#?\w+;|\r\n|.", re.DOTALL)
 AMPERSAND = re.compile(rb"&(?!#?\w+;)")
 """One that stands for itself."""
 ENTITY, BREAK = re.compile(r"&#?\w+;"), re.compile(r"\r\n|[\r\n\t]")
+LESS = re.compile(rb"<")
+DASHES = re.compile(rb"-(?=-)|-\Z")
+"""In a comment; the last one stands before its end."""
+DECLARATION = re.compile(rb"\s+(<\?xml[^>]*\?>)")
+_AMPERSAND = "an `&` that stands for itself is no XML, so other tools refuse the file", "write &amp;"
+_LESS = "a `<` in an attribute is no XML, so other tools refuse the file", "write &lt;"
+_DASHES = "a comment with `--` in it is no XML, so other tools refuse the file", "write other signs than dashes there"
+_BLANK = "something stands before `<?xml`, so other tools refuse the file", "begin the file with `<?xml`"
 TAG = re.compile(rb"<[A-Za-z_][^\s=/>]*")
 
 
@@ -124,6 +132,8 @@ class Document:
     root: Element
     before: str = ""
     after: str = ""
+    slips: tuple[Problem, ...] = ()
+    """What is no XML in it, and was read all the same: warnings."""
 
     def text(self) -> str:
         """Return the file's text: what it was read from, with what has been changed since."""
@@ -155,41 +165,71 @@ def parse_document(content: str | bytes, path: str = "<text>") -> Document:
     try:
         return _Parser(text, path).document(mark.decode())
     except FileError:
-        plain = _plain(text)
-        if plain == text:
+        plain = _Plain(text)
+        if plain.text == text:
             raise
     return _Parser(text, path, plain).document(mark.decode())
 
 
-def _plain(source: bytes) -> bytes:
-    """Return a text of the same length without the `&` and `<` that stand for themselves in attributes, as in ``a < b && c``.
+class _Plain:
+    """A text of the same length without what is no XML, and what BehaviorTree.CPP's reader takes all the same.
 
-    They are no XML, and BehaviorTree.CPP's reader takes them: files of the field have them in their scripts.
+    Files of the field have `&` and `<` that stand for themselves in attributes, as in ``a < b && c``, comments that are made of
+    dashes, and a blank line before `<?xml`. ``slips``: the first of each, as its index, what it is, and the cure.
     """
-    plain, index = bytearray(source), 0
-    while index < len(source):
-        start = index
-        index = source.find(b"<", start)
-        index = len(source) if index < 0 else index
-        plain[start:index] = AMPERSAND.sub(b"_", source[start:index])
-        end = b"-->" if source.startswith(b"<!--", index) else b">"
-        if match := TAG.match(source, index):
-            index = match.end()
-            while match := ATTRIBUTE.match(source, index):
-                start, index = match.span(4)
-                plain[start:index] = AMPERSAND.sub(b"_", source[start:index]).replace(b"<", b"_")
-        index = source.find(end, index) + len(end)
-        if index < len(end):
-            break
-    return bytes(plain)
+
+    def __init__(self, source: bytes) -> None:
+        self.slips: list[tuple[int, str, str]] = []
+        self._source = source
+        self._plain = bytearray(source)
+        self._declaration()
+        index = 0
+        while 0 <= index < len(source):
+            start, index = index, source.find(b"<", index)
+            self._mend((start, len(source) if index < 0 else index), AMPERSAND, _AMPERSAND)
+            if index >= 0:
+                index = self._comment(index) if source.startswith(b"<!--", index) else self._tag(index)
+        self.text = bytes(self._plain)
+
+    def _declaration(self) -> None:
+        match = DECLARATION.match(self._source)
+        if match is not None:
+            self._plain[: match.end()] = re.sub(rb"[^\n]", b" ", match[0])
+            self._note(match.start(1), _BLANK)
+
+    def _comment(self, index: int) -> int:
+        end = self._source.find(b"-->", index + 4)
+        if end >= 0:
+            self._mend((index + 4, end), DASHES, _DASHES)
+        return end + 3 if end >= 0 else -1
+
+    def _tag(self, index: int) -> int:
+        end = index + 1
+        if match := TAG.match(self._source, index):
+            end = match.end()
+            while match := ATTRIBUTE.match(self._source, end):
+                self._mend(match.span(4), AMPERSAND, _AMPERSAND)
+                self._mend(match.span(4), LESS, _LESS)
+                end = match.end()
+        return self._source.find(b">", end)
+
+    def _mend(self, span: tuple[int, int], pattern: re.Pattern[bytes], slip: tuple[str, str]) -> None:
+        for match in pattern.finditer(self._source, *span):
+            self._plain[match.start() : match.end()] = b"_" * len(match[0])
+            self._note(match.start(), slip)
+
+    def _note(self, index: int, slip: tuple[str, str]) -> None:
+        if slip not in [(message, cure) for _, message, cure in self.slips]:
+            self.slips.append((index, *slip))
 
 
 class _Parser:
     """Builds the elements while expat goes through the file; a stack, so that no nesting harms."""
 
-    def __init__(self, source: bytes, path: str, plain: bytes | None = None) -> None:
+    def __init__(self, source: bytes, path: str, plain: _Plain | None = None) -> None:
         self._source = source
-        self._plain = source if plain is None else plain
+        self._plain = source if plain is None else plain.text
+        self._slips = [] if plain is None else plain.slips
         self._path = path
         self._lines = [0, *(match.end() for match in re.finditer(rb"\n", source))]
         self._open: list[Element] = []
@@ -217,7 +257,8 @@ class _Parser:
         if self._root is None:
             raise self._error(0, "is empty")
         before, after = self._source[: self._before].decode(), self._source[self._written :].decode()
-        return Document(self._path, self._root, mark + before, after)
+        slips = [Problem(self._place(index), message, cure, "ALU619", warning=True) for index, message, cure in self._slips]
+        return Document(self._path, self._root, mark + before, after, tuple(slips))
 
     def _place(self, index: int) -> Place:
         line = bisect_right(self._lines, index)

@@ -61,12 +61,13 @@ class TickError(TreeError):
 
 
 Report = Callable[[Problem], None]
-"""Takes a problem. What is read can go on after it: a checker collects all, a loader raises at the first."""
+"""Takes a problem. What is read can go on after it: a checker collects all, a loader raises at the first that is no warning."""
 
 
 def refuse(problem: Problem) -> None:
-    """Raise FileError at the first problem."""
-    raise FileError(problem)
+    """Raise FileError at a problem that is no warning."""
+    if not problem.warning:
+        raise FileError(problem)
 
 
 def did_you_mean(word: str, known: Iterable[str]) -> str:

@@ -112,6 +112,8 @@ class _Reader:
         root = document.root
         self._files.documents.append(document)
         self._seen.add(chain[-1])
+        for slip in document.slips:
+            self._report(slip)
         if root.tag != "root":
             raise FileError(Problem(root.place, f"begins with <{root.tag}>", f'a file of trees has <root BTCPP_format="{FORMAT}">'))
         if root.get("BTCPP_format", FORMAT) != FORMAT:
@@ -120,6 +122,10 @@ class _Reader:
         for element in root.children:
             if element.tag == "include":
                 self._include(document, element, chain)
+        for element in [one for one in root.children if one.tag == MODELS][1:]:
+            self._report(
+                Problem(element.place, f"a second <{MODELS}>", "put all models into one: BehaviorTree.CPP refuses a file with two")
+            )
         for element in root.children:
             self._define(element, len([one for one in root.children if one.tag == "BehaviorTree"]))
 
@@ -158,8 +164,10 @@ class _Reader:
 def _models(element: Element, report: Report) -> Iterator[NodeType]:
     for one in element.children:
         category = CATEGORIES.get(one.tag)
-        if category is None or not one.get("ID"):
-            report(Problem(one.place, f"<{one.tag}> is no model of a node", 'write <Action ID="..."> or another category'))
+        if category is None:
+            continue  # editors keep there what they know besides
+        if not one.get("ID"):
+            report(Problem(one.place, f"<{one.tag}> without an ID is the model of no node", f'write <{one.tag} ID="...">'))
         else:
             ports = [_port(port) for port in one.children if port.tag in DIRECTIONS]
             yield node_type(one.get("ID"), category, ports)

@@ -16,6 +16,8 @@ BOOLEANS = {"0": False, "1": True, "false": False, "true": True, "False": False,
 
 
 _WHOLE = re.compile(r"-?[0-9]{1,18}")
+_WHOLE_PORT = re.compile(r"-?[0-9]{1,20}[ \t\r\n]*", re.ASCII)
+"""A port's: blanks and a plus before it, and signs between digits are refused, as BehaviorTree.CPP refuses them."""
 _NUMBER = re.compile(r"-?(?:[0-9]+\.?[0-9]*|\.[0-9]+)(?:[eE][-+]?[0-9]+)?")
 _LONGEST = 400
 
@@ -64,19 +66,21 @@ def whole(name: str, least: int, largest: int) -> PortType:
         return int(value)
 
     def parse(text: str) -> int:
-        try:
-            return cast(int(text))
-        except ValueError:
-            raise _wrong(text, name) from None
+        number = int(text) if _WHOLE_PORT.fullmatch(text) else None
+        if number is None or not least <= number <= largest:
+            raise _wrong(text, name)
+        return number
 
     return PortType(name, parse, cast)
 
 
 def _parse_double(text: str) -> float:
     try:
-        return float(text)
+        if "_" not in text:
+            return float(text)
     except ValueError:
-        raise _wrong(text, "double") from None
+        pass
+    raise _wrong(text, "double")
 
 
 def _cast_double(value: object) -> float:
@@ -147,7 +151,7 @@ def list_of(item: PortType) -> PortType:
     name = f"std::vector<{item.name}>"
 
     def parse(text: str) -> object:
-        return [item.read(part) for part in text.split(";")] if text else []
+        return [item.read(part) for part in text.removesuffix(";").split(";")] if text else []
 
     def cast(value: object) -> object:
         if isinstance(value, list | tuple):

@@ -172,3 +172,75 @@ NO_XML = ('<root a="1 b="2"/>', "<root><</root>", "<root><A b=<c>/></root>", "<r
 def test_what_no_reader_takes_is_still_no_xml(text):
     with pytest.raises(FileError, match="is no XML"):
         parse_document(text, "m.xml")
+
+
+SLIPS = (
+    ("<!-------><root/>", 1, 5, "comment"),
+    ("<root><!-- a -- b --></root>", 1, 14, "comment"),
+    ("<root><!--> --></root>", 0, 0, ""),
+    ('\n \n<?xml version="1.0"?>\n<root/>', 3, 1, "<?xml"),
+    ('<root><a b="1 && 2 && 3"/></root>', 1, 15, "&"),
+    ('<root><a b="1 < 2"/></root>', 1, 15, "<"),
+)
+
+
+@pytest.mark.parametrize(("text", "line", "column", "what"), SLIPS)
+def test_what_is_no_xml_and_is_read_all_the_same_is_a_warning_with_its_place(text, line, column, what):
+    document = parse_document(text)
+    assert document.text() == text
+    assert document.root.tag == "root"
+    assert [(slip.place.line, slip.place.column, slip.warning) for slip in document.slips] == ([(line, column, True)] if line else [])
+    assert all(what in slip.message and slip.cure for slip in document.slips)
+
+
+def test_what_an_editor_keeps_among_the_models_is_left_to_it():
+    """Elements that are no category of nodes, and such inside a model, as MoveIt Pro writes them."""
+    more = '<MetadataFields><Metadata subcategory="x"/></MetadataFields>'
+    text = GROOT.replace("<TreeNodesModel>", f"<TreeNodesModel>{more}").replace("</Action>", f"{more}</Action>")
+    assert list(read_text(text).declared().get("Go").ports) == ["to"]
+
+
+@pytest.mark.parametrize("model", ["<TreeNodesModel/><TreeNodesModel/>", "<TreeNodesModel><SubTree/></TreeNodesModel>"])
+def test_models_that_the_field_refuses_are_refused(model):
+    behaviortreepy = pytest.importorskip("behaviortreepy")
+    text = f'<root BTCPP_format="4"><BehaviorTree ID="m"><AlwaysSuccess/></BehaviorTree>{model}</root>'
+    with pytest.raises((RuntimeError, ValueError)):
+        behaviortreepy.BehaviorTreeFactory().create_tree_from_text(text)
+    with pytest.raises(FileError):
+        read_text(text)
+
+
+WHOLE = ("1", "-1", "1 ", "1\t", " 1", " 1 ", "+1", "0", "4294967295", "4294967296", "\u0661", "")
+LISTS = ("1;2", "1;2;", "1 ;2", "1; 2", " 1;2", "1;;2", "")
+
+
+def loads(node):
+    """Tell whether BehaviorTree.CPP makes a tree of a node, and whether this library does."""
+    behaviortreepy = pytest.importorskip("behaviortreepy")
+    text = f'<root BTCPP_format="4"><BehaviorTree ID="m">{node}</BehaviorTree></root>'
+    answers = []
+    for make in (
+        lambda: behaviortreepy.BehaviorTreeFactory().create_tree_from_text(text),
+        lambda: make_tree(read_text(text), standard_palette(), lambda: 0),
+    ):
+        try:
+            make()
+        except (RuntimeError, ValueError, TreeError):
+            answers.append(False)
+        else:
+            answers.append(True)
+    return answers
+
+
+@pytest.mark.parametrize("value", WHOLE)
+@pytest.mark.parametrize("node", ['<Sleep msec="{}"/>', '<Repeat num_cycles="{}"><AlwaysSuccess/></Repeat>'])
+def test_whole_numbers_are_read_as_the_field_reads_them(node, value):
+    theirs, ours = loads(node.format(value))
+    assert ours == theirs
+
+
+@pytest.mark.parametrize("value", LISTS)
+@pytest.mark.parametrize("item", ["Int", "String"])
+def test_lists_are_read_as_the_field_reads_them(item, value):
+    theirs, ours = loads(f'<Loop{item} queue="{value}" value="{{x}}"><AlwaysSuccess/></Loop{item}>')
+    assert ours == theirs
