@@ -88,15 +88,21 @@ class Uses:
             port = known.get(attribute.name)
             if port is None:
                 continue
-            written = port.direction is not Direction.INPUT
-            if site.kind == "SetBlackboard" and port.name == "output_key":
-                if write and pointer(attribute.value, port.name) is None:
-                    yield Use(site.board.key(attribute.value), attribute.value, True, attribute, None, _set_type(site))
-                continue
             key = pointer(attribute.value, port.name)
-            if key is None or written != write or (not write and self._traits.is_optional(site, port.name)):
+            names_entry = site.kind == "SetBlackboard" and port.name == "output_key"
+            if names_entry and key is None and write:
+                yield Use(site.board.key(attribute.value), attribute.value, True, attribute, None, _set_type(site))
+            if key is None or not self._uses(site, port, write=write) or (names_entry and write):
                 continue
             yield Use(site.board.key(key), key, write, attribute, None, _type_name(port), port.unit)
+
+    def _uses(self, site: Site, port: Port, *, write: bool) -> bool:
+        """Tell whether a port writes, or else needs what it reads: of one that does both, only a class is known to need it."""
+        if write:
+            return port.direction is not Direction.INPUT
+        known = site.type is not None and site.type.make is not None
+        needs = port.direction is Direction.INPUT or (port.direction is Direction.INOUT and known)
+        return needs and not self._traits.is_optional(site, port.name)
 
     def _script(self, site: Site, attribute: Attribute) -> Iterator[Use]:
         program = self._programs.program(attribute)

@@ -48,9 +48,9 @@ def before(site: Site) -> Iterator[Attribute]:
 
 
 def within(site: Site) -> Iterator[Attribute]:
-    """Yield those of the node itself: a text that names an entry holds none."""
+    """Yield those of the node itself: a text that names an entry holds none, and an empty Script does nothing."""
     for attribute in _present(site, PORTS.get(site.kind, ("if",))):
-        if not attribute.value.lstrip().startswith("{"):
+        if not attribute.value.lstrip().startswith("{") and (attribute.value or site.kind != "Script"):
             yield attribute
 
 

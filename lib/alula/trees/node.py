@@ -305,9 +305,9 @@ class Node(Behaviour):  # type: ignore[misc]  # py_trees is seen untyped
         raise TickError(f"{self.place()}: the port '{port}' is no number")
 
     def put(self, port: str, value: object) -> None:
-        """Write an output; nothing is written where the file gives no entry for it."""
+        """Write an output; nothing is written where the file gives no entry for it, or an empty text."""
         text = self.wiring.ports.get(port)
-        if text is None:
+        if not text:
             return
         key = pointer(text, port)
         if key is None:

@@ -86,7 +86,7 @@ def _verify_attribute(attribute: Attribute, known: NodeType, element: Element, r
         )
         return
     key = pointer(attribute.value, port.name)
-    if key is None and port.direction is Direction.OUTPUT:
+    if key is None and port.direction is Direction.OUTPUT and attribute.value:  # an empty one: nothing is written
         report(Problem(attribute.place, f"the port '{port.name}' is written", f'it names an entry: {port.name}="{{...}}"', code="ALU605"))
     elif key is None:
         try:

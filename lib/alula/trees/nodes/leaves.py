@@ -38,8 +38,13 @@ class _Code:
         self._node = node
         self._text = ""
         self._script: Script | None = None
-        if not node.wiring.ports.get("code", "").lstrip().startswith("{"):
+        if not node.wiring.ports.get("code", "").lstrip().startswith("{") and not self.is_empty:
             self.script()  # what is wrong in it is told when the tree is made
+
+    @property
+    def is_empty(self) -> bool:
+        """Whether the file gives it as an empty text: a Script that does nothing, as editors write it."""
+        return self._node.wiring.ports.get("code") == "" and isinstance(self._node, ScriptNode)
 
     def script(self) -> Script:
         """Return it."""
@@ -62,7 +67,8 @@ class ScriptNode(SyncAction):
 
     def update(self) -> Answer:
         """Run it."""
-        self._code.script().run()
+        if not self._code.is_empty:
+            self._code.script().run()
         return SUCCESS
 
 

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
+from dataclasses import replace
 
 from alula.trees.ends import FAILS, Ends, Given, answer_in
 from alula.trees.errors import TickError
@@ -61,6 +62,8 @@ class Loop(Decorator):
             self._items = value
         elif isinstance(value, tuple | str) and self._items is None:
             self._items = self._list(value)
+        elif value is None and self._items is None:
+            raise TickError(f"{self.place()}: the port 'queue' reads '{self.wiring.ports['queue']}', which nothing has written")
         elif value is not None and not isinstance(value, tuple | str):
             raise TickError(f"{self.place()}: the port 'queue' reads no list")
 
@@ -78,7 +81,7 @@ class Loop(Decorator):
 
 def _loop(name: str, item: PortType) -> type[Loop]:
     ports = (
-        inout_port("queue", doc="a list, or text with semicolons between its items"),
+        replace(inout_port("queue", doc="a list, or text with semicolons between its items"), required=True),
         input_port("if_empty", STATUS, "SUCCESS", "what it answers when there are no more items"),
         output_port("value", item, doc="the item"),
     )
