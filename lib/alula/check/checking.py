@@ -128,7 +128,7 @@ def _missing(whole: Whole) -> Iterator[Problem]:
     """Yield inputs that a file does not give and that have no default; of nodes that only a model tells of, nobody knows."""
     for site in whole.root.walk():
         for port in site.type.ports.values() if site.type and site.type.make else ():
-            if port.direction is not Direction.OUTPUT and site.given(port.name) is None and not port.required:
+            if port.direction is not Direction.OUTPUT and not port.optional and site.given(port.name) is None and not port.required:
                 message = f"'{site.kind}' has no input '{port.name}', which has no default"
                 yield of_element("ALU604", site.element, message, f'add {port.name}="..."', warning=whole.foreign)
 

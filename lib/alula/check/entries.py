@@ -84,7 +84,7 @@ class Uses:
 
     def _ports(self, site: Site, *, write: bool) -> Iterator[Use]:
         known = site.type.ports if site.type else {}
-        for attribute in site.ports():
+        for attribute in (*site.ports(), *_by_default(site)):
             port = known.get(attribute.name)
             if port is None:
                 continue
@@ -124,6 +124,13 @@ class Uses:
                 for child in children(node):
                     if not (isinstance(node, Call) and isinstance(child, Name)) and not _is_state(node, child):
                         yield from self._node(board, attribute, child)
+
+
+def _by_default(site: Site) -> Iterator[Attribute]:
+    """Yield the outputs that the file does not give and that the type has an entry for, as if they stood in the file."""
+    for port in site.type.ports.values() if site.type else ():
+        if port.direction is not Direction.INPUT and port.default and port.name not in site.element.attributes:
+            yield Attribute(port.name, port.default, site.element.place)
 
 
 def _is_state(node: Node, child: Node) -> bool:

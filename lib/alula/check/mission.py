@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
+from dataclasses import replace
 from pathlib import Path
 
 from alula.check.checking import Beside, check
@@ -11,10 +12,9 @@ from alula.check.rules import SkillRules
 from alula.check.skills import Skills, SkillTraits
 from alula.language.messages import NO_MESSAGES, Messages
 from alula.missions.mission_file import READY, STOP_HERE
-from alula.missions.palette import mission_palette
+from alula.missions.palette import no_class, palette_of
 from alula.missions.part import NO_PART, MissionPart
 from alula.model.model import Skillset
-from alula.trees import nav2
 from alula.trees.errors import FileError, Problem
 from alula.trees.palette import Palette
 from alula.trees.reading import TreeFiles, read_models, read_text
@@ -44,6 +44,8 @@ def check_mission(
     known = palette_for(files, skillsets, palettes, part)
     own = (rules.units, rules.results, rules.resources, NameRules(skills).names)
     found += check(files, known, SkillTraits(skills), own, beside=BESIDE, foreign=bool(palettes))
+    if not palettes and (problem := no_class(files, known)) is not None:
+        found.append(replace(problem, warning=True))
     endless = [problem for problem in found if problem.code.startswith("ALU0")]
     if endless:
         raise FileError(endless[0])
@@ -53,6 +55,4 @@ def check_mission(
 
 def palette_for(files: TreeFiles, skillsets: Sequence[Skillset], palettes: Sequence[Path], part: MissionPart) -> Palette:
     """Return the types that a mission may have: its own models, those of palettes, Nav2's, and all that the robot has; raises FileError."""
-    more = [one for palette in palettes for one in read_models(palette)]
-    types = {one.name: one for one in (*files.declared(), *more, *nav2.palette(), *mission_palette(skillsets, part))}
-    return Palette(types.values())
+    return palette_of(files, skillsets, part, more=[one for palette in palettes for one in read_models(palette)])

@@ -54,5 +54,6 @@ class PlainTraits:
         return name in self._names or "." in name
 
     def is_optional(self, site: Site, port: str) -> bool:
-        """Tell whether the port asks whether there is such an entry."""
-        return port == "entry" and site.kind in {"WasEntryUpdated", "SkipUnlessUpdated", "WaitValueUpdate"}
+        """Tell what the type tells of the port."""
+        known = site.type.ports.get(port) if site.type else None
+        return known is not None and known.optional

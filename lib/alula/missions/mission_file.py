@@ -17,7 +17,7 @@ from py_trees.behaviours import Success
 from alula.missions.blackboard import Blackboard
 from alula.missions.conditions import Condition, answers
 from alula.missions.nodes import Needs
-from alula.missions.palette import mission_palette
+from alula.missions.palette import no_class, palette_of
 from alula.missions.part import MissionPart
 from alula.missions.pending import PendingInterrupts
 from alula.missions.plan import InputError, Inputs, MissionPlan
@@ -26,7 +26,7 @@ from alula.missions.skillset import Client, Clock
 from alula.missions.world import World, asked_data, states_of
 from alula.model.model import Skillset
 from alula.trees.blackboard import Blackboard as TreeBoard
-from alula.trees.errors import TreeError
+from alula.trees.errors import FileError, TreeError
 from alula.trees.factory import build_tree
 from alula.trees.node import Node
 from alula.trees.palette import Category, Direction, NodeType, Port, node_type
@@ -92,7 +92,7 @@ class Maker:
         self._enums = states_of(skillsets)
         self._resources = frozenset(f"{one.name}.{resource}" for one in skillsets for resource in one.resource_index)
         self._data = frozenset(f"{one.name}.{data}" for one in skillsets for data in one.data_index)
-        self._palette = mission_palette(skillsets, part, crew)
+        self._palette = palette_of(files, skillsets, part, crew)
         for skillset, data in asked_data(files, skillsets).items():
             if data:
                 crew.clients[skillset].follow(data)
@@ -112,7 +112,10 @@ def plan_of_file(path: Path, name: str, skillsets: Sequence[Skillset], inputs: I
     """Return the plan of a mission's file; raises InputError."""
     try:
         files = read_files(path)
-        verify(files, mission_palette(skillsets, part))
+        palette = palette_of(files, skillsets, part)
+        verify(files, palette)
+        if (problem := no_class(files, palette)) is not None:
+            raise FileError(problem)
     except TreeError as error:
         raise InputError(str(error)) from error
     model = files.models.get(files.main) or node_type(files.main, Category.SUBTREE)

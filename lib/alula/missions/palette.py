@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Iterable, Sequence
 
 from alula.missions.blackboard import Blackboard
 from alula.missions.nodes import mission_nodes
@@ -10,14 +10,75 @@ from alula.missions.part import MissionPart
 from alula.missions.pending import PendingInterrupts
 from alula.missions.skills import Crew, robot_nodes
 from alula.model.model import Skillset
-from alula.trees.palette import Palette
+from alula.trees import nav2
+from alula.trees.document import Element
+from alula.trees.errors import Problem
+from alula.trees.palette import Category, NodeType, Palette, name_in_files
+from alula.trees.reading import TreeFiles, type_name
 from alula.trees.standard import standard_palette
 
 
 def mission_palette(skillsets: Sequence[Skillset], part: MissionPart, crew: Crew | None = None) -> Palette:
     """Return BehaviorTree.CPP's nodes, Alula's, the robot's own, its skills and resources; without a crew the last can't be ticked."""
-    memory = Blackboard(clock_ns=int, pending=PendingInterrupts(int)) if crew is None else crew.memory
-    palette = standard_palette() | mission_nodes(memory) | robot_nodes(skillsets, crew)
+    return _with_robot(standard_palette() | mission_nodes(_memory(crew)), skillsets, part, crew)
+
+
+def palette_of(
+    files: TreeFiles, skillsets: Sequence[Skillset], part: MissionPart, crew: Crew | None = None, more: Iterable[NodeType] = ()
+) -> Palette:
+    """Return the types that the trees of files may have: those of `mission_palette`, Nav2's, and what the files, or ``more``, declare.
+
+    A declaration gives way to a class of that name; but where it tells of another node than one of Alula's or Nav2's, it is the file's own.
+    """
+    types = {**{one.name: one for one in more}, **{one.name: one for one in files.declared()}}
+    own = {name_in_files(node) for node in part.nodes}
+    types.update({one.name: one for one in nav2.palette() if one.name not in own and not _is_another(types.get(one.name), one)})
+    types.update({one.name: one for one in mission_nodes(_memory(crew)) if not _is_another(types.get(one.name), one)})
+    types.update({one.name: one for one in standard_palette()})
+    return _with_robot(Palette(types.values()), skillsets, part, crew)
+
+
+def _memory(crew: Crew | None) -> Blackboard:
+    return Blackboard(clock_ns=int, pending=PendingInterrupts(int)) if crew is None else crew.memory
+
+
+def _with_robot(palette: Palette, skillsets: Sequence[Skillset], part: MissionPart, crew: Crew | None) -> Palette:
+    palette = palette | robot_nodes(skillsets, crew)
     for node in part.nodes:
         palette.register(node)
     return palette
+
+
+def _is_another(declared: NodeType | None, known: NodeType) -> bool:
+    """Tell whether a declaration is of another node: of another category, or with ports that this one has not."""
+    if declared is None:
+        return False
+    ports = ((port, known.ports.get(port.name)) for port in declared.ports.values())
+    return declared.category is not known.category or any(mine is None or mine.direction is not port.direction for port, mine in ports)
+
+
+def without_class(files: TreeFiles, palette: Palette) -> dict[str, Element]:
+    """Return the nodes that the files declare and no class makes, by their names, each where it is used first."""
+    found: dict[str, Element] = {}
+    for tree in files.trees.values():
+        for top in tree.children:
+            for element in top.iterate():
+                known = palette.get(type_name(element))
+                if element.tag != Category.SUBTREE.value and known is not None and known is files.models.get(known.name):
+                    found.setdefault(known.name, element)
+    return found
+
+
+def no_class(files: TreeFiles, palette: Palette) -> Problem | None:
+    """Return what is to be done about nodes that no class makes, at the first of them; None where there are none."""
+    found = without_class(files, palette)
+    if not found:
+        return None
+    first, *others = found
+    library = {one.name for one in (*nav2.palette(), *mission_nodes(_memory(None)))}
+    shadowed = [name for name in found if name in library]
+    which = f"'{first}'" + (f" and {len(others)} more" if others else "")
+    message = f"{which} {'are' if others else 'is'} declared in the file, and no class makes {'them' if others else 'it'}"
+    if shadowed:
+        message += f" ('{shadowed[0]}' is declared otherwise than the node of that name here, so it is taken for another)"
+    return Problem(found[first].place, message, f"write a class for {', '.join(found)} in the robot's part `missions`", "ALU620")

@@ -46,12 +46,16 @@ class Port:
     unit: str = ""
     required: bool = False
     """A file has to give it; else a node does without it, or says so when it is ticked."""
+    optional: bool = False
+    """The node does without it, and without a value of the entry that it names."""
 
 
 @public("alula.trees")
-def input_port(name: str, type_: PortType = ANY, default: str | None = None, doc: str = "", *, unit: str = "") -> Port:
+def input_port(
+    name: str, type_: PortType = ANY, default: str | None = None, doc: str = "", *, unit: str = "", optional: bool = False
+) -> Port:
     """Return a port that is read."""
-    return Port(name, type_, Direction.INPUT, default, doc, unit)
+    return Port(name, type_, Direction.INPUT, default, doc, unit, optional=optional)
 
 
 @public("alula.trees")

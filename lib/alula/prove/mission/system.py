@@ -23,7 +23,7 @@ from pathlib import Path
 
 from alula.missions.director import Director, Outcome
 from alula.missions.mission_file import STOP_HERE, FiledMission, plan_of_file
-from alula.missions.palette import mission_palette
+from alula.missions.palette import palette_of, without_class
 from alula.missions.part import MissionPart
 from alula.missions.plan import InputError, Inputs
 from alula.missions.skill_types import OUTCOME_PORT
@@ -305,9 +305,7 @@ class _Starting:
 
 def nowhere_made(files: TreeFiles, skillsets: Sequence[Skillset], part: MissionPart) -> list[NodeType]:
     """Return the types of node that a mission's trees use and its files only declare."""
-    palette = mission_palette(skillsets, part)
-    used = {type_name(element) for tree in files.trees.values() for element in tree.iterate()}
-    return [one for one in files.declared() if one.name in used and palette.get(one.name) is None]
+    return [files.models[name] for name in without_class(files, palette_of(files, skillsets, part))]
 
 
 def _named(files: TreeFiles) -> frozenset[str]:

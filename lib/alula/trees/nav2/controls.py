@@ -208,8 +208,8 @@ class PauseResumeController(Control):
     """Ticks its first child; the others are for a pause (while it lasts, when it begins, when it ends), which nobody asks for here."""
 
     ports = (
-        input_port("pause_service_name", STRING, None, "service that asks for a pause"),
-        input_port("resume_service_name", STRING, None, "service that ends it"),
+        input_port("pause_service_name", STRING, None, "service that asks for a pause", optional=True),
+        input_port("resume_service_name", STRING, None, "service that ends it", optional=True),
     )
     child_count = (1, 4)
 

@@ -75,8 +75,8 @@ class DistanceController(_Gate):
 
     ports = (
         input_port("distance", DOUBLE, "1.0", "how far the robot goes before the child is begun again", unit="m"),
-        input_port("global_frame", STRING, None, "reference frame"),
-        input_port("robot_base_frame", STRING, None, "the robot's own frame"),
+        input_port("global_frame", STRING, None, "reference frame", optional=True),
+        input_port("robot_base_frame", STRING, None, "the robot's own frame", optional=True),
     )
 
     remembers = ("_from",)
@@ -106,8 +106,8 @@ class _GoalGate(_Gate):
     """Opens when the goal is another."""
 
     ports: ClassVar[tuple[Port, ...]] = (
-        input_port("goal", doc="the goal (default: the entry 'goal')"),
-        input_port("goals", doc="the goals (default: the entry 'goals')"),
+        input_port("goal", doc="the goal (default: the entry 'goal')", optional=True),
+        input_port("goals", doc="the goals (default: the entry 'goals')", optional=True),
     )
 
     remembers: ClassVar[tuple[str, ...]] = ("_goals",)
@@ -205,8 +205,8 @@ class GoalUpdater(Decorator):
     """Ticks its child with the newest goal, here always the one that it was given."""
 
     ports = (
-        input_port("input_goal", doc="the goal so far"),
-        input_port("input_goals", doc="the goals so far"),
+        input_port("input_goal", doc="the goal so far", optional=True),
+        input_port("input_goals", doc="the goals so far", optional=True),
         output_port("output_goal", doc="the newest goal"),
         output_port("output_goals", doc="the newest goals"),
     )
@@ -227,7 +227,7 @@ class PathLongerOnApproach(Decorator):
     """
 
     ports = (
-        input_port("path", doc="the path"),
+        input_port("path", doc="the path", optional=True),
         input_port("prox_len", DOUBLE, "3.0", "the goal is near when the path to it is shorter", unit="m"),
         input_port("length_factor", DOUBLE, "2.0", "a path is much longer when it is so many times as long"),
     )

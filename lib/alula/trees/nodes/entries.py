@@ -54,7 +54,7 @@ class UnsetBlackboard(SyncAction):
         return SUCCESS
 
 
-ENTRY = (input_port("entry", ANY, doc="the entry, as {entry}"),)
+ENTRY = (input_port("entry", ANY, doc="the entry, as {entry}", optional=True),)
 
 
 class WasEntryUpdated(SyncAction):

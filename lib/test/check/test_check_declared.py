@@ -1,0 +1,115 @@
+"""Nodes that a file declares: those that no class makes, those that have the name of one of ours, and Nav2's."""
+
+from __future__ import annotations
+
+import pytest
+
+from alula.check.findings import findings_of
+from alula.language.errors import Severity
+from alula.language.models import ModelFile, check_texts
+from alula.missions.mission_file import plan_of_file
+from alula.missions.part import NO_PART, MissionPart
+from alula.missions.plan import InputError
+from alula.prove.mission.prover import prove_mission
+from alula.trees.node import SyncAction
+from alula.trees.palette import input_port
+from alula.trees.status import SUCCESS
+from finding_pages.mission_checks import ROBOT
+
+FILE = """<root BTCPP_format="4" main_tree_to_execute="m">
+  <BehaviorTree ID="m">{}</BehaviorTree>
+  <TreeNodesModel>{}</TreeNodesModel>
+</root>
+"""
+GRIP = '<Action ID="Grip"><input_port name="force"/><output_port name="held" type="double" default="{held}"/></Action>'
+WAIT_FOR = '<Action ID="WaitFor"><input_port name="signal"/></Action>'
+CHECKED = '<Sequence><Grip force="2"/><Grip/><ForceSuccess><drone.hover duration="2"/></ForceSuccess></Sequence>'
+
+
+@pytest.fixture(scope="module")
+def robot():
+    (file,) = check_texts([ModelFile("robot.rl", ROBOT)])
+    return file.skillsets
+
+
+def found(body, models, robot, part=NO_PART):
+    return findings_of("m.xml", FILE.format(body, models).encode(), robot, part=part)
+
+
+class Grip(SyncAction):
+    """Grips."""
+
+    ports = (input_port("force", default="1"),)
+
+    def update(self):
+        """Grip."""
+        return SUCCESS
+
+
+def test_a_node_that_no_class_makes_is_one_warning_that_says_what_to_do(robot):
+    (finding,) = found(CHECKED, GRIP, robot)
+    assert (finding.code, finding.severity, finding.span.line) == ("ALU620", Severity.WARNING, 2)
+    assert "'Grip' is declared in the file" in finding.message
+    assert "a class for Grip in the robot's part `missions`" in finding.hint
+
+
+def test_a_run_refuses_it_with_the_same_words(robot, tmp_path):
+    path = tmp_path / "m.xml"
+    path.write_text(FILE.format(CHECKED, GRIP))
+    with pytest.raises(InputError, match=r"m\.xml:2:.*'Grip' is declared.*part `missions`"):
+        plan_of_file(path, "m", robot, {}, NO_PART)
+
+
+def test_a_class_of_the_robot_makes_it(robot, tmp_path):
+    part = MissionPart((Grip,))
+    model = GRIP.replace('<output_port name="held" type="double" default="{held}"/>', "")
+    path = tmp_path / "m.xml"
+    path.write_text(FILE.format(CHECKED, model))
+    assert plan_of_file(path, "m", robot, {}, part).skillsets == ("drone",)
+    assert found(CHECKED, model, robot, part) == []
+
+
+def test_the_files_own_declaration_wins_over_a_node_of_ours(robot, tmp_path):
+    (finding,) = found('<WaitFor signal="go"/>', WAIT_FOR, robot)
+    assert finding.code == "ALU620"
+    assert "'WaitFor' is declared otherwise than the node of that name here" in finding.message
+    path = tmp_path / "m.xml"
+    path.write_text(FILE.format('<WaitFor signal="go"/>', WAIT_FOR))
+    with pytest.raises(InputError, match="taken for another"):
+        plan_of_file(path, "m", robot, {}, NO_PART)
+
+
+def test_a_declaration_of_a_node_of_ours_as_it_is_changes_nothing(robot):
+    assert found('<WaitFor if="1"/>', '<Action ID="WaitFor"><input_port name="if"/></Action>', robot) == []
+
+
+def test_what_is_checked_with_nav2s_nodes_can_be_run(robot, tmp_path):
+    body = '<RecoveryNode number_of_retries="2"><RateController hz="1"><AlwaysSuccess/></RateController><AlwaysSuccess/></RecoveryNode>'
+    path = tmp_path / "m.xml"
+    path.write_text(FILE.format(body, '<Control ID="RecoveryNode"><input_port name="number_of_retries"/></Control>'))
+    assert findings_of(str(path), path.read_bytes(), robot) == []
+    assert plan_of_file(path, "m", robot, {}, NO_PART).skillsets == ("drone",)
+
+
+def test_nav2_reads_goals_unchecked(robot):
+    goal = '<GoalUpdater input_goal="{goal}" output_goal="{g}"><AlwaysSuccess/></GoalUpdater>'
+    assert found(goal, "", robot) == []
+    assert found("<GoalUpdatedController><AlwaysSuccess/></GoalUpdatedController>", "", robot) == []
+
+
+def test_an_output_is_written_by_its_default(robot):
+    body = '<Sequence><Grip force="2"/>{}<Script code="x := held"/></Sequence>'
+    assert [one.code for one in found(body.format(""), GRIP, robot)] == ["ALU620"]
+    without = GRIP.replace(' default="{held}"', "")
+    assert sorted(one.code for one in found(body.format(""), without, robot)) == ["ALU607", "ALU620"]
+
+
+def test_proofs_take_it_for_a_node_that_may_do_anything(robot, tmp_path):
+    """It may fail, so the skill after it may not be reached, and may succeed, so it may be."""
+    path = tmp_path / "m.xml"
+    body = '<Fallback><Sequence><Grip force="1"/><ScriptCondition code="held == 1"/></Sequence><drone.hover duration="2"/></Fallback>'
+    path.write_text(FILE.format(body, GRIP))
+    proved = prove_mission(path, robot, NO_PART, timeout_s=60)
+    codes = [one.code for one in (*proved.findings, *proved.accepted)]
+    assert "ALU711" not in codes
+    assert not [one for one in proved.findings if "never ticked" in one.message]
