@@ -28,10 +28,11 @@ from alula.model.span import Span
 from alula.records.causes.fault_file import states_of_faults
 from alula.trees.document import read_source
 from alula.trees.errors import FileError
+from alula.trees.reading import PROJECT
 
 Tell = Callable[[str], None]
 """Takes a line about progress, or about what is left out."""
-MISSIONS = ".xml"
+MISSIONS = (".xml", PROJECT)
 """How the name of a mission's file ends."""
 TIME_S = 30.0
 """What the proofs of a file may take."""
@@ -57,7 +58,7 @@ def check_files(
     a ``counterexample``.
 
     Args:
-        paths: models (``*.skill``, ``*.rl``), folders of them, missions (``*.xml``); none: the robot's models.
+        paths: models (``*.skill``, ``*.rl``), folders of them, missions (``*.xml``, ``*.btproj``); none: the robot's models.
         robot: its folder, whose models and nodes the missions are made of; None: that of the current folder or above.
         palettes: of missions, files of more types of nodes (TreeNodesModel).
         proofs: False: leave out the proofs.
@@ -167,7 +168,7 @@ def prove_missions(files: Sequence[ModelFile], timeout_s: float, tell: Tell = ig
         return
     from alula.prove.mission.prover import prove_mission  # which brings its solvers along
 
-    skillsets, part, _ = _robot(tell)
+    skillsets, part, _ = _robot(ignore)  # what is to be told of it was told when they were checked
     faults = states_of_faults(skillsets, tell) if skillsets else {}
     for file in sound if skillsets else []:
         report = partial(_tell_runs, tell, file.path)

@@ -14,7 +14,9 @@ from alula.trees.document import Attribute
 from alula.trees.errors import Problem
 from alula.trees.node import pointer
 from alula.trees.palette import Direction, Port
+from alula.trees.reading import PRECONDITIONS
 from alula.trees.script.syntax import Assignment, Call, Chain, Comparison, Conditional, Literal, Name, Node, Prefix, children
+from alula.trees.status import SUCCESS
 from alula.trees.values import ANY, NUMBERS, STRING, TYPES
 
 NUMBER, TEXT, UNKNOWN = "a number", "a text", ""
@@ -22,6 +24,9 @@ NUMBER, TEXT, UNKNOWN = "a number", "a text", ""
 _NUMERIC = frozenset({NUMBER, *(one.name for one in NUMBERS)})
 _AT_ONCE = frozenset({"Parallel", "ParallelAll", "ReactiveSequence", "ReactiveFallback", "WhileDoElse", "PipelineSequence"})
 """Nodes whose children are ticked in an order that their answers make: what one writes, any other may find."""
+
+
+_ASKED = frozenset(PRECONDITIONS)
 
 
 @dataclass(frozen=True)
@@ -201,13 +206,19 @@ def read_too_early(root: Site, uses: Uses, given: Collection[str], others: Write
     by_then = {root.board.key(name) for name in given}
     later = {**others, **_written_in(root, uses)}
     names = sorted({use.name for use in later.values()} | set(given))
+    taken: dict[Key, Site] = {}
 
     def visit(site: Site) -> Iterator[Problem]:
         yield from judged(uses.before(site))
         if site.kind in _AT_ONCE:
             by_then.update(use.key for child in site.children for use in uses.of(child) if use.write)
+        unset: set[Key] = set()
         for child in site.children:
             yield from visit(child)
+            unset |= {key for key in _unset(site, child) if key in by_then}
+            by_then.difference_update(unset & set(_unset(site, child)))
+            taken.update(dict.fromkeys(_unset(site, child), child))
+        by_then.update(unset)  # behind this node nobody knows whether it came to that
         yield from judged(uses.after(site))
 
     def judged(found: list[Use]) -> Iterator[Problem]:
@@ -216,12 +227,13 @@ def read_too_early(root: Site, uses: Uses, given: Collection[str], others: Write
                 by_then.add(use.key)
             elif use.key not in by_then:
                 by_then.add(use.key)  # one finding for an entry is enough
-                if late and use.key in others:
+                if use.key in taken:
+                    yield _taken_away(use, taken[use.key])
+                elif late and use.key in others:
                     yield replace(_perhaps_unwritten(use, others[use.key]), warning=True)
-                    continue
-                problem = _unwritten(use, later.get(use.key), names)
-                outside = foreign and use.key not in later and use.key[0] == root.board.number
-                yield replace(problem, warning=outside)
+                else:
+                    outside = foreign and use.key not in later and use.key[0] == root.board.number
+                    yield replace(_unwritten(use, later.get(use.key), names), warning=outside)
 
     yield from visit(root)
 
@@ -229,6 +241,20 @@ def read_too_early(root: Site, uses: Uses, given: Collection[str], others: Write
 def _perhaps_unwritten(use: Use, writer: Use) -> Problem:
     message = f"`{use.name}` is read, and this tree may begin before line {writer.attribute.place.line} has written it"
     return use.problem("ALU607", message, "have it from the start: an output port of the main tree's model, with a default")
+
+
+def _unset(parent: Site, child: Site) -> tuple[Key, ...]:
+    """Return the entry that a child has surely taken away when the next one's turn comes."""
+    key = child.given("key") or ""
+    sure = parent.goes_on is SUCCESS and not any(one.kind in _AT_ONCE for one, _ in child.above())
+    if child.kind != "UnsetBlackboard" or not sure or pointer(key, "key") is not None or _ASKED.intersection(child.element.attributes):
+        return ()
+    return (child.board.key(key),)
+
+
+def _taken_away(use: Use, by: Site) -> Problem:
+    message = f"`{use.name}` is read, and UnsetBlackboard in line {by.element.place.line} has taken it away"
+    return use.problem("ALU607", message, "read it before, or write it again")
 
 
 def _unwritten(use: Use, writer: Use | None, names: list[str]) -> Problem:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 from collections.abc import Iterator
 from dataclasses import dataclass, field
 from pathlib import Path
@@ -13,6 +14,10 @@ from alula.trees.values import ANY, TYPES
 
 FORMAT = "4"
 MODELS = "TreeNodesModel"
+PROJECT = ".btproj"
+"""The end of a name of Groot2's projects: files that include others, and have no main tree."""
+FORBIDDEN = re.compile(r"""[\x00-\x20\x7f<>&"'/\\:*?|.]""")
+"""What the ID of a tree must not have in it since BehaviorTree.CPP 4.8.4."""
 CATEGORIES = {category.value: category for category in Category}
 DIRECTIONS = {**{direction.value: direction for direction in Direction}, "bidirectional_port": Direction.INOUT}
 """Of ports, also as Nav2's palette writes them."""
@@ -89,7 +94,9 @@ def _with_main(files: TreeFiles, report: Report) -> TreeFiles:
     used = {type_name(one) for tree in files.trees.values() for one in tree.iterate() if one.tag == Category.SUBTREE.value}
     tops = [name for name in files.trees if name not in used]
     tops = [name for name in tops if files.trees[name].place.path == files.path] or tops
-    files.main = root.get("main_tree_to_execute") or (tops[0] if len(tops) == 1 else "")
+    is_one = len(tops) == 1 or (tops and files.path.endswith(PROJECT))
+    files.main = root.get("main_tree_to_execute") or (tops[0] if is_one else "")
+    _warn_of_names(files, report)
     if not files.trees:
         report(Problem(root.place, "has no <BehaviorTree>", "a file of missions needs one"))
     elif not files.main:
@@ -98,6 +105,16 @@ def _with_main(files: TreeFiles, report: Report) -> TreeFiles:
         place = root.place_of("main_tree_to_execute")
         report(Problem(place, f"there is no tree '{files.main}'", did_you_mean(files.main, files.trees)))
     return files
+
+
+def _warn_of_names(files: TreeFiles, report: Report) -> None:
+    """Tell once of IDs of trees that newer versions refuse."""
+    wrong = [(name, tree) for name, tree in files.trees.items() if FORBIDDEN.search(name)]
+    if wrong:
+        name, tree = wrong[0]
+        more = f", and {len(wrong) - 1} more IDs of trees," if len(wrong) > 1 else ""
+        message = f"'{name}'{more} {'have' if more else 'has'} a sign in it that BehaviorTree.CPP refuses there since 4.8.4"
+        report(Problem(tree.place_of("ID"), message, "use letters, digits, `_` and `-`", "ALU621", warning=True))
 
 
 class _Reader:

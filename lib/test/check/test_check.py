@@ -334,3 +334,16 @@ def test_trees_beside_the_main_one_are_checked_like_it(main, name, body, expecte
     found = findings_of("mission.xml", text.encode(), robot)
     shown = [one.source_line[one.span.column - 1 : one.span.end_column - 1] for one in found]
     assert [(one.code, text, one.severity.value) for one, text in zip(found, shown, strict=True)] == expected
+
+
+def test_a_project_is_checked_and_a_robot_that_is_not_there_is_told_once(tmp_path, capsys, monkeypatch):
+    monkeypatch.chdir(tmp_path)
+    monkeypatch.delenv("ALULA_ROBOT", raising=False)
+    (tmp_path / "one.xml").write_text(whole("<Inverter/>"))
+    project = tmp_path / "all.btproj"
+    project.write_text('<root BTCPP_format="4"><include path="one.xml"/></root>')
+    assert main([str(project)]) == 1
+    assert "ALU602" in capsys.readouterr().out
+    (tmp_path / "one.xml").write_text(whole("<AlwaysSuccess/>"))
+    assert main([str(project)]) == 0
+    assert capsys.readouterr().err.count("no skills are known") == 1

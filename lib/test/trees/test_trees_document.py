@@ -244,3 +244,20 @@ def test_whole_numbers_are_read_as_the_field_reads_them(node, value):
 def test_lists_are_read_as_the_field_reads_them(item, value):
     theirs, ours = loads(f'<Loop{item} queue="{value}" value="{{x}}"><AlwaysSuccess/></Loop{item}>')
     assert ours == theirs
+
+
+def test_a_project_reads_what_it_includes_and_needs_no_main_tree(tmp_path):
+    for name in ("one", "other"):
+        (tmp_path / f"{name}.xml").write_text(f'<root BTCPP_format="4"><BehaviorTree ID="{name}"><AlwaysSuccess/></BehaviorTree></root>')
+    project = tmp_path / "all.btproj"
+    project.write_text('<root BTCPP_format="4" project_name="all"><include path="one.xml"/><include path="other.xml"/></root>')
+    assert list(read_files(project).trees) == ["one", "other"]
+
+
+def test_ids_of_trees_that_newer_versions_refuse_are_one_warning():
+    trees = "".join(f'<BehaviorTree ID="{name}"><AlwaysSuccess/></BehaviorTree>' for name in ("a b", "c.d", "\u00e9_1-x"))
+    problems: list[Problem] = []
+    read_text(f'<root BTCPP_format="4" main_tree_to_execute="a b">{trees}</root>', report=problems.append)
+    (problem,) = problems
+    assert (problem.code, problem.warning, problem.place.column) == ("ALU621", True, 65)
+    assert "'a b', and 1 more IDs of trees, have" in problem.message

@@ -94,3 +94,24 @@ def test_an_output_that_is_a_plain_text_is_refused():
     """BehaviorTree.CPP writes nothing then: an entry without its braces is a slip (docs/trees.md)."""
     with pytest.raises(FileError, match="names an entry"):
         make_tree(read_text(ROOT.format('<LoopInt queue="1" value="x"><AlwaysSuccess/></LoopInt>')), standard_palette(), lambda: 0)
+
+
+UNSET = '<Sequence><Script code="a := 1"/>{}<Script code="b := a"/></Sequence>'
+TAKEN = '<UnsetBlackboard key="a"/>'
+
+
+@pytest.mark.parametrize(
+    ("between", "wrong"),
+    [
+        (TAKEN, True),
+        (f'{TAKEN}<Script code="a := 2"/>', False),
+        ('<UnsetBlackboard key="a" _skipIf="a == 1"/>', False),
+        ('<UnsetBlackboard key="c"/>', False),
+        (f"<ForceSuccess><Fallback><ScriptCondition code='a == 1'/>{TAKEN}</Fallback></ForceSuccess>", False),
+        (f"<Sequence>{TAKEN}<Script code='c := a'/></Sequence>", True),
+        (f"<Sequence>{TAKEN}<AlwaysSuccess/></Sequence>", False),  # what follows is judged within the sequence
+    ],
+)
+def test_an_entry_that_was_taken_away_is_not_read(between, wrong):
+    problems = check(read_text(ROOT.format(UNSET.format(between))), standard_palette(), PlainTraits())
+    assert ["UnsetBlackboard in line 1 has taken it away" in one.message for one in problems] == [True] * wrong

@@ -15,7 +15,7 @@ MOST_SITUATIONS = 200_000
 UNLIKELY = 1e-3
 FILES_HELP = (
     "skillsets in the paper's notation (*.skill) or the Robot Language (*.rl), folders of them, or `-`: the standard input; "
-    "missions (*.xml)"
+    "missions (*.xml), projects of Groot2 (*.btproj)"
 )
 MISSION_HELP = "a mission: BehaviorTree.CPP 4's XML"
 PALETTE_HELP = "a TreeNodesModel with more types of node, as Groot2's"
