@@ -90,11 +90,10 @@ def _read_record(path: Path) -> Log | None:
         entries = follower.poll()
     except (RecordError, OSError) as error:
         raise AnalysisError(str(error)) from None
-    cut = "" if follower.ended else follower.broken or "it was cut off"
     told = [entry for entry in entries if entry.topic == EVENTS]
     if follower.ended and not any(entry.topic in {EVENTS, MISSION} for entry in entries):
         return None
-    return Log(path, tuple(_event(dict(entry.value), f"{path}: message at {entry.stamp_s:.3f} s") for entry in told), cut)
+    return Log(path, tuple(_event(dict(entry.value), f"{path}: message at {entry.stamp_s:.3f} s") for entry in told), follower.cut)
 
 
 def _read_lines(path: Path) -> Log:

@@ -51,8 +51,8 @@ def read_history(path: Path, problems: Problems) -> History:
     record = RecordFollower(path)
     entries = record.poll()
     events = read_events(path, entries, problems)
-    if not record.ended:
-        problems.note(f"{path.name} was cut off{f': {record.broken}' if record.broken else ''}")
+    if record.cut:
+        problems.note(f"{path.name}: {record.cut}")
     for sentence in gaps(events):
         problems.note(f"{path.name}: {sentence}")
     return replace(fold(with_told_ends(events, entries), problems, places_in(entries)), mission=account(path.parent, entries))

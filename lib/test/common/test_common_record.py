@@ -4,6 +4,8 @@ from __future__ import annotations
 
 import json
 import math
+import os
+import queue
 from pathlib import Path
 
 import pytest
@@ -12,6 +14,7 @@ from hypothesis import strategies as st
 from mcap.reader import make_reader
 from mcap.writer import CompressionType, Writer
 
+from alula.common import record
 from alula.common.record import DECISIONS, EVENTS, FILE, MAGIC, Entry, RecordError, RecordFollower, RecordWriter, read_record
 
 ENTRIES = [
@@ -70,14 +73,69 @@ def test_a_record_cut_off_anywhere_is_read_up_to_there(tmp_path_factory, data):
 
 
 @given(st.data())
-def test_a_damaged_record_never_raises_but_for_its_head(tmp_path_factory, data):
+def test_a_damaged_record_is_told_by_place_or_read_as_before(tmp_path_factory, data):
     path = tmp_path_factory.mktemp("record") / FILE
     write(path).close()
     content = bytearray(path.read_bytes())
-    place = data.draw(st.integers(len(MAGIC), len(content) - 1))
-    content[place] ^= data.draw(st.integers(1, 255))
+    for place in data.draw(st.sets(st.integers(len(MAGIC), len(content) - 1), min_size=1, max_size=3)):
+        content[place] ^= data.draw(st.integers(1, 255))
     path.write_bytes(content)
-    assert len(read_record(path)) <= len(ENTRIES)
+    follower = RecordFollower(path)
+    found = follower.poll()
+    assert found == ENTRIES[: len(found)]
+    assert found == ENTRIES or " at byte " in follower.cut
+    if follower.broken:
+        with pytest.raises(RecordError, match="damaged at byte "):
+            read_record(path)
+
+
+def test_a_message_that_is_left_out_is_told(tmp_path):
+    path = tmp_path / FILE
+    writer = write(path, ENTRIES[:1])
+    before = path.stat().st_size
+    writer.write(EVENTS, 0, {"left": "out"})
+    behind = path.stat().st_size
+    writer.write(EVENTS, 1, {"still": "there"})
+    content = path.read_bytes()
+    path.write_bytes(content[:before] + content[behind:])
+    with pytest.raises(RecordError, match=f"damaged at byte {before}: message 3 follows message 1"):
+        read_record(path)
+    writer.close()
+
+
+def test_an_older_record_without_chunks_is_read(tmp_path):
+    with (tmp_path / FILE).open("wb") as file:
+        writer = Writer(file, use_chunking=False)
+        writer.start(profile="", library="alula")
+        channel = writer.register_channel(EVENTS, "json", schema_id=0)
+        for number in range(3):
+            writer.add_message(channel, number, json.dumps({"number": number}).encode(), number)
+        writer.finish()
+    assert [entry.value["number"] for entry in read_record(tmp_path)] == [0, 1, 2]
+
+
+def test_what_was_written_is_synced_while_the_record_grows_and_at_its_end(tmp_path, monkeypatch):
+    synced = queue.SimpleQueue()
+    monkeypatch.setattr(record, "SYNC_S", 0.01)
+    monkeypatch.setattr(os, "fsync", lambda _: synced.put((tmp_path / FILE).stat().st_size))
+    writer = write(tmp_path / FILE, ENTRIES[:1])
+    whole = (tmp_path / FILE).stat().st_size
+    while synced.get(timeout=60) < whole:
+        pass
+    writer.close()
+    whole = (tmp_path / FILE).stat().st_size
+    while synced.get(timeout=60) < whole:
+        pass
+
+
+def test_a_disk_that_fails_to_sync_is_told(tmp_path, monkeypatch):
+    def fail(_):
+        raise OSError(5, "Input/output error")
+
+    monkeypatch.setattr(os, "fsync", fail)
+    writer = write(tmp_path / FILE)
+    writer.close()
+    assert writer.error == f"{FILE} ends early: Input/output error"
 
 
 @pytest.mark.parametrize("compression", [CompressionType.ZSTD, CompressionType.LZ4])
@@ -91,12 +149,12 @@ def test_a_damaged_chunk_of_another_recorder_ends_the_record_and_does_not_raise(
         for number in range(50):
             writer.add_message(channel, number, json.dumps({"number": number}).encode(), number)
         writer.finish()
-    assert len(read_record(path)) == 50
+    assert len(RecordFollower(path).poll()) == 50
     content = bytearray(path.read_bytes())
     place = data.draw(st.integers(len(MAGIC), len(content) - 1))
     content[place] ^= data.draw(st.integers(1, 255))
     path.write_bytes(content)
-    assert len(read_record(path)) <= 50
+    assert len(RecordFollower(path).poll()) <= 50
 
 
 def test_what_is_no_record_is_refused(tmp_path):

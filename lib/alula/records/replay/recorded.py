@@ -2,8 +2,9 @@
 
 from __future__ import annotations
 
+import contextlib
 import json
-from collections.abc import Iterable, Mapping, Sequence
+from collections.abc import Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any
@@ -146,10 +147,10 @@ class Recorded:
 
 
 def load(path: Path) -> Recorded:
-    """Read a run's folder, its ``skills.mcap``, or the one beside a bag, up to where it breaks off.
+    """Read a run's folder, its ``skills.mcap``, or the one beside a bag, up to where it was cut off.
 
     Raises:
-        ReplayError: there is no such file, it is no record, or there is no mission in it.
+        ReplayError: there is no such file, it is no record, it is damaged, or there is no mission in it.
     """
     file = path / FILE if path.is_dir() else path.with_name(FILE) if path.suffix == ".bag" else path
     if not file.is_file():
@@ -160,14 +161,13 @@ def load(path: Path) -> Recorded:
         entries = follower.poll()
     except (RecordError, OSError) as error:
         raise ReplayError(str(error)) from error
+    if follower.broken:
+        raise ReplayError(f"{file}: {follower.broken}; what stands before is in its report (alula report {file.parent})")
     missions = [entry.value for entry in entries if entry.topic == MISSION]
     if not missions:
         raise ReplayError(f"{file}: there is no mission in it")
-    try:
-        _check(entries)
-        return Recorded(file, entries, missions[-1], list(_decisions(entries)), _answers(entries), follower.ended)
-    except (KeyError, TypeError, ValueError) as error:
-        raise ReplayError(f"{file}: is no record of a mission: {type(error).__name__} {error}") from error
+    _check(file, entries)
+    return Recorded(file, entries, missions[-1], list(_decisions(file, entries)), _answers(file, entries), follower.ended)
 
 
 def event_of(entry: Entry) -> EngineEvent:
@@ -175,30 +175,44 @@ def event_of(entry: Entry) -> EngineEvent:
     return read_event(entry.value)
 
 
-def _check(entries: Iterable[Entry]) -> None:
-    """Raise KeyError, TypeError or ValueError where an entry has not what a replay reads of it."""
+@contextlib.contextmanager
+def _of(file: Path, entry: Entry) -> Iterator[None]:
+    """Raise ReplayError, with the place, where an entry has not what a replay reads of it."""
+    place = f"{file}: the message on {entry.topic} at {entry.stamp_s:.3f} s of mission clock"
+    try:
+        yield
+    except KeyError as error:
+        raise ReplayError(f"{place} has no {error}, which every mission of Alula writes there") from None
+    except (TypeError, ValueError) as error:
+        raise ReplayError(f"{place} makes no sense: {error}") from None
+
+
+def _check(file: Path, entries: Iterable[Entry]) -> None:
     for entry in entries:
         value = entry.value
-        if entry.topic == REPORTS:
-            str(value["id"]), float(value.get("progress") or 0.0), ExecutionState(value["state"]), dict(value.get("outputs") or {})
-        elif entry.topic == DATA:
-            str(value["skillset"]), str(value["data"]), value["value"]
+        with _of(file, entry):
+            if entry.topic == REPORTS:
+                str(value["id"]), float(value.get("progress") or 0.0), ExecutionState(value["state"]), dict(value.get("outputs") or {})
+            elif entry.topic == DATA:
+                str(value["skillset"]), str(value["data"]), value["value"]
 
 
-def _decisions(entries: Iterable[Entry]) -> Iterable[RecordedDecision]:
+def _decisions(file: Path, entries: Iterable[Entry]) -> Iterator[RecordedDecision]:
     for entry in entries:
         if entry.topic == DECISIONS:
             value = entry.value
-            words = (str(value[name]) for name in ("kind", "skillset", "skill", "id"))
-            kind, skillset, skill, id_ = words
-            yield RecordedDecision(int(value["number"]), entry.stamp_s, kind, skillset, skill, id_, dict(value["inputs"]))
+            with _of(file, entry):
+                kind, skillset, skill, id_ = (str(value[name]) for name in ("kind", "skillset", "skill", "id"))
+                decision = RecordedDecision(int(value["number"]), entry.stamp_s, kind, skillset, skill, id_, dict(value["inputs"]))
+            yield decision
 
 
-def _answers(entries: Iterable[Entry]) -> dict[str, RecordedEnd]:
+def _answers(file: Path, entries: Iterable[Entry]) -> dict[str, RecordedEnd]:
     """Put together what is known of each execution."""
     answers: dict[str, RecordedEnd] = {}
     for entry in entries:
-        event = event_of(entry) if entry.topic == EVENTS else None
+        with _of(file, entry):
+            event = event_of(entry) if entry.topic == EVENTS else None
         if isinstance(event, ExecutionEvent):
             answers[event.id] = _advance(answers.get(event.id), event)
     return answers
