@@ -12,10 +12,12 @@ import importlib
 import os
 import re
 import sys
-from collections.abc import Callable, Iterator, Mapping
+import threading
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from contextvars import ContextVar
 from dataclasses import dataclass, field
 from pathlib import Path
+from types import ModuleType
 from typing import Any
 
 from alula.common.errors import AlulaError
@@ -138,6 +140,7 @@ class RobotFolder:
 
     def import_path(self) -> None:
         """Have the robot's own packages found by imports."""
+        _swap_code(self.python)
         own = [str(folder) for folder in self.python]
         # Before what is installed: the folder that was named is the robot.
         sys.path[:] = [*own, *(place for place in sys.path if place not in own)]
@@ -151,6 +154,36 @@ class RobotFolder:
             return getattr(loaded, attribute) if attribute else loaded
         except (ImportError, AttributeError) as error:
             raise RobotError(f"{self.root / FILE}: {text} can't be imported: {error}") from error
+
+
+_CODE: dict[Path, dict[str, ModuleType]] = {}
+"""By each folder of packages of robots that were imported from: modules that were set aside, as another robot's have their names."""
+_SWAPPING = threading.RLock()
+
+
+def _swap_code(folders: Sequence[Path]) -> None:
+    """Set aside what was imported from other robots where packages of these folders have the same name, and bring back their own."""
+    with _SWAPPING:
+        for folder in folders:
+            _CODE.setdefault(folder, {})
+        theirs = [folder for folder in _CODE if folder not in folders]
+        for name, module in list(sys.modules.items()) if theirs else ():
+            place = _folder_of(module)
+            package = name.partition(".")[0]
+            if place in theirs and any((folder / package).is_dir() or (folder / f"{package}.py").is_file() for folder in folders):
+                _CODE[place][name] = sys.modules.pop(name)
+        for folder in folders:
+            sys.modules.update(_CODE[folder])
+            _CODE[folder].clear()
+        importlib.invalidate_caches()
+
+
+def _folder_of(module: ModuleType) -> Path | None:
+    """Return which folder of a robot's packages a module was imported from; None: none."""
+    places = [getattr(module, "__file__", None) or "", *list(getattr(module, "__path__", ()))[:1]]
+    place = next((Path(one) for one in places if one), None)
+    within = [folder for folder in _CODE if place is not None and place.is_relative_to(folder)]
+    return max(within, key=lambda folder: len(folder.parts), default=None)
 
 
 _MEANT: ContextVar[RobotFolder | None] = ContextVar("robot", default=None)
