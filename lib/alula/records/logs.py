@@ -3,14 +3,17 @@
 from __future__ import annotations
 
 import json
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 from alula.common.record import EVENTS, FILE, MISSION, RecordError, RecordFollower
 from alula.records.errors import AnalysisError
 from alula.runtime.core.events import EXECUTION, TRANSITION, EngineEvent, read_event
+
+if TYPE_CHECKING:
+    from rosbags.interfaces import Connection
 
 LINES = "events.jsonl"
 MESSAGE = "skillset_interfaces/msg/Event"
@@ -118,21 +121,41 @@ def _read_lines(path: Path) -> Log:
 
 
 def _read_bag(path: Path) -> Log:
-    from rosbags.highlevel import AnyReader, AnyReaderError  # late: it takes a moment, and most logs are records
+    """Return the log of a bag. Only the definition of our own message is asked of it: what else was recorded may lack or break its own."""
+    from rosbags import rosbag1, rosbag2  # late: it takes a moment, and most logs are records
 
     try:
-        with AnyReader([path]) as reader:
+        with rosbag1.Reader(path) if path.suffix == ".bag" else rosbag2.Reader(path) as reader:
             wanted = [one for one in reader.connections if one.msgtype == MESSAGE]
-            entries = tuple(
-                _from_message(reader.deserialize(data, connection.msgtype), path) for connection, _, data in reader.messages(wanted)
-            )
+            read = _decoder(path, reader.connections, ros1=path.suffix == ".bag")
+            entries = tuple(_from_message(read(data), path) for _, _, data in reader.messages(wanted))
     except AnalysisError:
         raise
-    except AnyReaderError as error:
-        raise AnalysisError(f"{path}: can't be read as a bag: {error}") from None
     except Exception as error:  # noqa: BLE001 - whatever a damaged or hostile bag makes the reader raise
-        raise AnalysisError(f"{path}: can't be read as a bag: {type(error).__name__}: {error}") from None
+        remedy = "" if path.suffix == ".bag" else f"; if it is whole, copy its topics of {MESSAGE} into another (ros2 bag convert)"
+        raise AnalysisError(f"{path}: can't be read as a bag: {type(error).__name__}: {error}{remedy}") from None
     return Log(path, entries)
+
+
+def _decoder(path: Path, connections: Sequence[Connection], *, ros1: bool) -> Callable[[bytes], Any]:
+    """Return what reads a message of a bag, by the definition that the bag has of it: other versions have other fields."""
+    from rosbags.interfaces import MessageDefinitionFormat
+    from rosbags.typesys import Stores, get_types_from_msg, get_typestore
+
+    connection = next((one for one in connections if one.msgtype == MESSAGE), None)
+    if connection is None:
+        types = sorted({one.msgtype for one in connections})
+        there = f"topics of {', '.join(types[:3])}{', ...' if len(types) > 3 else ''}" if types else "no topics"
+        raise AnalysisError(f"{path}: has no events of skillsets: no topic of {MESSAGE}; it has {there}")
+    if connection.msgdef.format is not MessageDefinitionFormat.MSG:
+        raise AnalysisError(
+            f"{path}: has events of skillsets on {connection.topic}, but no definition of {MESSAGE}; give the bag one where that message"
+            " is installed: ros2 bag convert, to storage mcap"
+        )
+    store = get_typestore(Stores.EMPTY)
+    store.register(get_types_from_msg(connection.msgdef.data, MESSAGE))
+    read = store.deserialize_ros1 if ros1 else store.deserialize_cdr
+    return lambda data: read(data, MESSAGE)
 
 
 def _from_message(message: Any, path: Path) -> Logged:

@@ -2,12 +2,16 @@
 
 from __future__ import annotations
 
+import contextlib
 import json
 import os
+import sqlite3
 from pathlib import Path
 
 import pytest
+from mcap.reader import make_reader
 from mcap.writer import Writer
+from rosbags.rosbag1 import Writer as Ros1Writer
 from rosbags.rosbag2 import StoragePlugin
 from rosbags.rosbag2 import Writer as BagWriter
 from rosbags.typesys import Stores, get_types_from_msg, get_typestore
@@ -193,3 +197,67 @@ def test_what_can_not_be_read_is_refused_in_one_line(what, tmp_path, capsys):
     assert printed.err.startswith("alula conform: ")
     assert printed.err.count("\n") == 1
     assert complaint in printed.err
+
+
+def foreign(path, storage, *topics):
+    """Write a bag of somebody else: strings on each topic."""
+    store = get_typestore(Stores.ROS2_JAZZY)
+    kind = "std_msgs/msg/String"
+    with BagWriter(path, version=9, storage_plugin=storage) as writer:
+        for topic in topics:
+            writer.write(writer.add_connection(topic, kind, typestore=store), 1, store.serialize_cdr(store.types[kind](data="a"), kind))
+
+
+@pytest.mark.parametrize("storage", [StoragePlugin.MCAP, StoragePlugin.SQLITE3])
+def test_a_bag_of_somebody_else_has_no_events_and_what_it_has_is_told(tmp_path, storage, capsys):
+    foreign(tmp_path / "bag", storage, "/chatter", "/other")
+    inside = next(path for path in (tmp_path / "bag").iterdir() if path.suffix != ".yaml")
+    for path in (tmp_path / "bag", inside):
+        assert main([str(path)]) == 2
+        told = f"{path}: has no events of skillsets: no topic of {MESSAGE}; it has topics of std_msgs/msg/String"
+        assert capsys.readouterr().err == f"alula conform: {told}\n"
+
+
+def test_a_bag_of_ros_1_of_somebody_else_has_no_events(tmp_path, capsys):
+    store = get_typestore(Stores.ROS1_NOETIC)
+    kind = "std_msgs/msg/String"
+    with Ros1Writer(tmp_path / "their.bag") as writer:
+        writer.write(writer.add_connection("/chatter", kind, typestore=store), 1, store.serialize_ros1(store.types[kind](data="a"), kind))
+    assert main([str(tmp_path / "their.bag")]) == 2
+    assert capsys.readouterr().err.endswith(f"no topic of {MESSAGE}; it has topics of std_msgs/msg/String\n")
+
+
+def changed(path, statement):
+    with contextlib.closing(sqlite3.connect(next(path.glob("*.db3")))) as connection:
+        connection.execute(statement)
+        connection.commit()
+
+
+def test_a_definition_of_others_that_makes_no_sense_keeps_no_event_from_being_read(tmp_path, flown, capsys):
+    bag(tmp_path / "bag", flown, StoragePlugin.MCAP)
+    inside = next((tmp_path / "bag").glob("*.mcap"))
+    with inside.open("rb") as file, (tmp_path / "more.mcap").open("wb") as more:
+        writer = Writer(more)
+        writer.start(profile="ros2")
+        schema = writer.register_schema("std_srvs/srv/SetBool_Event", "ros2msg", b"service_msgs/ServiceEventInfo info\nnothing[<=] of.this")
+        other = writer.register_channel("/x/_service_event", "cdr", schema)
+        writer.add_message(other, 1, b"\0\1\0\0", 1)
+        topics = {}
+        for schema, channel, message in make_reader(file).iter_messages():
+            if channel.topic not in topics:
+                topics[channel.topic] = writer.register_channel(
+                    channel.topic, "cdr", writer.register_schema(schema.name, schema.encoding, schema.data), channel.metadata
+                )
+            writer.add_message(topics[channel.topic], message.log_time, message.data, message.publish_time)
+        writer.finish()
+    assert main([str(tmp_path / "more.mcap"), "--json"]) == 0
+    assert json.loads(capsys.readouterr().out)["events"] == len(flown)
+
+
+def test_events_without_their_definition_are_named_with_the_remedy(tmp_path, flown, capsys):
+    bag(tmp_path / "bag", flown, StoragePlugin.SQLITE3)
+    changed(tmp_path / "bag", "delete from message_definitions")
+    assert main([str(tmp_path / "bag")]) == 2
+    told = capsys.readouterr().err
+    assert f"{tmp_path / 'bag'}: has events of skillsets on /" in told
+    assert f"but no definition of {MESSAGE}; give the bag one where that message is installed: ros2 bag convert" in told
