@@ -38,7 +38,15 @@ class RecordedRun:
 
     @property
     def origin_s(self) -> float:
-        """Lift-off, seconds of mission clock; the first event where nothing has lifted off."""
+        """Lift-off, seconds of mission clock; the first event where nothing has lifted off.
+
+        The mission's account tells it. The robot is asked only where there is none of a mission that ended, as of a log of events alone.
+        """
+        said = self.mission.get("lift_off_s")
+        if isinstance(said, int | float):
+            return float(said)
+        if self.events and "lift_off_s" in self.mission and self.outcome not in {"", "running"}:
+            return self.events[0].stamp_s
         return origin_of(self.events)
 
     def time_s(self, event: EngineEvent) -> float:

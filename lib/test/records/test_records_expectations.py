@@ -14,6 +14,7 @@ from alula.campaign.mocked_scenarios import load_mocked_scenario
 from alula.cli.expect import main
 from alula.common import run_log
 from alula.common.faults import parse_fault
+from alula.common.robots import VARIABLE
 from alula.records.errors import AnalysisError
 from alula.records.expectations import check, expectations_of, junit, load_expectations
 from alula.records.run import RecordedRun, load_recorded_run
@@ -37,6 +38,15 @@ def problems(path, run):
 def written(path, text):
     path.write_text(text, encoding="utf-8")
     return path
+
+
+@pytest.mark.parametrize("name", ["mapping", "inspection"])
+def test_what_is_written_of_a_run_does_not_depend_on_where_one_stands(name, tmp_path, monkeypatch):
+    here = expectations_of(load_recorded_run(ROOT / "tests" / "recordings" / name))
+    for elsewhere in (tmp_path, ROOT / "examples" / "rover"):
+        monkeypatch.chdir(elsewhere)
+        monkeypatch.delenv(VARIABLE, raising=False)
+        assert expectations_of(load_recorded_run(ROOT / "tests" / "recordings" / name)) == here
 
 
 @pytest.mark.parametrize(("figure", "fits", "differs"), [("11", "nominal", "failing"), ("12", "failing", "nominal")])
