@@ -5,7 +5,7 @@ A model says what a robot can do (`load_skillset`, `check_files`), hooks do it (
 
     import alula
 
-    mission = alula.Mission.load("deliver", robot="examples/rover")
+    mission = alula.Mission.load("patrol", robot="robots/mine")
     assert mission.run("laser@20", seed=1).outcome is alula.Outcome.DEGRADED
 
 These names are public, and so are those of `alula.trees` (nodes of one's own), `alula.parts` (what a robot adds to the commands),
