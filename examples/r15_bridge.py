@@ -45,5 +45,5 @@ with tempfile.TemporaryDirectory() as folder:
     finally:
         rclpy.try_shutdown()
         for process in reversed(processes):
-            os.killpg(process.pid, signal.SIGINT)
+            os.killpg(process.pid, signal.SIGTERM)
             process.wait()

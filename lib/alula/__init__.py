@@ -21,7 +21,8 @@ from alula.common.public import lazy_names
 if TYPE_CHECKING:
     from alula.api.checking import check_files
     from alula.api.mission import Mission
-    from alula.api.run import Record, Run, open_run
+    from alula.api.record import Record
+    from alula.api.run import Run, open_run
     from alula.common.errors import AlulaError
     from alula.language.errors import Diagnostic, Severity
     from alula.language.load import load_skillset, parse_skillset
@@ -62,7 +63,8 @@ __all__ = [
 _DEFINED_IN = {
     "alula.api.checking": ("check_files",),
     "alula.api.mission": ("Mission",),
-    "alula.api.run": ("Record", "Run", "open_run"),
+    "alula.api.record": ("Record",),
+    "alula.api.run": ("Run", "open_run"),
     "alula.common.errors": ("AlulaError",),
     "alula.language.errors": ("Diagnostic", "Severity"),
     "alula.language.load": ("load_skillset", "parse_skillset"),
