@@ -1,6 +1,7 @@
 # Sourced: the environment of one ROS world in this shell, with nothing of the other.  usage: . setup/env.sh 1|2
 # ALULA_ROOT must be set. It is the robot's where its overlay has been built, else Alula's alone.
 # The caller's ROS_MASTER_URI, ROS_DOMAIN_ID, ROS_LOG_DIR and display settings are kept.
+_packages=${ROS_PACKAGE_PATH:-}
 unset PYTHONHOME AMENT_PREFIX_PATH COLCON_PREFIX_PATH CMAKE_PREFIX_PATH PYTHONPATH LD_LIBRARY_PATH ROS_PACKAGE_PATH ROS_ROOT ROS_DISTRO VIRTUAL_ENV
 unset ${!ALULA_UNDERLAY@} ROS_ETC_DIR
 . "$ALULA_ROOT/setup/places.sh"
@@ -42,10 +43,16 @@ case "$1" in
     export _ROS_WHEELS_BOOTSTRAP_COMPLETE=1
     export ROS_AUTOMATIC_DISCOVERY_RANGE="${ROS_AUTOMATIC_DISCOVERY_RANGE:-LOCALHOST}"
     export RMW_IMPLEMENTATION=rmw_fastrtps_cpp
+    # Where the bridge finds ROS 1's definitions: the workspaces of the robot and of Alula, what ROS 1 stands on, and the caller's packages.
+    _below="$(unset ALULA_UNDERLAY_PACKAGES
+      for _file in "$ALULA_STATE/given1.env" "${_robot:-/dev}/underlays1.env"; do [ ! -f "$_file" ] || . "$_file"; done
+      printf %s "${ALULA_UNDERLAY_PACKAGES:-}")"
+    export ROS_BRIDGE_ROS1_WORKSPACES="${_robot:+$_robot/ros1/src:}$ALULA_STATE/ros1/src${_below:+:$_below}"
+    [ -z "$_packages" ] || export ROS_PACKAGE_PATH="$_packages"
     # 64 MB shared-memory segments: the default of 512 kB loses images and makes them slow.
     export FASTRTPS_DEFAULT_PROFILES_FILE="${FASTRTPS_DEFAULT_PROFILES_FILE:-$ALULA_ROOT/bridge/fastdds.xml}"
     export FASTDDS_DEFAULT_PROFILES_FILE="$FASTRTPS_DEFAULT_PROFILES_FILE"
     ;;
   *) echo "env.sh: the world is 1 or 2, not '$1'" >&2; return 2 ;;
 esac
-unset _path _robot _below _libraries ${!robot_@}
+unset _path _robot _below _libraries _packages ${!robot_@}

@@ -21,7 +21,6 @@ from ros_bridge.action_ends_ros2 import Ros2ClientsEnd, Ros2ServerEnd, empty_res
 from ros_bridge.action_states import Ros2Status
 from ros_bridge.action_types import ActionType, action_type
 from ros_bridge.config import ActionRoute, RosVersion
-from ros_bridge.conversion import ament_prefixes
 from ros_bridge.goals_to_ros1 import GoalsToRos1
 from ros_bridge.goals_to_ros2 import GoalsToRos2
 from ros_bridge.ros2_types import interface_class
@@ -253,5 +252,5 @@ KINDS: dict[RosVersion, type[ServerInRos1 | ServerInRos2]] = {RosVersion.ROS1: S
 def make(spec: ActionRoute, context: Context) -> Route:
     """Make an action's route; raises BridgeError when its type can't cross."""
     ros2_type = spec.ros2_type or context.types.rules.to_ros2(spec.type_name)
-    action = action_type(context.types, spec.type_name, ros2_type, ament_prefixes())
+    action = action_type(context.types, spec.type_name, ros2_type)
     return KINDS[spec.server](spec, action, interface_class(ros2_type, "action"), context)

@@ -35,7 +35,8 @@ class Reliability(Enum):
 class TopicRoute:
     """A topic that crosses. ``latched`` is ROS 1's latch and ROS 2's transient local; ``depth`` bounds every queue on the way.
 
-    ``type_name`` is ROS 1's type, ``ros2_type`` ROS 2's (both ``package/Name``), empty where the mapping rules tell it.
+    ``type_name`` is ROS 1's type, ``ros2_type`` ROS 2's (both ``package/Name``), empty where the mapping rules tell it. ``md5sum`` is that
+    of the definition that a node in ROS 1 has said it has; empty where none has been asked.
     """
 
     ros1_name: str
@@ -46,6 +47,7 @@ class TopicRoute:
     depth: int = 10
     reliability: Reliability = Reliability.RELIABLE
     ros2_type: str = ""
+    md5sum: str = ""
 
     @property
     def label(self) -> str:
@@ -60,7 +62,7 @@ class TopicRoute:
 
 @dataclass(frozen=True)
 class _ServedRoute:
-    """A service or action: a server in one world, and callers in the other."""
+    """A service or action: a server in one world, and callers in the other; ``md5sum`` as of a topic, for an action of all parts."""
 
     KIND: ClassVar[str]
 
@@ -70,6 +72,7 @@ class _ServedRoute:
     type_name: str
     timeout_s: float = 5.0
     ros2_type: str = ""
+    md5sum: str = ""
 
     @property
     def label(self) -> str:

@@ -15,12 +15,13 @@ from ros_bridge.config_values import Reader
 from ros_bridge.discovery_options import READERS, below, make_selection, merge_selections
 from ros_bridge.errors import ConfigError
 from ros_bridge.mapping import TypeRule, TypeRules
+from ros_bridge.mapping_rules import read_mapping_rules
 from ros_bridge.selection import Selection
 
 Route = TypeVar("Route", TopicRoute, ServiceRoute, ActionRoute)
 
 
-NAMES: Mapping[str, Reader] = {"name": config_values.name, "ros1_name": config_values.name, "ros2_name": config_values.name}
+NAMES: Mapping[str, Reader] = {"name": config_values.name, "ros1_name": config_values.ros1_name, "ros2_name": config_values.name}
 TOPIC_KEYS: Mapping[str, Reader] = {
     **NAMES,
     "direction": config_values.choice(Direction),
@@ -73,8 +74,10 @@ def merge_rules(rules: Iterable[TypeRules]) -> TypeRules:
 
 
 def read_config(path: Path, namespace: str = "") -> BridgeConfig:
-    """Read one file, for a bridge in a namespace of ROS 2; raises ConfigError."""
+    """Read one file, for a bridge in a namespace of ROS 2; a list is ``ros1_bridge``'s mapping rules. Raises ConfigError."""
     root = read_yaml(path, ConfigError)
+    if root is not None and root.is_list:
+        return BridgeConfig(rules=read_mapping_rules(root))
     sections = root.record("the configuration", SECTIONS) if root is not None else {}
     return BridgeConfig(
         tuple(_route(TopicRoute, item, TOPIC_KEYS, "direction", namespace) for item in _items(sections, "topics")),

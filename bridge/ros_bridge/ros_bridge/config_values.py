@@ -6,7 +6,8 @@ import re
 from collections.abc import Callable
 from enum import Enum
 
-NAME = re.compile(r"(/[A-Za-z][A-Za-z0-9_]*)+")
+from ros_bridge.selection import is_ros1_name, is_ros2_name
+
 TYPE = re.compile(r"[a-z][a-z0-9_]*/[A-Za-z][A-Za-z0-9_]*")
 PACKAGE = re.compile(r"[a-z][a-z0-9_]*")
 PATTERN = re.compile(r"[/*?\[][^\s]*")
@@ -16,8 +17,16 @@ Reader = Callable[[object], object]
 
 
 def name(value: object) -> str:
-    """Read an absolute ROS name."""
-    if isinstance(value, str) and NAME.fullmatch(value):
+    """Read an absolute name that both worlds can have."""
+    if isinstance(value, str) and is_ros2_name(value):
+        return value
+    digit = "; no part begins with a digit, which only ROS 1 allows" if isinstance(value, str) and is_ros1_name(value) else ""
+    raise ValueError(f"an absolute ROS name such as /camera/image{digit}")
+
+
+def ros1_name(value: object) -> str:
+    """Read an absolute name of ROS 1, whose parts may begin with a digit."""
+    if isinstance(value, str) and is_ros1_name(value):
         return value
     raise ValueError("an absolute ROS name such as /camera/image")
 

@@ -12,36 +12,46 @@ from __future__ import annotations
 
 from collections.abc import Iterable, Iterator
 from dataclasses import dataclass
-from typing import Protocol
+from typing import TYPE_CHECKING, Protocol, TypeVar
 
 from ros_bridge.config import ActionRoute, Direction, Reliability, RosVersion, ServiceRoute, Spec, TopicRoute
 from ros_bridge.errors import BridgeError
 from ros_bridge.graph import ACTION_PARTS, Graphs, Ros2Endpoint
-from ros_bridge.selection import Selection
+from ros_bridge.selection import Selection, is_ros2_name
+
+if TYPE_CHECKING:
+    from ros_bridge.checked_types import CheckedPair
 
 DEPTH = 100
 BULKY_DEPTH = 10  # of types with an array of bytes without an end: images, clouds, maps
+MOST_OF_A_REASON = 500
+NO_ROS2_NAME = "{1} can't be a name in ROS 2, where no part begins with a digit; give it another one (rename: {{{0}: /NAME}})"
+Served = TypeVar("Served", ServiceRoute, ActionRoute)
 
 
 class TypeLookup(Protocol):
-    """What ``decide`` asks about types."""
+    """What ``decide`` asks about types: both of a pair of which one may be unknown; raises BridgeError when they can't be converted."""
 
-    def pair(self, ros1_type: str | None, ros2_type: str | None, topic: str) -> tuple[str, str]:
-        """Return both types of a topic, of which one may be unknown; raises BridgeError when they can't be converted."""
+    def pair(self, ros1_type: str | None, ros2_type: str | None, topic: str) -> CheckedPair:
+        """Return both types of a topic, by its name in ROS 1."""
 
-    def check_service(self, ros1_type: str | None, ros2_type: str | None) -> tuple[str, str]:
+    def service(self, ros1_type: str | None, ros2_type: str | None, service: str) -> CheckedPair:
         """Do the same for a service."""
 
-    def bulky(self, ros2_type: str) -> bool:
-        """Tell whether messages of the type can be large."""
+    def action(self, ros1_type: str | None, ros2_type: str | None, action: str) -> CheckedPair:
+        """Do the same for an action."""
 
 
 @dataclass(frozen=True)
 class RouteDecision:
-    """A route that is to exist. ``receivers``: foreign subscribers of its target; with none nothing is forwarded."""
+    """A route that is to exist.
+
+    ``receivers``: foreign subscribers of its target; with none nothing is forwarded. ``notes``: fields that were renamed or don't cross.
+    """
 
     spec: Spec
     receivers: int = 0
+    notes: tuple[str, ...] = ()
 
     @property
     def flows(self) -> bool:
@@ -63,24 +73,38 @@ Decision = RouteDecision | Refused
 
 
 def decide(graphs: Graphs, selection: Selection, types: TypeLookup, configured: Iterable[Spec] = ()) -> list[Decision]:
-    """Return a decision for each selected name: a route, or the reason why there is none. Names of configured routes are skipped."""
+    """Return a decision for each selected name: a route, or the reason why there is none. Names of configured routes are skipped.
+
+    Whatever is raised about one name refuses this name and no other.
+    """
     taken1 = {spec.ros1_name for spec in configured}
     taken2 = {spec.ros2_name for spec in configured}
-    decisions: list[Decision] = []
-    actions = {**_pairs(graphs.ros1.action_servers(), graphs.ros2.actions, selection)}
+    actions = _pairs(graphs.ros1.action_servers(), graphs.ros2.actions, selection)
     in_actions = {f"{ros1_name}/{part}" for ros1_name, _ in actions for part in ACTION_PARTS}
     names1 = graphs.ros1.publishers.keys() | graphs.ros1.subscribers.keys()
     names2 = graphs.ros2.publishers.keys() | graphs.ros2.subscribers.keys()
-    for ros1_name, ros2_name in sorted(_pairs(names1 - in_actions, names2, selection)):
-        if ros1_name not in taken1 and ros2_name not in taken2 and ros1_name not in in_actions:
-            decisions += _topic(graphs, types, ros1_name, ros2_name)
-    for ros1_name, ros2_name in sorted(_pairs(graphs.ros1.services, graphs.ros2.services, selection)):
-        if ros1_name not in taken1 and ros2_name not in taken2 and ros1_name not in graphs.ros1.services_asked:
-            decisions.append(_service(graphs, types, ros1_name, ros2_name))
-    for ros1_name, ros2_name in sorted(actions):
-        if ros1_name not in taken1 and ros2_name not in taken2:
-            decisions.append(_action(graphs, ros1_name, ros2_name))
+    topics = [pair for pair in _pairs(names1 - in_actions, names2, selection) if pair[0] not in in_actions]
+    services = [pair for pair in _pairs(graphs.ros1.services, graphs.ros2.services, selection) if pair[0] not in graphs.ros1.services_asked]
+    decisions: list[Decision] = []
+    for kind, pairs, deciding in (("topic", topics, _topic), ("service", services, _service), ("action", actions, _action)):
+        for ros1_name, ros2_name in sorted(pairs):
+            if ros1_name in taken1 or ros2_name in taken2:
+                continue
+            try:
+                found = list(deciding(graphs, types, ros1_name, ros2_name))
+                if found and not is_ros2_name(ros2_name):
+                    raise BridgeError(NO_ROS2_NAME.format(ros1_name, ros2_name))  # noqa: TRY301 - as any other refusal
+                decisions += found
+            except BridgeError as error:
+                decisions.append(Refused(kind, ros1_name, ros2_name, _short(str(error))))
+            except Exception as error:  # noqa: BLE001 - a node may say anything about its types
+                decisions.append(Refused(kind, ros1_name, ros2_name, _short(f"{type(error).__name__}: {error}")))
     return decisions
+
+
+def _short(reason: str) -> str:
+    line = " ".join(reason.split())
+    return line if len(line) <= MOST_OF_A_REASON else f"{line[:MOST_OF_A_REASON]} ..."
 
 
 def _pairs(names1: Iterable[str], names2: Iterable[str], selection: Selection) -> dict[tuple[str, str], None]:
@@ -101,50 +125,52 @@ def _topic(graphs: Graphs, types: TypeLookup, ros1_name: str, ros2_name: str) ->
     if ros1_type is None and not kinds2:
         return  # the type is not known yet
     if len(kinds2) > 1:
-        yield Refused("topic", ros1_name, ros2_name, f"ROS 2 has it with different types: {', '.join(kinds2)}")
-        return
-    try:
-        pair = types.pair(ros1_type, kinds2[0] if kinds2 else None, ros1_name)
-        depth = BULKY_DEPTH if types.bulky(pair[1]) else DEPTH
-    except BridgeError as error:
-        yield Refused("topic", ros1_name, ros2_name, str(error))
-        return
+        raise BridgeError(f"ROS 2 has it with different types: {', '.join(kinds2)}")
+    pair = types.pair(ros1_type, kinds2[0] if kinds2 else None, ros1_name)
+    depth = BULKY_DEPTH if pair.bulky else DEPTH
     names = (ros1_name, ros2_name)
     if publishers1:
-        receivers = sum(end.type_name == pair[1] for end in subscribers2)
-        spec = TopicRoute(*names, Direction.ROS1_TO_ROS2, pair[0], latched=True, depth=max(depth, len(publishers1)), ros2_type=pair[1])
-        yield RouteDecision(spec, receivers)
+        receivers = sum(end.type_name == pair.ros2_type for end in subscribers2)
+        depth_up = max(depth, len(publishers1))
+        spec = TopicRoute(
+            *names, Direction.ROS1_TO_ROS2, pair.ros1_type, latched=True, depth=depth_up, ros2_type=pair.ros2_type, md5sum=pair.md5sum
+        )
+        yield RouteDecision(spec, receivers, pair.notes)
     if publishers2:
-        yield RouteDecision(_from_ros2(names, pair, depth, publishers2), subscribers1)
+        yield RouteDecision(_from_ros2(names, pair, depth, publishers2), subscribers1, pair.notes)
 
 
-def _from_ros2(names: tuple[str, str], pair: tuple[str, str], depth: int, publishers: tuple[Ros2Endpoint, ...]) -> TopicRoute:
+def _from_ros2(names: tuple[str, str], pair: CheckedPair, depth: int, publishers: tuple[Ros2Endpoint, ...]) -> TopicRoute:
     """Return the route with what all publishers offer: asking for more would leave some of them out."""
     reliable = all(end.reliable for end in publishers)
     return TopicRoute(
         *names,
         Direction.ROS2_TO_ROS1,
-        pair[0],
+        pair.ros1_type,
         latched=all(end.transient_local for end in publishers),
         depth=max(depth, len(publishers)),
         reliability=Reliability.RELIABLE if reliable else Reliability.BEST_EFFORT,
-        ros2_type=pair[1],
+        ros2_type=pair.ros2_type,
+        md5sum=pair.md5sum,
     )
 
 
-def _service(graphs: Graphs, types: TypeLookup, ros1_name: str, ros2_name: str) -> Decision:
+def _service(graphs: Graphs, types: TypeLookup, ros1_name: str, ros2_name: str) -> Iterator[Decision]:
     in1, in2 = ros1_name in graphs.ros1.services, ros2_name in graphs.ros2.services
     if in1 and in2:
-        return Refused("service", ros1_name, ros2_name, "both worlds have a server")
-    try:
-        pair = types.check_service(graphs.ros1.service_types.get(ros1_name), graphs.ros2.services.get(ros2_name))
-    except BridgeError as error:
-        return Refused("service", ros1_name, ros2_name, str(error))
-    return RouteDecision(ServiceRoute(ros1_name, ros2_name, RosVersion.ROS1 if in1 else RosVersion.ROS2, pair[0], ros2_type=pair[1]))
+        raise BridgeError("both worlds have a server")
+    pair = types.service(graphs.ros1.service_types.get(ros1_name), graphs.ros2.services.get(ros2_name), ros1_name)
+    yield RouteDecision(_served(ServiceRoute, ros1_name, ros2_name, pair, in_ros1=in1), notes=pair.notes)
 
 
-def _action(graphs: Graphs, ros1_name: str, ros2_name: str) -> Decision:
+def _action(graphs: Graphs, types: TypeLookup, ros1_name: str, ros2_name: str) -> Iterator[Decision]:
     in1, in2 = graphs.ros1.action_servers().get(ros1_name), graphs.ros2.actions.get(ros2_name)
     if in1 and in2:
-        return Refused("action", ros1_name, ros2_name, "both worlds have a server")
-    return RouteDecision(ActionRoute(ros1_name, ros2_name, RosVersion.ROS1 if in1 else RosVersion.ROS2, in1 or in2 or ""))
+        raise BridgeError("both worlds have a server")
+    pair = types.action(in1, in2, ros1_name)
+    yield RouteDecision(_served(ActionRoute, ros1_name, ros2_name, pair, in_ros1=in1 is not None), notes=pair.notes)
+
+
+def _served(kind: type[Served], ros1_name: str, ros2_name: str, pair: CheckedPair, *, in_ros1: bool) -> Served:
+    server = RosVersion.ROS1 if in_ros1 else RosVersion.ROS2
+    return kind(ros1_name, ros2_name, server, pair.ros1_type, ros2_type=pair.ros2_type, md5sum=pair.md5sum)

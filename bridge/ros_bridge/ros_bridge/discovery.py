@@ -53,7 +53,8 @@ class GraphReader:
         self.services = ServiceTypes(self._service_type, self._hung)
         self._selection = selection
         self._ros1 = Ros1Reader(master, caller_id, self.services, self._selects)
-        self.types = CheckedTypes(types, self._publisher_headers)
+        self._service_sums: dict[str, str] = {}
+        self.types = CheckedTypes(types, self._publisher_headers, self._service_sums)
 
     def read_ros1(self, system: bytes) -> bool:
         """Read ROS 1's graph from the master's answer to getSystemState; tell whether it has changed. Raises OSError."""
@@ -61,6 +62,7 @@ class GraphReader:
 
     def graphs(self) -> Graphs:
         """Return ROS 1's graph as it was last read, and ROS 2's of now."""
+        self.types.look_at(self._ros1.graph.publishers)
         return Graphs(self._ros1.graph, read_ros2_graph(self._node))
 
     def _selects(self, ros1_name: str) -> bool:
@@ -68,11 +70,14 @@ class GraphReader:
         return ros2_name is not None and self._selection.selects(ros1_name, ros2_name)
 
     def _service_type(self, name: str) -> str | None:
+        """Ask a service's node for its type, and note its sum."""
         try:
             uri = str(self._master.call("lookupService", self._caller_id, name))
         except OSError:
             return None
-        return tcpros.service_type(name, uri, self._caller_id)
+        header = tcpros.service_header(name, uri, self._caller_id)
+        self._service_sums[name] = header.get("md5sum", "")
+        return header.get("type")
 
     def _publisher_headers(self, topic: str) -> Iterator[dict[str, str]]:
         """Ask the publishers, but none that hangs."""
@@ -117,6 +122,12 @@ class Discovery:
         """Start the thread that follows both graphs."""
         self._monitor.on_graph = self._reader.services.on_answer = self._events.wake
         self._thread.start()
+
+    def doubt(self, topic: str) -> None:
+        """Look again at a topic whose publisher in ROS 1 was refused because of its type. From any thread."""
+        if not self._stop.is_set():
+            self._reader.types.doubt(topic)
+            self._events.wake()
 
     def _run(self) -> None:
         while not self._stop.is_set():

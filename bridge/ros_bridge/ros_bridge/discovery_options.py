@@ -30,7 +30,7 @@ OPTIONS: Mapping[str, Option] = {
     "exclude": Option(config_values.patterns, "leave out names that match in either world", PATTERNS),
     "namespace1": Option(config_values.name, "put ROS 2's names below this one in ROS 1", NAME),
     "namespace2": Option(config_values.name, "put ROS 1's names below this one in ROS 2", NAME),
-    "rename": Option(config_values.mapping(config_values.name, config_values.name)),
+    "rename": Option(config_values.mapping(config_values.ros1_name, config_values.name)),
     "parameters": Option(config_values.flag),
 }
 """Each sets the field of ``Selection`` of its name; ``all`` and ``rename`` are made into fields by ``make_selection``."""

@@ -13,7 +13,6 @@ from typing import TYPE_CHECKING, cast
 from rosbags.interfaces import Nodetype
 
 from ros_bridge.errors import TypeUnknownError
-from ros_bridge.pairing import PADDING
 
 if TYPE_CHECKING:
     from collections.abc import Iterable
@@ -21,9 +20,12 @@ if TYPE_CHECKING:
     from rosbags.interfaces.typing import FieldDesc, Typesdict
 
 HEADER = "std_msgs/msg/Header"
+PADDING = "structure_needs_at_least_one_member"  # ROS 2 gives an empty message one byte
 SIZES = {"bool": 1, "byte": 1, "char": 1, "octet": 1, "float32": 4, "float64": 8}
 SIZES |= {f"{sign}int{bits}": bits // 8 for sign in ("", "u") for bits in (8, 16, 32, 64)}
 MOST_REPETITIONS = 1 << 20
+MOST_OPERATIONS = 100_000  # a few types that have each other ten times make millions
+MOST_BYTES = 1 << 30
 
 
 class Code(IntEnum):
@@ -53,7 +55,7 @@ def compile_program(definitions: Typesdict, name: str) -> tuple[int, ...]:
     """Return the program of a message type ``package/msg/Name`` as a flat row of numbers, four an operation.
 
     Raises:
-        TypeUnknownError: ROS 1 has no such type of field (wstring, long double).
+        TypeUnknownError: ROS 1 has no such type of field (wstring, long double), or a message would be too large.
     """
     return tuple(number for each in _message(definitions, name) for number in (each.code, each.a, each.b, each.c))
 
@@ -67,6 +69,13 @@ def _message(definitions: Typesdict, name: str) -> list[Operation]:
             operations.append(Operation(Code.PADDING))
         else:
             _join(operations, _field(definitions, kind))
+        if len(operations) > MOST_OPERATIONS:
+            break
+    if len(operations) > MOST_OPERATIONS or any(each.least > MOST_BYTES for each in operations):
+        raise TypeUnknownError(
+            f"message type {name.replace('/msg/', '/')} is more than the bridge converts ({MOST_OPERATIONS} fields with those of parts, "
+            f"{MOST_BYTES} bytes of a field)",
+        )
     return operations
 
 

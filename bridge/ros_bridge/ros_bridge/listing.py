@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING
 import rclpy
 
 from alula.common.fast_dds import leave
+from ros_bridge.action_types import action_type
 from ros_bridge.config import ActionRoute, ServiceRoute, TopicRoute
 from ros_bridge.decisions import decide
 from ros_bridge.discovery import GraphReader
@@ -42,20 +43,25 @@ def list_routes(config: BridgeConfig, types: Types, master: Connection) -> str:
         reader.services.wait(AT_MOST_S)
         reader.read_ros1(system)
         decisions = decide(reader.graphs(), config.selection, reader.types, config.routes)
-        return render(list_table(decisions, {spec: problem(spec, types) for spec in config.routes}))
+        return render(list_table(decisions, {spec: state_of(spec, types) for spec in config.routes}))
     finally:
         reader.services.close()
         events.close()
         leave(node)
 
 
-def problem(spec: Spec, types: Types) -> str:
-    """Return why a configured route can't be, or nothing."""
-    kind = {ActionRoute: "action", ServiceRoute: "srv", TopicRoute: "msg"}[type(spec)]
+def state_of(spec: Spec, types: Types) -> str:
+    """Return why a configured route can't be, or that it is configured, and which fields have other names or don't cross."""
+    ros2_type = spec.ros2_type or types.rules.to_ros2(spec.type_name)
     try:
-        if kind != "action":
-            (types.service if kind == "srv" else types.message)(spec.type_name, spec.ros2_type)
-        interface_class(spec.ros2_type or types.rules.to_ros2(spec.type_name), kind)
+        if isinstance(spec, ActionRoute):
+            parts = [part.pair for part in action_type(types, spec.type_name, ros2_type).parts]
+        elif isinstance(spec, ServiceRoute):
+            service = types.service(spec.type_name, ros2_type)
+            parts = [service.request, service.response]
+        else:
+            parts = [types.message(spec.type_name, ros2_type)]
+        interface_class(ros2_type, {ActionRoute: "action", ServiceRoute: "srv", TopicRoute: "msg"}[type(spec)])
     except BridgeError as error:
-        return str(error)
-    return ""
+        return f"can't be: {error}"
+    return "; ".join(["configured", *(note for part in parts for note in part.notes)])

@@ -1,7 +1,7 @@
 """Rules that tell which type of one world is which of the other where names differ, and which field is which.
 
 Without a rule a type has the same ``package/Name`` in both worlds. Rules come from the configuration's ``types`` section; these are
-built in: tf's message moved to tf2_msgs, and ROS 2 has a log message of its own.
+built in: tf's message moved to tf2_msgs, ROS 2 has a log message of its own, and times, durations and UUIDs are in other packages.
 """
 
 from __future__ import annotations
@@ -12,17 +12,24 @@ from dataclasses import dataclass, field
 
 @dataclass(frozen=True)
 class TypeRule:
-    """One type of ROS 1 is one of ROS 2. ``fields`` maps paths with dots, from ROS 1's names to ROS 2's; others go by their names."""
+    """One type of ROS 1 is one of ROS 2. ``fields`` maps paths with dots, from ROS 1's names to ROS 2's; others go by their names.
+
+    ``complete``: ``fields`` has all pairs that there are, and fields that are not in it do not cross.
+    """
 
     ros1: str
     ros2: str
     fields: Mapping[str, str] = field(default_factory=dict, hash=False)
+    complete: bool = False
 
 
 BUILT_IN = (
     TypeRule("tf/tfMessage", "tf2_msgs/TFMessage"),
     TypeRule("tf2_msgs/TFMessage", "tf2_msgs/TFMessage"),
     TypeRule("rosgraph_msgs/Log", "rcl_interfaces/Log", {"header.stamp": "stamp", "header.frame_id": "", "header.seq": "", "topics": ""}),
+    TypeRule("std_msgs/Time", "builtin_interfaces/Time", {"data.sec": "sec", "data.nanosec": "nanosec"}),
+    TypeRule("std_msgs/Duration", "builtin_interfaces/Duration", {"data.sec": "sec", "data.nanosec": "nanosec"}),
+    TypeRule("uuid_msgs/UniqueID", "unique_identifier_msgs/UUID"),
 )
 
 
@@ -51,6 +58,10 @@ class TypeRules:
     def fields(self, ros1_type: str, ros2_type: str) -> Mapping[str, str]:
         """Return the fields that a rule maps between two types; a path that becomes the empty one is left out on purpose."""
         return next((rule.fields for rule in self._rules if (rule.ros1, rule.ros2) == (ros1_type, ros2_type)), {})
+
+    def only_told(self, ros1_type: str, ros2_type: str) -> bool:
+        """Tell whether the fields that a rule maps between two types are all that cross."""
+        return next((rule.complete for rule in self._rules if (rule.ros1, rule.ros2) == (ros1_type, ros2_type)), False)
 
     def related(self, ros1_type: str, ros2_type: str) -> bool:
         """Tell whether the two are one type in the rules' eyes."""

@@ -1,47 +1,39 @@
 """Put the fields of a ROS 1 type and a ROS 2 type side by side: the same layout, or a plan that fills one from the other.
 
-Rules, in this order: fields that a mapping names; then fields of the same name (letter case and trailing underscores aside). Fields
+Fields that a mapping names come first, then fields of the same name (letter case and underscores aside). Fields of different
+names are one field only where all kinds agree, place by place, and neither name stands at another place: then it was renamed. Fields
 that only one of the two types has stay at zero in one direction and are lost in the other; where both have such fields, only
 the user knows whether they are the same, and the pair is refused. Kinds of fields have to agree, except for single numbers in a mapping.
 """
 
 from __future__ import annotations
 
-import dataclasses
-from collections.abc import Callable, Mapping
+import struct
+from collections import Counter
+from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any, cast
 
-import numpy as np
 from rosbags.interfaces import Nodetype
 
 from ros_bridge.errors import TypeDiffersError
+from ros_bridge.layout import HEADER
+from ros_bridge.names import msg_name, plain_name
+from ros_bridge.values import Codec, fields_of
 
 if TYPE_CHECKING:
-    from rosbags.interfaces.typing import FieldDesc
-    from rosbags.typesys.store import Typestore
+    from rosbags.interfaces.typing import FieldDesc, Typesdict
 
     from ros_bridge.mapping import TypeRules
 
-PADDING = "structure_needs_at_least_one_member"  # ROS 2 gives an empty message one byte
-HEADER = "std_msgs/msg/Header"
 ALIASES = {"char": "uint8", "byte": "uint8", "octet": "uint8"}
-NUMPY_OF_BYTES = {"byte": "uint8", "char": "uint8", "octet": "uint8"}
-NUMBERS = frozenset({"int8", "uint8", "int16", "uint16", "int32", "uint32", "int64", "uint64", "float32", "float64", "bool"})
+NUMBERS = {"bool": "<?", "int8": "<b", "uint8": "<B", "float32": "<f", "float64": "<d"}
+NUMBERS |= {
+    f"{sign}int{bits}": f"<{code.upper() if sign else code}" for sign in ("", "u") for bits, code in ((16, "h"), (32, "i"), (64, "q"))
+}
+TIMES = "builtin_interfaces/"
 Path = tuple[str, ...]
 Convert = Callable[[Any], Any]
-
-
-def msg_name(name: str) -> str:
-    """Return ``package/msg/Name`` of ``package/Name``."""
-    package, short = name.split("/")
-    return f"{package}/msg/{short}"
-
-
-def plain_name(name: str) -> str:
-    """Return ``package/Name`` of ``package/msg/Name``."""
-    package, _, short = name.split("/")
-    return f"{package}/{short}"
 
 
 @dataclass(frozen=True)
@@ -56,7 +48,7 @@ class Leaf:
 
 @dataclass(frozen=True)
 class Plan:
-    """How objects of two types are filled from each other, and which fields have no counterpart."""
+    """How values of two types are filled from each other, and which fields have no counterpart."""
 
     ros1_type: str
     ros2_type: str
@@ -64,25 +56,78 @@ class Plan:
     only_ros1: tuple[str, ...]
     only_ros2: tuple[str, ...]
 
+    def to_ros2(self, source: Mapping[str, Any]) -> dict[str, Any]:
+        """Return what a message of ROS 2 has of one of ROS 1."""
+        target: dict[str, Any] = {}
+        for leaf in self.leaves:
+            _put(target, leaf.ros2, leaf.to_ros2(_get(source, leaf.ros1)))
+        return target
+
+    def to_ros1(self, source: Mapping[str, Any]) -> dict[str, Any]:
+        """Return what a message of ROS 1 has of one of ROS 2."""
+        target: dict[str, Any] = {}
+        for leaf in self.leaves:
+            _put(target, leaf.ros1, leaf.to_ros1(_get(source, leaf.ros2)))
+        return target
+
 
 class Pairing:
-    """Compares types of the two stores, in which they and their parts have to be registered."""
+    """Compares the types of two sets of definitions, in which they and their parts have to be."""
 
-    def __init__(self, ros1: Typestore, ros2: Typestore, rules: TypeRules) -> None:
-        self._ros1 = ros1
-        self._ros2 = ros2
+    def __init__(self, ros1: Typesdict, ros2: Typesdict, rules: TypeRules) -> None:
+        self._ros1, self._ros2 = ros1, ros2
+        self._codec1, self._codec2 = Codec(ros1), Codec(ros2)
         self._rules = rules
+        self._same: dict[tuple[str, str], bool] = {}
         self._plans: dict[tuple[str, str], Plan] = {}
 
+    def to_ros2(self, ros1_type: str, ros2_type: str, ros1: bytes) -> bytes:
+        """Convert a message by their plan to ROS 2's layout; raises WireError."""
+        value = self.plan(ros1_type, ros2_type).to_ros2(self._codec1.read(msg_name(ros1_type), ros1))
+        return self._codec2.write(msg_name(ros2_type), value)
+
+    def to_ros1(self, ros1_type: str, ros2_type: str, content: bytes) -> bytes:
+        """Convert a message in ROS 2's layout by their plan; raises WireError."""
+        value = self.plan(ros1_type, ros2_type).to_ros1(self._codec2.read(msg_name(ros2_type), content))
+        return self._codec1.write(msg_name(ros1_type), value)
+
     def same_layout(self, ros1_type: str, ros2_type: str) -> bool:
-        """Tell whether both put the same kinds of fields in the same order; names may differ, and ``Header.seq`` is known."""
+        """Tell whether both put the same fields in the same order; some may have been renamed, and ``Header.seq`` is known."""
+        key = (ros1_type, ros2_type)
+        if key not in self._same:
+            self._same[key] = self._lie_alike(ros1_type, ros2_type)
+        return self._same[key]
+
+    def _lie_alike(self, ros1_type: str, ros2_type: str) -> bool:
         name1, name2 = msg_name(ros1_type), msg_name(ros2_type)
         if name1 == name2 == HEADER:
             return True
         if self._rules.fields(ros1_type, ros2_type):
             return False
-        fields1, fields2 = self._ros1.fielddefs[name1][1], self._ros2.fielddefs[name2][1]
-        return len(fields1) == len(fields2) and all(self._same_kind(one, two) for (_, one), (_, two) in zip(fields1, fields2, strict=True))
+        fields1, fields2 = fields_of(self._ros1, name1), fields_of(self._ros2, name2)
+        alike = len(fields1) == len(fields2) and all(self._same_kind(one, two) for (_, one), (_, two) in zip(fields1, fields2, strict=True))
+        if not alike:
+            return False
+        keys1, keys2 = keys_of([name for name, _ in fields1], [name for name, _ in fields2])
+        return not any(one != two and (one in keys2 or two in keys1) for one, two in zip(keys1, keys2, strict=True))
+
+    def renamed(self, ros1_type: str, ros2_type: str) -> tuple[str, ...]:
+        """Return the fields that have another name at the same place, for people, of types of the same layout."""
+        return tuple(dict.fromkeys(self._renamed(ros1_type, ros2_type, set())))
+
+    def _renamed(self, ros1_type: str, ros2_type: str, seen: set[tuple[str, str]]) -> list[str]:
+        if (ros1_type, ros2_type) in seen or msg_name(ros1_type) == HEADER:
+            return []
+        seen.add((ros1_type, ros2_type))
+        fields1, fields2 = fields_of(self._ros1, msg_name(ros1_type)), fields_of(self._ros2, msg_name(ros2_type))
+        found: list[str] = []
+        for (one, kind1), (two, kind2) in zip(fields1, fields2, strict=True):
+            if one.rstrip("_") != two.rstrip("_"):
+                found.append(f"{ros1_type}'s field '{one}' is '{two}' in ROS 2")
+            part1, part2 = message_in(kind1), message_in(kind2)
+            if part1 is not None and part2 is not None and not part1.startswith(TIMES):
+                found += self._renamed(plain_name(part1), plain_name(part2), seen)
+        return found
 
     def _same_kind(self, one: FieldDesc, two: FieldDesc) -> bool:
         if one[0] != two[0]:
@@ -91,7 +136,7 @@ class Pairing:
             return shape(one) == shape(two)
         if one[0] == Nodetype.NAME:
             name1, name2 = str(one[1]), str(two[1])
-            if "builtin_interfaces" in {name1.split("/", maxsplit=1)[0], name2.split("/", maxsplit=1)[0]}:
+            if name1.startswith(TIMES) and name2.startswith(TIMES):
                 return name1 == name2
             return self._related(name1, name2) and self.same_layout(plain_name(name1), plain_name(name2))
         element1, length1 = cast("tuple[FieldDesc, int]", one[1])
@@ -114,38 +159,61 @@ class Pairing:
 
     def _make_plan(self, ros1_type: str, ros2_type: str) -> Plan:
         told = self._rules.fields(ros1_type, ros2_type)
-        leaves = [self._told_leaf(ros1_type, ros2_type, *pair) for pair in told.items() if pair[1]]
-        names1 = self._open_names(self._ros1, ros1_type, told.keys())
-        names2 = self._open_names(self._ros2, ros2_type, [path for path in told.values() if path])
-        common = [key for key in names1 if key in names2]
-        leaves += [self._leaf(ros1_type, ros2_type, (names1.pop(key),), (names2.pop(key),)) for key in common]
-        if names1 and names2:
-            one, two = next(iter(names1.values())), next(iter(names2.values()))
-            raise TypeDiffersError(
-                f"message type {_both(ros1_type, ros2_type)} differs: only ROS 1 has field '{one}' and only ROS 2 has field '{two}'; "
-                f"say in the configuration's 'types' whether they are the same (fields: {{{one}: {two}}}), or leave it out ({{{one}: ''}})",
-            )
+        leaves = [self._leaf(ros1_type, ros2_type, *pair, told=True) for pair in told.items() if pair[1]]
+        fields1 = _untouched(self._ros1, ros1_type, told)
+        fields2 = _untouched(self._ros2, ros2_type, [path for path in told.values() if path])
+        keys1, keys2 = keys_of(fields1, fields2)
+        names1, names2 = dict(zip(keys1, fields1, strict=True)), dict(zip(keys2, fields2, strict=True))
+        if not self._rules.only_told(ros1_type, ros2_type):
+            common = [key for key in names1 if key in names2]
+            leaves += [self._leaf(ros1_type, ros2_type, names1.pop(key), names2.pop(key), told=False) for key in common]
+            if names1 and names2:
+                raise TypeDiffersError(self._refusal(ros1_type, ros2_type, next(iter(names1.values())), next(iter(names2.values()))))
         return Plan(ros1_type, ros2_type, tuple(leaves), tuple(names1.values()), tuple(names2.values()))
 
-    def _open_names(self, store: Typestore, name: str, told: object) -> dict[str, str]:
-        """Return the fields that no mapping has touched, by the name under which they are compared."""
-        touched = {path.split(".")[0].rstrip("_").lower() for path in cast("list[str]", told)}
-        fields = [field for field, _ in store.fielddefs[msg_name(name)][1] if field != PADDING]
-        return {key: field for field in fields if (key := field.rstrip("_").lower()) not in touched}
+    def _refusal(self, ros1_type: str, ros2_type: str, one: str, two: str) -> str:
+        """Say which fields have no counterpart, and what to write into a mapping so that they have."""
+        both = _both(ros1_type, ros2_type)
+        problem = f"message type {both} differs: only ROS 1 has field '{one}' and only ROS 2 has field '{two}'; "
+        hint = self._hint(ros1_type, ros2_type, one, two)
+        if hint is None:
+            return f"{problem}say in the configuration's 'types' that it is left out (fields: {{{one}: ''}}), or what it is"
+        return f"{problem}say in the configuration's 'types' if they are the same (fields: {hint}), or leave it out ({{{one}: ''}})"
 
-    def _told_leaf(self, ros1_type: str, ros2_type: str, path1: str, path2: str) -> Leaf:
-        return self._leaf(ros1_type, ros2_type, tuple(path1.split(".")), tuple(path2.split(".")), told=True)
+    def _hint(self, ros1_type: str, ros2_type: str, one: str, two: str) -> str | None:
+        """Return a mapping of the two that can be: of the fields, or of one's parts that the other type has beside each other."""
+        _, kind1 = find_field(self._ros1, ros1_type, (one,), "ROS 1")
+        _, kind2 = find_field(self._ros2, ros2_type, (two,), "ROS 2")
+        try:
+            if self._converters(kind1, kind2, told=True) is not None:
+                return f"{{{one}: {two}}}"
+        except TypeDiffersError:  # of their parts
+            return None
+        pairs = [f"{one}.{part}: {field}" for part, field in self._parts_in(self._ros1, kind1, self._ros2, ros2_type)]
+        pairs = pairs or [f"{field}: {two}.{part}" for part, field in self._parts_in(self._ros2, kind2, self._ros1, ros1_type)]
+        return f"{{{', '.join(pairs)}}}" if pairs else None
 
-    def _leaf(self, ros1_type: str, ros2_type: str, path1: Path, path2: Path, *, told: bool = False) -> Leaf:
-        kind1 = field_kind(self._ros1, ros1_type, path1, "ROS 1")
-        kind2 = field_kind(self._ros2, ros2_type, path2, "ROS 2")
+    def _parts_in(self, within: Typesdict, kind: FieldDesc, other: Typesdict, other_type: str) -> list[tuple[str, str]]:
+        """Return the parts of a field, each with the field of the other type that has its name and kind; none if one has none."""
+        if kind[0] != Nodetype.NAME:
+            return []
+        fields, parts = dict(fields_of(other, msg_name(other_type))), dict(fields_of(within, str(kind[1])))
+        keys1, keys2 = keys_of(list(parts), list(fields))
+        names = dict(zip(keys2, fields, strict=True))
+        found = [(part, names[key]) for key, part in zip(keys1, parts, strict=True) if key in names]
+        fit = all(self._converters(parts[part], fields[field], told=True) is not None for part, field in found)
+        return found if fit and len(found) == len(parts) else []
+
+    def _leaf(self, ros1_type: str, ros2_type: str, path1: str, path2: str, *, told: bool) -> Leaf:
+        found1, kind1 = find_field(self._ros1, ros1_type, tuple(path1.split(".")), "ROS 1")
+        found2, kind2 = find_field(self._ros2, ros2_type, tuple(path2.split(".")), "ROS 2")
         converters = self._converters(kind1, kind2, told=told)
         if converters is None:
             raise TypeDiffersError(
-                f"message type {_both(ros1_type, ros2_type)} differs: field '{'.'.join(path1)}' is {shape(kind1)} in ROS 1, "
-                f"'{'.'.join(path2)}' is {shape(kind2)} in ROS 2",
+                f"message type {_both(ros1_type, ros2_type)} differs: field '{path1}' is {shape(kind1)} in ROS 1, "
+                f"'{path2}' is {shape(kind2)} in ROS 2",
             )
-        return Leaf(path1, path2, *converters)
+        return Leaf(found1, found2, *converters)
 
     def _converters(self, one: FieldDesc, two: FieldDesc, *, told: bool) -> tuple[Convert, Convert] | None:
         """Return how a value goes to ROS 2 and back; None when it can't."""
@@ -155,7 +223,7 @@ class Pairing:
             if shape(one) == shape(two):
                 return _same, _same
             numbers = shape(one) in NUMBERS and shape(two) in NUMBERS
-            return (_number(shape(two)), _number(shape(one))) if told and numbers else None
+            return (_number(shape(one), shape(two)), _number(shape(two), shape(one))) if told and numbers else None
         if one[0] != two[0]:
             return None
         element1, length1 = cast("tuple[FieldDesc, int]", one[1])
@@ -168,43 +236,73 @@ class Pairing:
         return _each(inner[0]), _each(inner[1])
 
     def _nested(self, name1: str, name2: str, *, told: bool) -> tuple[Convert, Convert] | None:
-        if "builtin_interfaces" in {name1.split("/", maxsplit=1)[0], name2.split("/", maxsplit=1)[0]}:
+        if name1.startswith(TIMES) and name2.startswith(TIMES):
             return (_same, _same) if name1 == name2 else None
         if not told and not self._related(name1, name2):
             return None
+        if self.same_layout(plain_name(name1), plain_name(name2)):
+            return self._by_place(name1, name2)
         plan = self.plan(plain_name(name1), plain_name(name2))
-        return (lambda value: self.to_ros2(plan, value)), (lambda value: self.to_ros1(plan, value))
+        return plan.to_ros2, plan.to_ros1
 
-    def to_ros2(self, plan: Plan, source: object) -> object:
-        """Return a ROS 2 object of what a ROS 1 object has."""
-        target = blank(self._ros2, msg_name(plan.ros2_type))
-        for leaf in plan.leaves:
-            _put(target, leaf.ros2, leaf.to_ros2(_get(source, leaf.ros1)))
-        return target
-
-    def to_ros1(self, plan: Plan, source: object) -> object:
-        """Return a ROS 1 object of what a ROS 2 object has."""
-        target = blank(self._ros1, msg_name(plan.ros1_type))
-        for leaf in plan.leaves:
-            _put(target, leaf.ros1, leaf.to_ros1(_get(source, leaf.ros2)))
-        return target
+    def _by_place(self, name1: str, name2: str) -> tuple[Convert, Convert]:
+        """Return how a message within one goes over whose fields lie alike, under these names or others."""
+        codec1, codec2 = self._codec1, self._codec2
+        return (
+            lambda value: codec2.read(name2, codec1.write(name1, value)),
+            lambda value: codec1.read(name1, codec2.write(name2, value)),
+        )
 
 
 def _both(ros1_type: str, ros2_type: str) -> str:
     return ros1_type if ros1_type == ros2_type else f"{ros1_type} (ROS 2: {ros2_type})"
 
 
-def field_kind(store: Typestore, name: str, path: Path, world: str) -> FieldDesc:
-    """Return the kind of the field at a path of a type; raises TypeDiffersError when there is none."""
-    fields: Mapping[str, FieldDesc] = dict(store.fielddefs[msg_name(name)][1])
-    key = next((field for field in fields if field.rstrip("_").lower() == path[0].rstrip("_").lower()), None)
-    if key is None:
+def keys_of(names1: Sequence[str], names2: Sequence[str]) -> tuple[list[str], list[str]]:
+    """Return the names of two types' fields as they are compared: those of the same name, then without case and underscores.
+
+    A name that is not the only one of its type that is left under that spelling stays as it is.
+    """
+    both = set(names1) & set(names2)
+    numbers = [Counter(_folded(name) for name in names if name not in both) for names in (names1, names2)]
+    alone = {folded for folded in numbers[0] | numbers[1] if all(number[folded] <= 1 for number in numbers)}
+
+    def key(name: str) -> str:
+        return name if name in both or _folded(name) not in alone else f"~{_folded(name)}"
+
+    return [key(name) for name in names1], [key(name) for name in names2]
+
+
+def _folded(name: str) -> str:
+    return name.replace("_", "").lower()
+
+
+def _untouched(definitions: Typesdict, name: str, told: Iterable[str]) -> list[str]:
+    """Return the fields that no mapping has touched."""
+    touched = {_folded(path.split(".")[0]) for path in told}
+    return [field for field, _ in fields_of(definitions, msg_name(name)) if _folded(field) not in touched]
+
+
+def find_field(definitions: Typesdict, name: str, path: Path, world: str) -> tuple[Path, FieldDesc]:
+    """Return the field at a path of a type, by its exact names, and its kind; raises TypeDiffersError when there is none."""
+    fields: Mapping[str, FieldDesc] = dict(fields_of(definitions, msg_name(name)))
+    alike = [field for field in fields if _folded(field) == _folded(path[0])]
+    if not alike:
         raise TypeDiffersError(f"message type {name}: a mapping names field '{path[0]}', which it does not have in {world}")
+    key = path[0] if path[0] in alike else alike[0]
     if len(path) == 1:
-        return fields[key]
+        return (key,), fields[key]
     if fields[key][0] != Nodetype.NAME:
         raise TypeDiffersError(f"message type {name}: a mapping goes into field '{key}' ({shape(fields[key])}), which is no message")
-    return field_kind(store, plain_name(str(fields[key][1])), path[1:], world)
+    rest, kind = find_field(definitions, plain_name(str(fields[key][1])), path[1:], world)
+    return (key, *rest), kind
+
+
+def message_in(kind: FieldDesc) -> str | None:
+    """Return the message type ``package/msg/Name`` in a field's kind, if there is one."""
+    if kind[0] == Nodetype.NAME:
+        return str(kind[1])
+    return None if kind[0] == Nodetype.BASE else message_in(cast("tuple[FieldDesc, int]", kind[1])[0])
 
 
 def shape(field: FieldDesc) -> str:
@@ -219,54 +317,27 @@ def shape(field: FieldDesc) -> str:
     return f"{shape(element)}[{length if kind == Nodetype.ARRAY else ''}]"
 
 
-def blank(store: Typestore, name: str) -> object:
-    """Return an object of a type with all fields zero, empty or false."""
-    values = [_zero(store, kind) for _, kind in store.fielddefs[name][1]]
-    return store.types[name](*cast("list[Any]", values))
-
-
-def _zero(store: Typestore, field: FieldDesc) -> object:
-    kind, inner = field
-    if kind == Nodetype.NAME:
-        return blank(store, str(inner))
-    if kind == Nodetype.BASE:
-        base = cast("tuple[str, int]", inner)[0]
-        return {"string": "", "bool": False, "float32": 0.0, "float64": 0.0}.get(base, 0)
-    element, length = cast("tuple[FieldDesc, int]", inner)
-    number = length if kind == Nodetype.ARRAY else 0
-    base = cast("tuple[str, int]", element[1])[0] if element[0] == Nodetype.BASE else ""
-    if base and base != "string":
-        return np.zeros(number, dtype=NUMPY_OF_BYTES.get(base, base))
-    return [_zero(store, element) for _ in range(number)]
-
-
 def _same(value: object) -> object:
     return value
 
 
-def _number(kind: str) -> Convert:
-    return bool if kind == "bool" else float if kind.startswith("float") else int
+def _number(one: str, two: str) -> Convert:
+    """Return what makes a number of another kind; it raises struct.error for one that does not fit."""
+    kind = bool if two == "bool" else float if two.startswith("float") else int
+    return lambda value: struct.pack(NUMBERS[two], kind(struct.unpack(NUMBERS[one], value)[0]))
 
 
 def _each(convert: Convert) -> Convert:
     return lambda values: [convert(value) for value in values]
 
 
-def _get(source: object, path: Path) -> object:
+def _get(source: Mapping[str, Any], path: Path) -> Any:
     for name in path:
-        source = getattr(source, _attribute(source, name))
+        source = source[name]
     return source
 
 
-def _put(target: object, path: Path, value: object) -> None:
+def _put(target: dict[str, Any], path: Path, value: object) -> None:
     for name in path[:-1]:
-        target = getattr(target, _attribute(target, name))
-    object.__setattr__(target, _attribute(target, path[-1]), value)
-
-
-def _attribute(source: object, name: str) -> str:
-    """Return the attribute of a field: as it is, or as rosbags spells a name that is a keyword or has another case in its stores."""
-    if hasattr(source, name):
-        return name
-    wanted = name.rstrip("_").lower()
-    return next(field.name for field in dataclasses.fields(source) if field.name.rstrip("_").lower() == wanted)  # type: ignore[arg-type]
+        target = target.setdefault(name, {})
+    target[path[-1]] = value

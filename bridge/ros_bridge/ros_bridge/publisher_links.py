@@ -8,7 +8,7 @@ from __future__ import annotations
 import logging
 import threading
 import time
-from collections.abc import Iterable, Iterator
+from collections.abc import Callable, Iterable, Iterator
 from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass, field
 from typing import TYPE_CHECKING
@@ -63,6 +63,7 @@ class PublisherLinks:
         self._subscriptions: dict[int, _Subscription] = {}  # by the native route's address
         self._links: dict[int, _Link] = {}  # those of subscriptions, and those that are about to be replaced
         self._asked: set[str] = set()  # nodes
+        self.on_refused: Callable[[str], None] = lambda _: None  # the topic: its publisher has another type, or another version of it
         self._closed = False
         self._askers = ThreadPoolExecutor(ASKING_THREADS, thread_name_prefix="plane_ask")
 
@@ -177,6 +178,8 @@ class PublisherLinks:
                 self._replace(link)
             elif kind in {EventKind.CLOSED, EventKind.REFUSED}:
                 self._failed(link, text, refused=kind is EventKind.REFUSED)
+                if kind is EventKind.REFUSED:
+                    self.on_refused(link.topic)
 
     def _replace(self, link: _Link) -> None:
         """Connect a second time to a publisher that is not heard any more, until that succeeds.

@@ -12,6 +12,7 @@ from __future__ import annotations
 
 import hashlib
 import re
+from collections import Counter
 from collections.abc import Callable
 from dataclasses import dataclass
 
@@ -23,7 +24,10 @@ PRIMITIVES = frozenset({*NUMBERS, "bool", "string", "time", "duration", "byte", 
 ROS2_TIMES = {"builtin_interfaces/Time": "time", "builtin_interfaces/Duration": "duration"}
 SEPARATOR = "=" * 80
 CONSTANT = re.compile(r"(?P<base>\w+)\s+(?P<name>\w+)\s*=(?P<value>.*)")  # a string's value reaches to the end of the line, # included
-FIELD = re.compile(r"(?P<base>[A-Za-z][A-Za-z0-9_/]*)(?P<array>\[\d*\])?")
+FIELD = re.compile(r"(?P<base>[A-Za-z][A-Za-z0-9_]*(/[A-Za-z][A-Za-z0-9_]*)?)(?P<array>\[\d{0,10}\])?")
+FIELD_NAME = re.compile(r"[A-Za-z][A-Za-z0-9_]*")
+TYPE_NAME = re.compile(r"[A-Za-z][A-Za-z0-9_]*/[A-Za-z][A-Za-z0-9_]*")
+ROS2_ALONE = frozenset({"wstring", "octet", "boolean"})
 
 
 @dataclass(frozen=True)
@@ -50,6 +54,13 @@ class Definition:
         return tuple(dict.fromkeys(field.base for field in self.fields if field.base not in PRIMITIVES))
 
 
+def require_type_name(name: str) -> str:
+    """Return a type's name if it is ``package/Name``; raises TypeUnknownError."""
+    if TYPE_NAME.fullmatch(name) is None:
+        raise TypeUnknownError(f"'{name}' is no name of a type; those are package/Name, such as std_msgs/String")
+    return name
+
+
 def parse_definition(type_name: str, text: str) -> Definition:
     """Read a ``.msg`` text; ``type_name`` is ``package/Name``.
 
@@ -67,14 +78,19 @@ def parse_definition(type_name: str, text: str) -> Definition:
             constants.append(f"{constant['base']} {constant['name']}={constant['value'].strip()}")
         else:
             fields.append(_field(type_name, code))
+    twice = next((name for name, number in Counter(field.name for field in fields).items() if number > 1), None)
+    if twice is not None:
+        raise TypeUnknownError(f"{type_name}: two fields are called '{twice}'")
     return Definition(type_name, text, tuple(constants), tuple(fields))
 
 
 def _field(type_name: str, code: str) -> Field:
     words = code.split()
     match = FIELD.fullmatch(words[0])
-    if match is None or len(words) != 2:
+    if match is None or len(words) != 2 or FIELD_NAME.fullmatch(words[1]) is None:
         raise TypeUnknownError(f"{type_name}: '{code}' can't be a ROS 1 field; ROS 1 has neither bounded types nor default values")
+    if match["base"] in ROS2_ALONE:
+        raise TypeUnknownError(f"{type_name}: field '{words[1]}' is a {match['base']}, and ROS 1 has no such kind of field")
     base = ROS2_TIMES.get(match["base"], match["base"])
     if base == "Header":
         base = "std_msgs/Header"

@@ -102,8 +102,12 @@ class RouteTable:
         """Let a route flow, once."""
         with self._lock:
             if spec in self._running and spec not in self._started:
-                self._running[spec].start()
-                self._started.add(spec)
+                try:
+                    self._running[spec].start()
+                    self._started.add(spec)
+                except Exception as error:  # noqa: BLE001 - of one route; the others go on
+                    self._close(spec)
+                    self._give_up(spec, error)
 
     def started(self, spec: Spec) -> bool:
         """Tell whether a route forwards messages."""
@@ -119,9 +123,12 @@ class RouteTable:
     def _make(self, spec: Spec) -> None:
         try:
             self._running[spec] = self._maker(spec)(spec, self._context)
-        except BridgeError as error:
-            self.failed[spec] = str(error)
-            logger.error("%s is not bridged: %s", spec.label, error)
+        except Exception as error:  # noqa: BLE001 - whatever its type or rclpy raise; the others go on
+            self._give_up(spec, error)
+
+    def _give_up(self, spec: Spec, error: Exception) -> None:
+        self.failed[spec] = str(error) if isinstance(error, BridgeError) else f"{type(error).__name__}: {error}"
+        logger.error("%s is not bridged: %s", spec.label, self.failed[spec])
 
     def _maker(self, spec: Spec) -> Maker:
         if type(spec) not in self._makers:
@@ -131,7 +138,10 @@ class RouteTable:
     def _close(self, spec: Spec) -> None:
         route = self._running.pop(spec)
         self._started.discard(spec)
-        route.close()
+        try:
+            route.close()
+        except Exception:  # of one route; the others go on
+            logger.exception("%s does not close", spec.label)
         self._earlier[key_of(spec)] = route.figures().after(self._earlier.get(key_of(spec), Figures()))
 
     def running(self) -> dict[Spec, Route]:

@@ -6,6 +6,7 @@ round through a chain of renamed topics.
 
 from __future__ import annotations
 
+import re
 from collections.abc import Sequence
 from dataclasses import dataclass
 from fnmatch import fnmatchcase
@@ -28,6 +29,19 @@ NEVER = (
     "*/set_parameters_atomically",
     "*/get_type_description",
 )
+
+ROS1_NAME = re.compile(r"(/[A-Za-z0-9_]+)+")
+ROS2_NAME = re.compile(r"(/[A-Za-z_][A-Za-z0-9_]*)+")
+
+
+def is_ros1_name(name: str) -> bool:
+    """Tell whether ROS 1 can have an absolute name."""
+    return ROS1_NAME.fullmatch(name) is not None
+
+
+def is_ros2_name(name: str) -> bool:
+    """Tell whether ROS 2 can have an absolute name: no part of it begins with a digit."""
+    return ROS2_NAME.fullmatch(name) is not None
 
 
 @dataclass(frozen=True)

@@ -127,4 +127,4 @@ def refusal_around(response_class: Any, to_layout: Callable[[bytes], bytes]) -> 
 
 def make(spec: ServiceRoute, context: Context) -> Route:
     """Make a service's route; raises BridgeError when its type can't cross."""
-    return NativeService(spec, context.types.service(spec.type_name, spec.ros2_type), context)
+    return NativeService(spec, context.types.service(spec.type_name, spec.ros2_type, spec.md5sum), context)

@@ -75,15 +75,16 @@ def quality_text(spec: Spec) -> str:
 
 
 def list_table(decisions: Iterable[Decision], configured: Mapping[Spec, str]) -> Table:
-    """Return the table of what would be bridged and what can't be; ``configured`` has a reason for each route that can't."""
+    """Return the table of what would be bridged and what can't be; ``configured`` has the state of each configured route."""
     rows: Table = [COLUMNS]
-    rows += [_row(spec, f"can't be: {reason}" if reason else "configured") for spec, reason in configured.items()]
+    rows += [_row(spec, state) for spec, state in configured.items()]
     for decision in decisions:
         if isinstance(decision, Refused):
             rows.append((decision.kind, decision.ros1_name, "x", decision.ros2_name, "", "", f"can't be: {decision.reason}"))
         else:
             receivers = f"{decision.receivers} receive" if decision.receivers else "offered; no subscriber"
-            rows.append(_row(decision.spec, receivers if isinstance(decision.spec, TopicRoute) else "offered"))
+            state = receivers if isinstance(decision.spec, TopicRoute) else "offered"
+            rows.append(_row(decision.spec, "; ".join([state, *decision.notes])))
     return rows
 
 

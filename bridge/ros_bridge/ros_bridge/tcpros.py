@@ -59,20 +59,20 @@ def publisher_header(node_uri: str, topic: str, caller_id: str) -> dict[str, str
         return None
 
 
-def service_type(service: str, service_uri: str, caller_id: str) -> str | None:
-    """Return the type of a service; None when its node answers otherwise than it should, or is not there.
+def service_header(service: str, service_uri: str, caller_id: str) -> dict[str, str]:
+    """Return the header with which a node offers a service: its type and MD5 sum; empty when it answers otherwise, or is not there.
 
     Raises TimeoutError when it does not answer in time.
     """
     wanted = {"service": service, "probe": "1", "md5sum": "*", "callerid": caller_id}
     try:
         parts = urlsplit(service_uri)
-        return _exchange(str(parts.hostname), int(parts.port or 0), wanted).get("type")
+        return _exchange(str(parts.hostname), int(parts.port or 0), wanted)
     except TimeoutError:
         raise
     except (OSError, ValueError, WireError) as error:
         logger.debug("%s says nothing about %s: %s", service_uri, service, error)
-        return None
+        return {}
 
 
 def _exchange(host: str, port: int, wanted: Mapping[str, str]) -> dict[str, str]:

@@ -90,4 +90,4 @@ class NativeTopic(NativeRoute):
 
 def make(spec: TopicRoute, context: Context) -> TopicBridge:
     """Make a topic's route; raises BridgeError when its type can't cross."""
-    return NativeTopic(spec, context.types.message(spec.type_name, spec.ros2_type), context)
+    return NativeTopic(spec, context.types.message(spec.type_name, spec.ros2_type, spec.md5sum), context)

@@ -113,6 +113,13 @@ def advertise_own(topic, type, definition):  # noqa: A002
     PUBLISHERS[topic] = rospy.Publisher(topic, bytes_class(type, md5sum, definition), queue_size=1)
 
 
+def publish_bytes(topic, hex):  # noqa: A002
+    """Publish a message of such a type."""
+    message = PUBLISHERS[topic].data_class()
+    message._buff = bytes.fromhex(hex)
+    PUBLISHERS[topic].publish(message)
+
+
 def advertise_bag(path, prefix):
     """Advertise what a recording has, with the recorded types."""
     with rosbag.Bag(path) as bag:
@@ -177,6 +184,7 @@ COMMANDS = {
     "publish_once": publish_once,
     "set_parameter": set_parameter,
     "advertise_own": advertise_own,
+    "publish_bytes": publish_bytes,
     "advertise_bag": advertise_bag,
     "play": play,
     "connections": connections,

@@ -10,9 +10,10 @@ from hypothesis import strategies as st
 
 from ros_bridge import actionlib_wire
 from ros_bridge.action_states import ROS1_TERMINAL, ROS2_TERMINAL, TO_ROS1, TO_ROS2, CancelCode, Ros1Status, Ros2Status
-from ros_bridge.action_types import action_type, split
+from ros_bridge.action_types import action_type
 from ros_bridge.actionlib_wire import GoalId, GoalStatus
 from ros_bridge.conversion import Types, ament_prefixes
+from ros_bridge.definitions import split
 from ros_bridge.errors import TypeUnknownError, WireError
 from ros_bridge.goals_to_ros1 import (
     KEEP_RESULT_BYTES,
@@ -79,7 +80,7 @@ def test_every_state_has_its_counterpart():
 
 
 def test_md5_sums_of_an_action_are_those_of_genpy():
-    action = action_type(Types(ament_prefixes()), "bridge_test_interfaces/Count", "bridge_test_interfaces/Count", ament_prefixes())
+    action = action_type(Types(ament_prefixes()), "bridge_test_interfaces/Count", "bridge_test_interfaces/Count")
     sums = [part.envelope.md5sum for part in (action.goal, action.result, action.feedback)]
     assert sums == ["c6c96f7e707cf908bb40bcffeedb2718", "a764b76e26d05d07b931699d7af9ec18", "7030176b9408030ce098804e78467d2b"]
     assert action.result.envelope.ros1_name == "bridge_test_interfaces/CountActionResult"
@@ -87,11 +88,11 @@ def test_md5_sums_of_an_action_are_those_of_genpy():
 
 def test_unknown_action_type_is_named_with_the_place_and_the_remedy():
     with pytest.raises(TypeUnknownError, match=r"no_msgs/action/No\.action .* build the package"):
-        action_type(Types(ament_prefixes()), "no_msgs/No", "no_msgs/No", ament_prefixes())
+        action_type(Types(ament_prefixes()), "no_msgs/No", "no_msgs/No")
 
 
 def test_split_of_an_action_text():
-    assert split("int32 a\n---\n---\nint32 b # c") == ("int32 a", "", "int32 b # c")
+    assert split("int32 a\n---\n---\nint32 b # c", 3) == ["int32 a", "", "int32 b # c"]
 
 
 class Server:

@@ -15,6 +15,7 @@ from rosbags.interfaces import Nodetype
 from rosbags.rosbag1 import Reader
 
 from ros_bridge.conversion import Types, ament_prefixes
+from ros_bridge.definitions import DefinitionFiles
 from ros_bridge.errors import TypeDiffersError, TypeUnknownError
 
 ROUND_TRIPS = [
@@ -57,7 +58,7 @@ def ros1_bytes(types, name):
     """Serialized ROS 1 messages of a type, written from its fields alone: an obvious reference beside rosbags' generated code."""
     if name == "std_msgs/msg/Header":  # seq is lost on the way, so it is 0 here
         return st.tuples(st.just(bytes(4)), st.binary(min_size=8, max_size=8), SCALARS["string"]).map(b"".join)
-    fields = [field for field in types._ros1.fielddefs[name][1] if field[0] != "structure_needs_at_least_one_member"]
+    fields = [field for field in types._found.fielddefs[name][1] if field[0] != "structure_needs_at_least_one_member"]
     return st.tuples(*(field_bytes(types, kind) for _, kind in fields)).map(b"".join)
 
 
@@ -212,10 +213,9 @@ def test_fields_that_ros1_does_not_have(tmp_path, line):
 
 
 def test_a_type_that_differs_is_refused_by_name_and_field(tmp_path):
-    from rosbags.typesys import get_types_from_msg
-
-    types = Types([package(tmp_path, "own_msgs", msg_Outer="Inner[] inner\n", msg_Inner="int32 a\nint32 b\n")])
-    types._ros1.register(get_types_from_msg("int32 a\nfloat32 b\n", "own_msgs/msg/Inner"))
+    ros2 = package(tmp_path / "ros2", "own_msgs", msg_Outer="Inner[] inner\n", msg_Inner="int32 a\nint32 b\n")
+    ros1 = package(tmp_path / "ros1", "own_msgs", msg_Outer="Inner[] inner\n", msg_Inner="int32 a\nfloat32 b\n")
+    types = Types([ros2], None, DefinitionFiles([ros1 / "share"]))
     with pytest.raises(TypeDiffersError, match=r"own_msgs/Inner differs: field 'b' is float32 in ROS 1, 'b' is int32 in ROS 2"):
         types.message("own_msgs/Outer")
 

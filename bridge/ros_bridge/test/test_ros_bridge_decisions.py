@@ -6,6 +6,7 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
+from ros_bridge.checked_types import CheckedPair
 from ros_bridge.config import ActionRoute, Direction, Reliability, RosVersion, ServiceRoute, TopicRoute
 from ros_bridge.decisions import BULKY_DEPTH, DEPTH, Refused, RouteDecision, decide
 from ros_bridge.errors import BridgeError, TypeUnknownError
@@ -24,19 +25,20 @@ ALL = Selection(("*",))
 class Types:
     """Every type is itself in the other world, but for one that the other world does not have."""
 
-    def pair(self, ros1_type, ros2_type, topic):
+    def pair(self, ros1_type, ros2_type, name):
         kind = ros1_type or ros2_type
         if "no_msgs/No" in {ros1_type, ros2_type}:
             raise TypeUnknownError(f"{kind} is not in ROS 2")
-        return kind, ros2_type or kind
+        if kind == "no_msgs/Odd":
+            raise KeyError(kind)
+        return CheckedPair(kind, ros2_type or kind, bulky=kind == "sensor_msgs/Image")
 
-    def check_service(self, ros1_type, ros2_type):
+    def service(self, ros1_type, ros2_type, name):
         if ros1_type is None and ros2_type is None:
             raise BridgeError("its node does not say its type")
-        return self.pair(ros1_type, ros2_type, "")
+        return self.pair(ros1_type, ros2_type, name)
 
-    def bulky(self, ros2_type):
-        return ros2_type == "sensor_msgs/Image"
+    action = service
 
 
 def ros1(publishers=(), subscribers=(), types=None, **more):
@@ -122,7 +124,7 @@ def test_services_and_actions_go_from_the_world_that_has_the_server():
         Refused("service", "/mute", "/mute", "its node does not say its type"),
         RouteDecision(ServiceRoute("/one", "/one", RosVersion.ROS1, "a/B", ros2_type="a/B")),
         RouteDecision(ServiceRoute("/two", "/two", RosVersion.ROS2, "c/D", ros2_type="c/D")),
-        RouteDecision(ActionRoute("/go", "/go", RosVersion.ROS2, "e/Go")),
+        RouteDecision(ActionRoute("/go", "/go", RosVersion.ROS2, "e/Go", ros2_type="e/Go")),
     ]
 
 
@@ -132,7 +134,7 @@ def test_an_action_of_ros1_is_known_by_its_topics_which_are_no_topics_then():
     to_server = {"/go/goal": server, "/go/cancel": server}
     types = {"/go/goal": "e/GoActionGoal", "/go/status": "actionlib_msgs/GoalStatusArray"}
     graph = Ros1Graph({**from_server, "/go/goal": client}, {**to_server, "/go/status": client}, types=types)
-    assert decided(graph, ros2()) == [RouteDecision(ActionRoute("/go", "/go", RosVersion.ROS1, "e/Go"))]
+    assert decided(graph, ros2()) == [RouteDecision(ActionRoute("/go", "/go", RosVersion.ROS1, "e/Go", ros2_type="e/Go"))]
     assert Ros1Graph({"/go/goal": client}, {"/go/status": client}, types=types).action_servers() == {}
 
 
@@ -233,7 +235,7 @@ def test_rows_tell_both_ways_of_a_topic_and_what_can_not_be():
     assert {name: row["count"] for name, row in topics.items()} == {"/tf": 7, "/tf ros2_to_ros1": 2}
     assert (topics["/tf"]["rate_hz"], topics["/tf"]["dropped"], topics["/tf"]["dropped_why"]) == (1.26, 3, {"slow": 3})
     assert [row[0:3] for row in live_table(figures, {up: 1.0})[1:]] == [("/tf", "->", "/tf"), ("/tf", "<-", "/tf")]
-    table = list_table([RouteDecision(down, 1), Refused("topic", "/x", "/y", "no such type")], {up: ""})
+    table = list_table([RouteDecision(down, 1), Refused("topic", "/x", "/y", "no such type")], {up: "configured"})
     assert [(row[0], row[2], row[5], row[6]) for row in table[1:]] == [
         ("topic", "->", "reliable, volatile, 10", "configured"),
         ("topic", "<-", "best effort, volatile, 10", "1 receive"),

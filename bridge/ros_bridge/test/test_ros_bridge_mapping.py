@@ -9,8 +9,9 @@ from rosbags.typesys import Stores, get_types_from_msg, get_typestore
 
 from ros_bridge.conversion import Types, ament_prefixes
 from ros_bridge.definitions import DefinitionFiles
-from ros_bridge.errors import TypeDiffersError, TypeUnknownError
+from ros_bridge.errors import TypeDiffersError, TypeUnknownError, WireError
 from ros_bridge.mapping import TypeRule, TypeRules
+from ros_bridge.ros1_definition import md5
 
 
 def write(folder, name, text, kind="msg"):
@@ -179,7 +180,11 @@ def test_a_mapping_that_names_no_field_is_refused(world, fields, words):
 def test_what_a_publisher_says_is_its_definition(world):
     types = world({}, {"own_msgs/Outer": "Inner[] inner\n", "own_msgs/Inner": "int32 b\nint32 a\n"})
     assert not types.knows_ros1("own_msgs/Outer")
-    types.learn("own_msgs/Outer", "Inner[] inner\n" + "=" * 80 + "\nMSG: own_msgs/Inner\nint32 a\nint64 c\nint32 b\n")
+    inner = "int32 a\nint64 c\nint32 b"
+    text = "Inner[] inner\n" + "=" * 80 + f"\nMSG: own_msgs/Inner\n{inner}\n"
+    with pytest.raises(TypeUnknownError, match=r"the text that comes with own_msgs/Outer has MD5 sum .*, and its node says x"):
+        types.learn("own_msgs/Outer", text, "x")
+    types.learn("own_msgs/Outer", text, md5(f"{md5(inner)} inner"))
     assert types.knows_ros1("own_msgs/Outer")
     pair = types.message("own_msgs/Outer")
     assert not pair.same_layout
@@ -230,3 +235,130 @@ def test_any_order_of_any_fields_returns_byte_for_byte(tmp_path_factory, data):
     pair = Types([folder / "ros2"], None, DefinitionFiles([folder / "ros1"])).message("x_msgs/X")
     ros1 = b"".join(data.draw(VALUES[kind]) for kind, _ in fields)
     assert bytes(pair.to_ros1(pair.to_ros2(ros1))) == ros1
+
+
+def test_a_name_that_stands_at_another_place_is_never_paired_by_place(world):
+    pair = world({"a_msgs/Swap": "float64 x\nfloat64 y\n"}, {"a_msgs/Swap": "float64 y\nfloat64 x\n"}).message("a_msgs/Swap")
+    assert not pair.same_layout
+    assert pair.to_ros2(struct.pack("<dd", 1.0, 2.0))[4:] == struct.pack("<dd", 2.0, 1.0)
+    assert bytes(pair.to_ros1(pair.to_ros2(struct.pack("<dd", 1.0, 2.0)))) == struct.pack("<dd", 1.0, 2.0)
+
+
+def test_fields_renamed_at_their_place_are_paired_and_told(world):
+    ros1 = {"a_msgs/M": "uint8 a\nPart[] parts\nfloat32 temp\n", "a_msgs/Part": "float32 batteryVoltage\n"}
+    ros2 = {"a_msgs/M": "uint8 a\nPart[] parts\nfloat32 heat\n", "a_msgs/Part": "float32 battery_voltage\n"}
+    pair = world(ros1, ros2).message("a_msgs/M")
+    assert pair.same_layout
+    assert pair.notes == (
+        "a_msgs/Part's field 'batteryVoltage' is 'battery_voltage' in ROS 2",
+        "a_msgs/M's field 'temp' is 'heat' in ROS 2",
+    )
+
+
+@pytest.mark.parametrize(
+    ("ros1", "ros2", "words"),
+    [
+        ("float64 x\nfloat64 y\nfloat64 v\n", "float64 y\nfloat64 x\nfloat64 w\n", "only ROS 1 has field 'v' and only ROS 2 has field 'w'"),
+        ("float64 a\nfloat64 b\n", "float64 b\nfloat64 c\n", "only ROS 1 has field 'a' and only ROS 2 has field 'c'"),
+        ("In one\nIn two\nfloat64 x\n", "In two\nIn one\nfloat64 z\n", "only ROS 1 has field 'x' and only ROS 2 has field 'z'"),
+    ],
+)
+def test_beside_fields_at_other_places_no_field_is_paired_by_place(world, ros1, ros2, words):
+    part = {"a_msgs/In": "int8 i\n"}
+    with pytest.raises(TypeDiffersError, match=words):
+        world({"a_msgs/M": ros1, **part}, {"a_msgs/M": ros2, **part}).message("a_msgs/M")
+
+
+def test_a_part_whose_fields_swap_makes_the_whole_go_by_names(world):
+    ros1 = {"a_msgs/M": "In[] ins\nIn[2] two\nint8 z\n", "a_msgs/In": "int16 x\nint16 y\n"}
+    ros2 = {"a_msgs/M": "In[] ins\nIn[2] two\nint8 z\n", "a_msgs/In": "int16 y\nint16 x\n"}
+    pair = world(ros1, ros2).message("a_msgs/M")
+    cdr = pair.to_ros2(struct.pack("<Ihh4hb", 1, 1, 2, 3, 4, 5, 6, 7))
+    assert cdr[4:] == struct.pack("<Ihh4hb", 1, 2, 1, 4, 3, 6, 5, 7)
+
+
+NAMED = st.lists(
+    st.tuples(st.sampled_from(["a", "b", "cd", "c_d", "Cd", "e"]), st.sampled_from(["int32", "float32"])), min_size=1, max_size=4
+)
+
+
+@settings(max_examples=200, suppress_health_check=list(HealthCheck), database=None)
+@given(NAMED.filter(lambda fields: len({name for name, _ in fields}) == len(fields)), st.data())
+def test_no_value_arrives_in_a_field_that_the_other_world_has_elsewhere(tmp_path_factory, fields, data):
+    """Fields that both worlds have under the very name get each other's values, or the type is refused."""
+    others = data.draw(NAMED.filter(lambda fields: len({name for name, _ in fields}) == len(fields)))
+    folder = tmp_path_factory.mktemp("named")
+    for place, these in (("ros1", fields), ("ros2/share", others)):
+        write(folder / place, "x_msgs/X", "".join(f"{kind} {name}\n" for name, kind in these))
+    try:
+        pair = Types([folder / "ros2"], None, DefinitionFiles([folder / "ros1"])).message("x_msgs/X")
+    except TypeDiffersError:
+        return
+    ros1 = b"".join(struct.pack("<i" if kind == "int32" else "<f", number + 1) for number, (_, kind) in enumerate(fields))
+    values = struct.unpack("<" + "".join("i" if kind == "int32" else "f" for _, kind in others), pair.to_ros2(ros1)[4:])
+    arrived = dict(zip((name for name, _ in others), values, strict=True))
+    for number, (name, _) in enumerate(fields):
+        if name in arrived:
+            assert arrived[name] == number + 1, (fields, others)
+
+
+def test_strings_that_are_no_utf8_pass_as_bytes_where_fields_go_by_their_names(world):
+    types = world({"a_msgs/M": "string one\nstring[] more\nint8 x\n"}, {"a_msgs/M": "int8 x\nstring[] more\nstring one\n"})
+    ros1 = struct.pack("<I2sII1sb", 2, b"\xff\xe4", 1, 1, b"\x80", 7)
+    pair = types.message("a_msgs/M")
+    assert not pair.same_layout
+    assert bytes(pair.to_ros1(pair.to_ros2(ros1))) == ros1
+    assert b"\xff\xe4\x00" in pair.to_ros2(ros1)
+
+
+@pytest.mark.parametrize("data", [b"", b"\x01", struct.pack("<i", 2**31 - 1), struct.pack("<i", -1) + bytes(8), bytes(200)])
+def test_bytes_that_are_no_message_are_an_error_where_fields_go_by_their_names(world, data):
+    types = world(
+        {"a_msgs/M": "string one\nIn[] ins\nint8 x\n", "a_msgs/In": ""}, {"a_msgs/M": "int8 x\nIn[] ins\nstring one\n", "a_msgs/In": ""}
+    )
+    pair = types.message("a_msgs/M")
+    for convert in (pair.to_ros2_layout, pair.to_ros1_from_layout):
+        with pytest.raises(WireError, match=r"ends early|goes on behind its end"):
+            convert(data)
+
+
+def test_times_durations_and_uuids_have_rules():
+    types = Types(ament_prefixes())
+    rules = TypeRules()
+    for one, two in (("std_msgs/Time", "builtin_interfaces/Time"), ("std_msgs/Duration", "builtin_interfaces/Duration")):
+        assert (rules.to_ros2(one), rules.to_ros1(two)) == (two, one)
+        pair = types.message(one)
+        assert bytes(pair.to_ros1(pair.to_ros2(struct.pack("<II", 5, 6)))) == struct.pack("<II", 5, 6)
+        assert pair.to_ros2(struct.pack("<II", 5, 6))[4:] == struct.pack("<II", 5, 6)
+    assert (rules.to_ros2("uuid_msgs/UniqueID"), rules.to_ros1("unique_identifier_msgs/UUID")) == (
+        "unique_identifier_msgs/UUID",
+        "uuid_msgs/UniqueID",
+    )
+    pair = types.message("uuid_msgs/UniqueID")
+    assert (pair.same_layout, bytes(pair.to_ros1(pair.to_ros2(bytes(range(16)))))) == (True, bytes(range(16)))
+
+
+def test_a_field_of_a_ruled_type_follows_the_rule(world):
+    pair = world({"a_msgs/M": "int8 x\nstd_msgs/Time at\n"}, {"a_msgs/M": "builtin_interfaces/Time at\nint8 x\n"}).message("a_msgs/M")
+    assert pair.to_ros2(struct.pack("<bII", 7, 5, 6))[4:] == struct.pack("<IIb", 5, 6, 7)
+
+
+def hint_of(error):
+    """Return the mapping that a refusal proposes."""
+    return dict(pair.split(": ") for pair in str(error).split("fields: {")[1].split("}")[0].split(", "))
+
+
+@pytest.mark.parametrize(
+    ("ros1", "ros2"),
+    [
+        ("int32 x\nint32 old\nint8 y\n", "int8 y\nint32 x\nint32 new\n"),
+        ("int8 x\ntime data\n", "int32 sec\nuint32 nanosec\nint8 x\n"),
+        ("int32 sec\nuint32 nanosec\nint8 x\n", "int8 x\nbuiltin_interfaces/Time stamp\n"),
+        ("int8 n\ngeometry_msgs/Point at\n", "float64 x\nfloat64 y\nfloat64 z\nint8 n\n"),
+    ],
+)
+def test_what_a_refusal_proposes_works(world, ros1, ros2):
+    with pytest.raises(TypeDiffersError, match=r"fields: \{") as refused:
+        world({"a_msgs/M": ros1}, {"a_msgs/M": ros2}).message("a_msgs/M")
+    rules = TypeRules(rules=[TypeRule("a_msgs/M", "a_msgs/M", hint_of(refused.value))])
+    assert world({"a_msgs/M": ros1}, {"a_msgs/M": ros2}, rules).message("a_msgs/M").notes == ()
