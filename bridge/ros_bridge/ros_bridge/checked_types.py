@@ -2,7 +2,7 @@
 
 A node in ROS 1 may have another version of a type than the files here. It is asked for its definition where the type is not known, and
 when a connection to it was refused: asking takes a connection, which a publisher takes for a subscriber. So clients of actions, who wait
-for one, are asked only then.
+for one, are asked only then. A subscriber is never asked: it says its definition when it connects.
 """
 
 from __future__ import annotations
@@ -21,6 +21,7 @@ from ros_bridge.ros2_types import interface_class
 
 if TYPE_CHECKING:
     from ros_bridge.conversion import Types
+    from ros_bridge.graph import Ros1Graph
 
 Headers = Callable[[str], Iterable[Mapping[str, str]]]
 SUM = re.compile(r"[0-9a-f]{32}")
@@ -45,12 +46,13 @@ class CheckedPair:
 
 @dataclass(frozen=True)
 class _Answer:
-    """What the publishers of a topic have said about their type."""
+    """What the publishers of a topic have said about their type, or where there are none, a subscriber (``teacher``)."""
 
     publishers: frozenset[str]
     asked_s: float
     md5sum: str = ""
     problem: str = ""
+    teacher: str = ""
 
 
 NOTHING = _Answer(frozenset(), 0.0)
@@ -71,15 +73,25 @@ class CheckedTypes:
         self._answers: dict[str, _Answer] = {}
         self._publishers: Mapping[str, frozenset[str]] = {}
         self._refused: set[str] = set()
+        self._heard: dict[str, Mapping[str, str]] = {}
 
-    def look_at(self, publishers: Mapping[str, frozenset[str]]) -> None:
-        """Take ROS 1's publishers by topic: what others have said does not count any more."""
-        self._publishers = publishers
-        self._answers = {topic: answer for topic, answer in self._answers.items() if publishers.get(topic) == answer.publishers}
+    def look_at(self, graph: Ros1Graph) -> None:
+        """Take ROS 1's graph: what nodes have said that are gone does not count any more."""
+        self._publishers = graph.publishers
+        self._answers = {
+            topic: answer
+            for topic, answer in self._answers.items()
+            if graph.publishers.get(topic, frozenset()) == answer.publishers and (answer.publishers or topic in graph.subscribers)
+        }
 
     def doubt(self, topic: str) -> None:
         """Note that a publisher in ROS 1 was refused because of its type: it is asked at the next look. From any thread."""
         self._refused.add(topic)
+
+    def hear(self, header: Mapping[str, str]) -> None:
+        """Take the connection header of a subscriber in ROS 1 that was turned away because of its type. From any thread."""
+        self._heard[header.get("topic", "")] = header
+        self.doubt(header.get("topic", ""))
 
     def pair(self, ros1_type: str | None, ros2_type: str | None, topic: str) -> CheckedPair:
         """Complete a pair of which one may be unknown, and check that its messages can cross; raises BridgeError."""
@@ -147,7 +159,7 @@ class CheckedTypes:
         return one, two
 
     def _ask(self, topic: str, header_type: str, known_by: str = "") -> _Answer:
-        """Return what the publishers of a topic say about their type, asked where it is not known or one of them was refused.
+        """Return what the nodes of a topic say about their type; publishers are asked where it is not known or a connection was refused.
 
         ``known_by`` is the type that has to be known, where it is not the header's own.
         """
@@ -157,7 +169,7 @@ class CheckedTypes:
         refused = topic in self._refused
         self._refused.discard(topic)
         if kept is None:
-            wanted = bool(publishers) and (refused or not self._types.knows_ros1(known_by or header_type))
+            wanted = refused or (bool(publishers) and not self._types.knows_ros1(known_by or header_type))
         else:
             wanted = refused or (bool(kept.problem) and now_s - kept.asked_s > ASK_AGAIN_S)
         if wanted:
@@ -166,8 +178,9 @@ class CheckedTypes:
         return self._answers.get(topic, NOTHING)
 
     def _read_headers(self, topic: str, header_type: str, kept: _Answer | None, empty: _Answer) -> _Answer:
-        sums, problem = [], ""
-        for header in self._headers(topic):
+        sums, problem, teacher = [], "", ""
+        heard = self._heard.pop(topic, None)
+        for header in [*self._headers(topic), *([heard] if heard is not None else [])]:
             if header.get("type") != header_type or SUM.fullmatch(header.get("md5sum", "")) is None:
                 continue
             sums.append(header["md5sum"])
@@ -175,9 +188,11 @@ class CheckedTypes:
                 self._types.learn(header_type, header.get("message_definition", ""), header["md5sum"])
             except BridgeError as error:
                 problem = str(error)
-        if kept is not None and kept.md5sum in sums:  # it is another publisher that was refused
-            return kept
-        return _Answer(empty.publishers, empty.asked_s, sums[0] if sums else "", problem or ("" if sums else "it says none"))
+        if heard is not None and len(sums) == 1:
+            teacher = heard.get("callerid", "")
+        if kept is not None and (kept.md5sum in sums or (teacher and kept.md5sum and not kept.problem and teacher != kept.teacher)):
+            return kept  # it is another node that was refused, and those that the route has suit each other
+        return _Answer(empty.publishers, empty.asked_s, sums[0] if sums else "", problem or ("" if sums else "it says none"), teacher)
 
     def _check(self, kind: str, ros1_type: str, ros2_type: str, md5sum: str, check: Callable[[], CheckedPair]) -> CheckedPair:
         key = (kind, ros1_type, ros2_type, md5sum)

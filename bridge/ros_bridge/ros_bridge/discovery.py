@@ -17,6 +17,7 @@ from ros_bridge import tcpros
 from ros_bridge.checked_types import CheckedTypes
 from ros_bridge.config import Direction, Spec, TopicRoute
 from ros_bridge.decisions import Decision, Refused, RouteDecision, decide
+from ros_bridge.errors import WireError
 from ros_bridge.graph import Graphs
 from ros_bridge.graph_events import GraphEvents
 from ros_bridge.hung_nodes import HungNodes
@@ -62,7 +63,7 @@ class GraphReader:
 
     def graphs(self) -> Graphs:
         """Return ROS 1's graph as it was last read, and ROS 2's of now."""
-        self.types.look_at(self._ros1.graph.publishers)
+        self.types.look_at(self._ros1.graph)
         return Graphs(self._ros1.graph, read_ros2_graph(self._node))
 
     def _selects(self, ros1_name: str) -> bool:
@@ -127,6 +128,15 @@ class Discovery:
         """Look again at a topic whose publisher in ROS 1 was refused because of its type. From any thread."""
         if not self._stop.is_set():
             self._reader.types.doubt(topic)
+            self._events.wake()
+
+    def hear(self, header: bytes) -> None:
+        """Look again at a topic, a subscriber of which in ROS 1 was turned away because of its type. From any thread."""
+        try:
+            self._reader.types.hear(tcpros.decode_header(header))
+        except WireError:
+            return
+        if not self._stop.is_set():
             self._events.wake()
 
     def _run(self) -> None:

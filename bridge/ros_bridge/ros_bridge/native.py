@@ -9,7 +9,7 @@ from __future__ import annotations
 import ctypes
 import os
 from collections.abc import Sequence
-from ctypes import POINTER, Structure, c_char, c_char_p, c_int32, c_int64, c_uint8, c_uint16, c_uint32, c_uint64, c_void_p
+from ctypes import POINTER, Structure, c_char_p, c_int32, c_int64, c_uint8, c_uint16, c_uint32, c_uint64, c_void_p
 from enum import IntEnum
 from pathlib import Path
 from typing import Any, ClassVar
@@ -37,6 +37,7 @@ class EventKind(IntEnum):
     UNSUBSCRIBED = 11
     UNHEARD = 12
     HEARD = 13
+    OTHER_VERSION = 14
 
 
 class Specification(Structure):
@@ -116,9 +117,9 @@ class PythonMessage(Structure):
 
 
 class Event(Structure):
-    """An event, as ``PlaneEvent``."""
+    """An event, as ``PlaneEvent``; its text may have zeros in it, and be cut off at its end."""
 
-    _fields_: ClassVar = [("kind", c_int32), ("token", c_uint64), ("text", c_char * 512)]
+    _fields_: ClassVar = [("kind", c_int32), ("token", c_uint64), ("text", c_uint8 * (1 << 16)), ("size", c_int32)]
 
 
 KEEPING_THE_LOCK = {

@@ -211,7 +211,7 @@ class Pairing:
         if converters is None:
             raise TypeDiffersError(
                 f"message type {_both(ros1_type, ros2_type)} differs: field '{path1}' is {shape(kind1)} in ROS 1, "
-                f"'{path2}' is {shape(kind2)} in ROS 2",
+                f"'{path2}' is {shape(kind2)} in ROS 2{_rule_hint(kind1, kind2)}",
             )
         return Leaf(found1, found2, *converters)
 
@@ -252,6 +252,15 @@ class Pairing:
             lambda value: codec2.read(name2, codec1.write(name1, value)),
             lambda value: codec1.read(name1, codec2.write(name2, value)),
         )
+
+
+def _rule_hint(kind1: FieldDesc, kind2: FieldDesc) -> str:
+    """Return what to write into a mapping if two messages are one under two names."""
+    one, two = message_in(kind1), message_in(kind2)
+    if one is None or two is None or one == two:
+        return ""
+    rule = f"{{ros1: {plain_name(one)}, ros2: {plain_name(two)}}}"
+    return f"; if these are one type, say so in the configuration's 'types' ({rule})"
 
 
 def _both(ros1_type: str, ros2_type: str) -> str:

@@ -132,10 +132,13 @@ class Plane:
         while not self._closed.is_set():
             missing = self.links.try_again() | self.subscribers.try_again()
             if self.native.next_event(self.context, RETRY_MS if missing else LISTEN_MS, ctypes.byref(event)):
-                self._hear(EventKind(event.kind), event.token, event.text.decode(errors="replace"))
+                self._hear(EventKind(event.kind), event.token, ctypes.string_at(event.text, event.size))
 
-    def _hear(self, kind: EventKind, token: int, text: str) -> None:
-        if kind is EventKind.BAD_PEER and text not in self._told:
+    def _hear(self, kind: EventKind, token: int, content: bytes) -> None:
+        text = content.decode(errors="replace")
+        if kind is EventKind.OTHER_VERSION:
+            self.links.on_header(content)
+        elif kind is EventKind.BAD_PEER and text not in self._told:
             self._told.append(text)
             logger.warning("a ROS 1 peer was turned away: %s", text)
         elif kind is EventKind.BAD_MESSAGE:

@@ -109,8 +109,18 @@ def bytes_class(kind, md5sum, definition):
 
 def advertise_own(topic, type, definition):  # noqa: A002
     """Advertise a type of which only this node has the definition."""
-    md5sum = md5(definition.encode()).hexdigest()  # noqa: S324 - ROS 1's fingerprint
+    md5sum = md5(definition.strip().encode()).hexdigest()  # noqa: S324 - ROS 1's fingerprint
     PUBLISHERS[topic] = rospy.Publisher(topic, bytes_class(type, md5sum, definition), queue_size=1)
+
+
+def subscribe_own(topic, type, definition):  # noqa: A002
+    """Subscribe with a type of which only this node has the definition."""
+    md5sum = md5(definition.strip().encode()).hexdigest()  # noqa: S324 - ROS 1's fingerprint
+
+    def received(message):
+        report(event="message", topic=topic, hex=message._buff.hex())
+
+    KEEP.append(rospy.Subscriber(topic, bytes_class(type, md5sum, definition), received))
 
 
 def publish_bytes(topic, hex):  # noqa: A002
@@ -184,6 +194,7 @@ COMMANDS = {
     "publish_once": publish_once,
     "set_parameter": set_parameter,
     "advertise_own": advertise_own,
+    "subscribe_own": subscribe_own,
     "publish_bytes": publish_bytes,
     "advertise_bag": advertise_bag,
     "play": play,

@@ -97,3 +97,17 @@ def test_a_driver_that_comes_back_with_another_version_is_bridged(master, bridge
         assert (received[-1].x, received[-1].y, received[-1].theta) == (1.0, 2.0, 3.0)
         driver.close()
         received.clear()
+
+
+def test_a_subscriber_of_another_version_gets_messages_of_its_own(master, bridge, ros2_node):
+    subscriber = Ros1Peer(master)
+    definition, content = VERSIONS[1]
+    subscriber.do("subscribe_own", topic="/fo/down", type=TYPE, definition=definition)
+    publisher = ros2_node.publisher("/fo/down", Pose)
+
+    def arrives():
+        publisher.publish(Pose(x=1.0, y=2.0, theta=3.0))
+        return any(content.hex() in line for line in subscriber.lines)
+
+    ros2_node.until(arrives, "it crosses")
+    subscriber.close()

@@ -34,7 +34,7 @@ def install(monkeypatch, *names):
 def decided(types, ros1, ros2=None, headers=(), sums=None):
     """Decide about everything of two graphs; all publishers of ROS 1 answer with the same headers."""
     checked = CheckedTypes(types, lambda _: headers, sums)
-    checked.look_at(ros1.publishers)
+    checked.look_at(ros1)
     return decide(Graphs(ros1, ros2 or Ros2Graph()), Selection(("*",)), checked)
 
 

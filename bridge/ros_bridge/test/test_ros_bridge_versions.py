@@ -13,6 +13,7 @@ from ros_bridge.checked_types import ASK_AGAIN_S, CheckedTypes
 from ros_bridge.conversion import Types
 from ros_bridge.definitions import SHARES_VARIABLE, WORKSPACES_VARIABLE, DefinitionFiles, ros1_shares
 from ros_bridge.errors import TypeDiffersError, TypeUnknownError
+from ros_bridge.graph import Ros1Graph
 from ros_bridge.mapping import TypeRule, TypeRules
 from ros_bridge.ros1_definition import md5
 
@@ -101,7 +102,7 @@ class Node:
 
 def checked(types, node):
     found = CheckedTypes(types, node)
-    found.look_at({"/m": NODE})
+    found.look_at(Ros1Graph({"/m": NODE}))
     return found
 
 
@@ -125,8 +126,8 @@ def test_a_driver_with_a_new_version_is_bridged_as_soon_as_it_is_refused(tmp_pat
             pair = types.pair("own_msgs/M", None, "/m")
             assert (pair.md5sum, pair.notes) == (md5(text), notes)
     assert node.asked == 3
-    types.look_at({})  # it goes, and what it has said goes with it
-    types.look_at({"/m": NODE})
+    types.look_at(Ros1Graph())  # it goes, and what it has said goes with it
+    types.look_at(Ros1Graph({"/m": NODE}))
     assert types.pair("own_msgs/M", None, "/m").md5sum == ""
 
 
@@ -145,12 +146,12 @@ def test_a_type_that_only_its_publisher_knows_is_asked_for_once_and_when_another
             types.pair("own_msgs/M", None, "/m")
     assert node.asked == 1
     node.headers = (said("int8 a b c"),)
-    types.look_at({"/m": frozenset({"/another"})})
+    types.look_at(Ros1Graph({"/m": frozenset({"/another"})}))
     with pytest.raises(TypeUnknownError, match=r"its publisher's definition of own_msgs/M: .* can't be a ROS 1 field"):
         types.pair("own_msgs/M", None, "/m")
     assert node.asked == 2
     node.headers = (said("int32 a\nint64 y"),)
-    types.look_at({"/m": NODE})
+    types.look_at(Ros1Graph({"/m": NODE}))
     assert types.pair("own_msgs/M", None, "/m").md5sum == md5("int32 a\nint64 y")
 
 
@@ -175,6 +176,7 @@ def test_a_refused_type_is_asked_for_again_after_a_while(tmp_path, monkeypatch):
 FOLLOW1 = "own_msgs/Point[] path\nfloat64 tolerance\n---\nint32 error_code\n---\nHeader header\n"
 FOLLOW2 = "Point[] path\nPoint[] more\nfloat64 tolerance\n---\nint32 error_code\nstring error_string\n---\nstd_msgs/Header header\n"
 HEADER_SUM, STATUS_SUM = "2176decaecbce78abc3b96ef049fabed", "d388f9b87b3c471f784434d671988d4a"
+GOAL_ID_SUM = "302881f31927c1df708a2dbab0e80ee8"
 RESULT_SUM = md5(f"{HEADER_SUM} header\n{STATUS_SUM} status\n{md5('int32 error_code')} result")
 POINT = {"own_msgs/Point": "float64 x\n"}
 
@@ -205,7 +207,7 @@ def test_an_action_whose_server_says_its_parts_is_paired_by_them(tmp_path):
         return [{"type": name, "md5sum": RESULT_SUM, "message_definition": text}]
 
     known = CheckedTypes(types, headers)
-    known.look_at({f"/follow/{part}": NODE for part in ("status", "feedback", "result", "goal")})
+    known.look_at(Ros1Graph({f"/follow/{part}": NODE for part in ("status", "feedback", "result", "goal")}))
     before = known.action(None, "own_msgs/Follow", "/other")
     pair = known.action("own_msgs/Follow", None, "/follow")
     assert "only ROS 2 has field 'error_string'" in pair.notes
@@ -223,3 +225,41 @@ def test_types_of_other_names_need_a_rule(tmp_path):
     ruled = checked(types_of(tmp_path, {}, {}, TypeRules(rules=[TypeRule("geometry_msgs/Point", "geometry_msgs/Vector3")])), Node())
     assert ruled.pair("geometry_msgs/Point", "geometry_msgs/Vector3", "/m").ros2_type == "geometry_msgs/Vector3"
     assert types.pair("tf/tfMessage", "tf2_msgs/TFMessage", "/m").ros1_type == "tf/tfMessage"
+
+
+def test_a_subscriber_says_its_version_when_it_is_turned_away(tmp_path):
+    node = Node()
+    types = CheckedTypes(types_of(tmp_path, {}, {"own_msgs/M": OLD}), node)
+    subscribed = Ros1Graph({}, {"/m": frozenset({"/one", "/two"})})
+
+    def look():
+        types.look_at(subscribed)
+        return types.pair(None, "own_msgs/M", "/m").md5sum
+
+    assert look() == ""
+    types.hear({**said(NEW), "topic": "/m", "callerid": "/one"})
+    assert [look(), look()] == [md5(NEW)] * 2
+    types.hear({**said("int32 b"), "topic": "/m", "callerid": "/two"})
+    assert look() == md5(NEW)  # the route has a subscriber that it suits
+    types.hear({**said("int32 b"), "topic": "/m", "callerid": "/one"})
+    assert look() == md5("int32 b")  # it has come back with another version
+    types.look_at(Ros1Graph())
+    assert look() == ""
+    types.hear({**said("", md5sum=md5(OLD)), "topic": "/m", "callerid": "/two"})  # roscpp says the sum alone
+    assert look() == md5(OLD)
+
+
+def test_the_server_of_an_action_says_its_goal_when_it_is_turned_away(tmp_path):
+    types = CheckedTypes(types_of(tmp_path, {}, {"own_msgs/action/Follow": FOLLOW2, **POINT}), Node())
+    graph = Ros1Graph({}, {"/follow/goal": NODE})
+    types.look_at(graph)
+    before = types.action("own_msgs/Follow", None, "/follow")
+    goal = "float64 tolerance\n"
+    text = f"Header header\nactionlib_msgs/GoalID goal_id\nFollowGoal goal{SEPARATOR}MSG: own_msgs/FollowGoal\n{goal}"
+    md5sum = md5(f"{HEADER_SUM} header\n{GOAL_ID_SUM} goal_id\n{md5(goal.strip())} goal")
+    types.hear({**said(text, "own_msgs/FollowActionGoal", md5sum), "topic": "/follow/goal", "callerid": "/server"})
+    types.look_at(graph)
+    after = types.action("own_msgs/Follow", None, "/follow")
+    assert before.notes == ()
+    assert after.notes == ("only ROS 2 has field 'path'", "only ROS 2 has field 'more'")
+    assert after.md5sum != before.md5sum

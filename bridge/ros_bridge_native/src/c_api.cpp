@@ -2,6 +2,7 @@
 // plane_error, for the thread that asked.
 #include "c_api.hpp"
 
+#include <algorithm>
 #include <cstring>
 #include <stdexcept>
 
@@ -62,7 +63,8 @@ struct PlanePythonMessage {
 struct PlaneEvent {
   int32_t kind;
   uint64_t token;
-  char text[512];
+  char text[plane::kMostEventBytes];
+  int32_t size;
 };
 
 namespace {
@@ -99,8 +101,8 @@ PLANE_API int32_t plane_next_event(void * context, int32_t timeout_ms, PlaneEven
   if (!static_cast<Context *>(context)->events.next(timeout_ms, event)) return 0;
   out->kind = static_cast<int32_t>(event.kind);
   out->token = event.token;
-  std::strncpy(out->text, event.text.c_str(), sizeof out->text - 1);
-  out->text[sizeof out->text - 1] = 0;
+  out->size = static_cast<int32_t>(std::min(event.text.size(), sizeof out->text));
+  std::memcpy(out->text, event.text.data(), out->size);
   return 1;
 }
 

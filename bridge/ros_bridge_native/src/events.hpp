@@ -24,7 +24,10 @@ enum class EventKind : int32_t {
   kUnsubscribed = 11,  // it is not any more; behind these the text has our address, the peer's and its port
   kUnheard = 12,       // a subscriber has not been heard for three seconds
   kHeard = 13,         // it is heard again
+  kOtherVersion = 14,  // a subscriber was turned away because of its type; the text is its connection header without the length
 };
+
+constexpr size_t kMostEventBytes = 1 << 16;
 
 struct Event {
   EventKind kind;
@@ -51,7 +54,9 @@ class Events {
   }
 
  private:
-  static bool dispensable(EventKind kind) { return kind >= EventKind::kBadMessage && kind <= EventKind::kCallFailed; }
+  static bool dispensable(EventKind kind) {
+    return (kind >= EventKind::kBadMessage && kind <= EventKind::kCallFailed) || kind == EventKind::kOtherVersion;
+  }
 
   static constexpr size_t kMostWaiting = 1000;
   std::mutex mutex_;

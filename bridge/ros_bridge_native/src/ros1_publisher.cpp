@@ -117,7 +117,10 @@ class OutConnection : public Handler, public std::enable_shared_from_this<OutCon
     const auto publishers = server_->find(fields["topic"]);
     if (publishers.empty()) return turn_away("topic [" + fields["topic"] + "] is not published here");
     const std::string reason = mismatch(fields, publishers.front()->identity);
-    if (!reason.empty()) return turn_away(fields["callerid"] + " on " + fields["topic"] + ": " + reason);
+    if (!reason.empty()) {
+      server_->events.put(EventKind::kOtherVersion, 0, header_.substr(sizeof length, kMostEventBytes));
+      return turn_away(fields["callerid"] + " on " + fields["topic"] + ": " + reason);
+    }
     replace_missed(publishers.front(), fields["callerid"]);
     accept(publishers);
     if (!is_name(fields["callerid"])) return;  // nobody can be asked to connect again
