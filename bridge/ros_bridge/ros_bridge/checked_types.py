@@ -88,6 +88,11 @@ class CheckedTypes:
         """Note that a publisher in ROS 1 was refused because of its type: it is asked at the next look. From any thread."""
         self._refused.add(topic)
 
+    def has_version_of(self, header: Mapping[str, str]) -> bool:
+        """Tell whether the topic of a subscriber's header crosses with the definition that the subscriber has."""
+        answer = self._answers.get(header.get("topic", ""), NOTHING)
+        return answer.md5sum == header.get("md5sum")
+
     def hear(self, header: Mapping[str, str]) -> None:
         """Take the connection header of a subscriber in ROS 1 that was turned away because of its type. From any thread."""
         self._heard[header.get("topic", "")] = header

@@ -166,7 +166,7 @@ class Types:
     def learn(self, ros1_name: str, full_text: str, md5sum: str) -> None:
         """Take the definition that a ROS 1 peer sent in its connection's header (``message_definition``), with all its parts and its sum.
 
-        Whoever asks for a type without saying a sum gets the definition that was learned last. Raises TypeUnknownError.
+        Whoever asks for a type of its package without saying a sum gets the definition that was learned last. Raises TypeUnknownError.
         """
         with self._lock:
             header = HeaderTexts(ros1_name, full_text)
@@ -174,7 +174,10 @@ class Types:
             if (own_sum := ros1.md5(ros1_name)) != md5sum:
                 raise TypeUnknownError(f"the text that comes with {ros1_name} has MD5 sum {own_sum}, and its node says {md5sum}")
             ros1 = self._told.setdefault((ros1_name, md5sum), ros1)
+            package = ros1_name.partition("/")[0]
             for name in header.names:
+                if name.partition("/")[0] != package:
+                    continue
                 try:
                     self._told.setdefault((name, ros1.md5(name)), ros1)
                 except TypeUnknownError:

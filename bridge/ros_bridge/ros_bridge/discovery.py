@@ -10,14 +10,14 @@ from __future__ import annotations
 import logging
 import threading
 import time
-from collections.abc import Iterable, Iterator
+from collections import deque
+from collections.abc import Callable, Iterable, Iterator
 from typing import TYPE_CHECKING, cast
 
 from ros_bridge import tcpros
 from ros_bridge.checked_types import CheckedTypes
 from ros_bridge.config import Direction, Spec, TopicRoute
 from ros_bridge.decisions import Decision, Refused, RouteDecision, decide
-from ros_bridge.errors import WireError
 from ros_bridge.graph import Graphs
 from ros_bridge.graph_events import GraphEvents
 from ros_bridge.hung_nodes import HungNodes
@@ -41,6 +41,7 @@ LOOK_EVERY_S = 0.02  # while a route waits for its target's subscribers
 IDLE_S = 0.2  # routes that are not wanted any more end after a while
 CONNECT_WITHIN_S = 1.0
 AGAIN_AFTER_S = 0.5
+CALL_BACK_EVERY_S = 2.0
 
 
 class GraphReader:
@@ -111,6 +112,10 @@ class Discovery:
         self._configured = tuple(configured)
         self._events = GraphEvents(node)
         self._keep_alive = KeepAlive()
+        self.connect_again: Callable[[str, str], None] = lambda *_: None  # asks a subscriber (topic, node) to
+        self._turned_away: deque[dict[str, str]] = deque()  # connection headers of subscribers
+        self._to_call_back: set[tuple[str, str]] = set()
+        self._called_back_s: dict[tuple[str, str], float] = {}
         self._made_s: dict[Spec, float] = {}
         self._said: set[str] = set()
         self._losses = 0
@@ -130,13 +135,11 @@ class Discovery:
             self._reader.types.doubt(topic)
             self._events.wake()
 
-    def hear(self, header: bytes) -> None:
+    def hear(self, header: dict[str, str]) -> None:
         """Look again at a topic, a subscriber of which in ROS 1 was turned away because of its type. From any thread."""
-        try:
-            self._reader.types.hear(tcpros.decode_header(header))
-        except WireError:
-            return
         if not self._stop.is_set():
+            self._reader.types.hear(header)
+            self._turned_away.append(header)
             self._events.wake()
 
     def _run(self) -> None:
@@ -150,12 +153,25 @@ class Discovery:
     def _follow(self) -> None:
         changed = True
         while not self._stop.is_set():
-            changed = self._read_ros1() or changed
+            turned_away = [self._turned_away.popleft() for _ in range(len(self._turned_away))]
+            changed = self._read_ros1() or bool(turned_away) or changed
             if changed:
                 self.decisions = decide(self._reader.graphs(), self._selection, self._reader.types, self._configured)
                 self._report()
             waiting = self._apply(time.monotonic())
+            self._call_back(turned_away, time.monotonic())
             changed = self._events.wait(LOOK_EVERY_S if waiting else IDLE_S)
+
+    def _call_back(self, turned_away: Iterable[dict[str, str]], now_s: float) -> None:
+        """Have subscribers connect again whose version their topics have now; not often, as they may be turned away again."""
+        for fields in turned_away:
+            if self._reader.types.has_version_of(fields):
+                self._to_call_back.add((fields.get("topic", ""), fields.get("callerid", "")))
+        self._called_back_s = {key: at_s for key, at_s in self._called_back_s.items() if now_s - at_s < CALL_BACK_EVERY_S}
+        for key in self._to_call_back - self._called_back_s.keys():
+            self._to_call_back.discard(key)
+            self._called_back_s[key] = now_s
+            self.connect_again(*key)
 
     def _read_ros1(self) -> bool:
         """Read ROS 1's graph. A restarted master knows less than before: routes that still have connections go on."""

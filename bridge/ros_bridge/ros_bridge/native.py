@@ -38,6 +38,7 @@ class EventKind(IntEnum):
     UNHEARD = 12
     HEARD = 13
     OTHER_VERSION = 14
+    NOT_PUBLISHED = 15
 
 
 class Specification(Structure):

@@ -64,7 +64,9 @@ class Bridge:
             reader = GraphReader(self._node, types, master, name, config.selection)
             self._parameters = ParameterMirror(self._plane.node, master) if config.selection.parameters else None
             self._discovery = Discovery(reader, self._node, self._monitor, config.selection, self.table, config.routes)
-            self._plane.links.on_refused, self._plane.links.on_header = self._discovery.doubt, self._discovery.hear
+            self._plane.links.on_refused = self._discovery.doubt
+            self._plane.subscribers.on_turned_away = self._discovery.hear
+            self._discovery.connect_again = self._plane.subscribers.connect_again
         self._heartbeat = Heartbeat(context, self._state)
         self._executor = SingleThreadedExecutor()
         self._executor.add_node(self._node)
@@ -142,7 +144,7 @@ class Bridge:
         self._monitor.close()
         if self._discovery is not None:
             self._plane.links.on_refused = lambda _: None
-            self._plane.links.on_header = lambda _: None
+            self._plane.subscribers.on_turned_away = lambda _: None
             self._discovery.close()
         if self._parameters is not None:
             self._parameters.close()

@@ -136,8 +136,8 @@ class Plane:
 
     def _hear(self, kind: EventKind, token: int, content: bytes) -> None:
         text = content.decode(errors="replace")
-        if kind is EventKind.OTHER_VERSION:
-            self.links.on_header(content)
+        if kind in {EventKind.OTHER_VERSION, EventKind.NOT_PUBLISHED}:
+            self.subscribers.on_header(kind, content)
         elif kind is EventKind.BAD_PEER and text not in self._told:
             self._told.append(text)
             logger.warning("a ROS 1 peer was turned away: %s", text)

@@ -64,7 +64,6 @@ class PublisherLinks:
         self._links: dict[int, _Link] = {}  # those of subscriptions, and those that are about to be replaced
         self._asked: set[str] = set()  # nodes
         self.on_refused: Callable[[str], None] = lambda _: None  # the topic: its publisher has another type, or another version of it
-        self.on_header: Callable[[bytes], None] = lambda _: None  # of a subscriber that has another type, or another version of it
         self._closed = False
         self._askers = ThreadPoolExecutor(ASKING_THREADS, thread_name_prefix="plane_ask")
 

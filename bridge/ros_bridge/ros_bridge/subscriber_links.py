@@ -21,12 +21,15 @@ import socket
 import threading
 import time
 from collections import Counter
+from collections.abc import Callable
 from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass, field
 from typing import TYPE_CHECKING
 
+from ros_bridge.errors import WireError
 from ros_bridge.master import Connection, RefusedError, call_node
 from ros_bridge.native import EventKind, Native
+from ros_bridge.tcpros import decode_header
 
 if TYPE_CHECKING:
     from ros_bridge.ros1_node import Ros1Node
@@ -80,6 +83,7 @@ class SubscriberLinks:
         self._lock = threading.Lock()
         self._connections: Counter[tuple[str, str]] = Counter()  # by topic and node; a node may have several for a moment
         self._lost: dict[str, _Lost] = {}  # by node
+        self.on_turned_away: Callable[[dict[str, str]], None] = lambda _: None  # its header: it has another type, or version of it
         self._closed = False
         self._askers = ThreadPoolExecutor(ASKING_THREADS, thread_name_prefix="plane_call")
 
@@ -104,6 +108,34 @@ class SubscriberLinks:
             if not lost.unheard:
                 lost.reached_s = None
             self._forget_if_well(name, lost)
+
+    def on_header(self, kind: EventKind, content: bytes) -> None:
+        """Take the connection header of a subscriber that was turned away."""
+        try:
+            header = decode_header(content)
+        except WireError:
+            return
+        topic, name = header.get("topic", ""), header.get("callerid", "")
+        if kind is EventKind.NOT_PUBLISHED:  # perhaps for a moment, while the topic's route is made again
+            self.connect_again(topic, name, after_s=FIRST_TRY_S)
+            return
+        with self._lock:
+            lost = self._lost.get(name)
+            if lost is not None:
+                lost.topics.discard(topic)
+                self._forget_if_well(name, lost)
+        self.on_turned_away(header)
+
+    def connect_again(self, topic: str, name: str, *, after_s: float = 0.0) -> None:
+        """Have a subscriber that was turned away connect again.
+
+        rospy keeps the connection that was refused, and makes no second one to the same URI: it is told another form of it.
+        """
+        with self._lock:
+            self._forms[topic, name] += 1
+            lost = self._lost.setdefault(name, _Lost())
+            lost.topics.add(topic)
+            lost.next_try_s, lost.tries = time.monotonic() + after_s, 0
 
     def _lose(self, lost: _Lost, topic: str, name: str, ends: list[str]) -> None:
         del self._connections[topic, name]
@@ -136,7 +168,7 @@ class SubscriberLinks:
                     self._forget(name, lost, topic)
                 elif topic in self._topics(lost.topics):
                     self._end_half_open(lost.ends.get(topic))
-                    self._tell_publishers(topic, self._uri_of(name), self.node.uri)
+                    self._tell_publishers(topic, self._uri_of(name), self.node.uri + "/" * self._forms[topic, name])
             if self._topics(lost.unheard):
                 self._look_after_unheard(name, lost)
             reached = True

@@ -5,8 +5,9 @@ import threading
 
 import actionlib
 import rospy
-from actionlib_msgs.msg import GoalID
+from actionlib_msgs.msg import GoalID, GoalStatus
 from bridge_test_interfaces.msg import CountAction, CountFeedback, CountGoal, CountResult
+from genpy.dynamic import generate_dynamic
 from ros_bridge_peer_loop import report, run
 
 KEEP = []
@@ -80,6 +81,39 @@ def serve_simple(name):
     report(event="serving", name=name)
 
 
+OLD_PARTS = {"Goal": "int32 target", "Result": "string message\nint32[] counted", "Feedback": "int32 count"}
+COMMON = {"std_msgs/Header": "uint32 seq\ntime stamp\nstring frame_id"}
+COMMON |= {kind._type: kind._full_text.split("=" * 80)[0] for kind in (GoalID, GoalStatus)}
+
+
+def old_action():
+    """Return the class of an older version of the action, in which parts have fewer fields or another order."""
+    package = "bridge_test_interfaces"
+    texts = dict(COMMON)
+    for part, text in OLD_PARTS.items():
+        inner = "GoalID goal_id" if part == "Goal" else "GoalStatus status"
+        texts[f"{package}/Count{part}"] = text
+        texts[f"{package}/CountAction{part}"] = f"Header header\nactionlib_msgs/{inner}\nCount{part} {part.lower()}"
+    whole = "\n".join(f"CountAction{part} action_{part.lower()}" for part in OLD_PARTS)
+    parts = "".join(f"\n{'=' * 80}\nMSG: {name}\n{text}" for name, text in texts.items())
+    return generate_dynamic(f"{package}/CountAction", whole + parts)[f"{package}/CountAction"]
+
+
+def serve_old(name):
+    """Serve an older version of the action."""
+    action = old_action()
+    result_class, feedback_class = type(action().action_result.result), type(action().action_feedback.feedback)
+
+    def on_goal(handle):
+        handle.set_accepted()
+        handle.publish_feedback(feedback_class(handle.get_goal().target))
+        handle.set_succeeded(result_class("from old times", [handle.get_goal().target]))
+
+    KEEP.append(actionlib.ActionServer(name, action, on_goal, auto_start=False))
+    KEEP[-1].start()
+    report(event="serving", name=name)
+
+
 def client(name):
     """Connect to a server."""
     CLIENTS[name] = actionlib.ActionClient(name, CountAction)
@@ -139,6 +173,7 @@ COMMANDS = {
     "leave": leave,
     "serve": serve,
     "serve_simple": serve_simple,
+    "serve_old": serve_old,
     "client": client,
     "goal": goal,
     "cancel": cancel,

@@ -3,7 +3,7 @@
 from xmlrpc.client import ServerProxy
 
 from action_msgs.msg import GoalStatus
-from ros_bridge_action_nodes import Sent, feedback_arrives
+from ros_bridge_action_nodes import Sent, done_soon, feedback_arrives
 from ros_bridge_harness import Ros1Peer
 
 from alula_testing.waits import until
@@ -43,3 +43,21 @@ def test_a_ros2_action_server_is_found_and_its_action_goes_with_it(master, actio
 
 def published(master):
     return {topic for topic, _ in ServerProxy(master.uri).getSystemState("/bridge_test")[2][0]}
+
+
+def test_a_server_of_an_older_version_serves_clients_of_ros2(master, action_ros2):
+    """No file here has its version: the goal's is known from the server's subscriber, the others from its publishers."""
+    server = Ros1Peer(master, "ros_bridge_action_peer.py")
+    server.do("serve_old", name="/da/old")
+    client = action_ros2.client("/da/old")
+
+    def accepted():
+        sent = Sent(client, target=1)  # refused until the bridge has learned the version
+        return done_soon(sent.future) and sent.future.result().accepted
+
+    until(accepted, "a goal is accepted")
+    until(lambda: feedback_arrives(client), "a goal comes back")
+    sent = Sent(client, target=7)
+    answer = sent.result()
+    assert (answer.status, list(answer.result.counted), answer.result.message) == (GoalStatus.STATUS_SUCCEEDED, [7], "from old times")
+    assert [(feedback.count, feedback.fraction) for feedback in sent.feedback] == [(7, 0.0)]

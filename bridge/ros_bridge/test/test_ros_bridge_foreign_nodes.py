@@ -101,7 +101,7 @@ def test_a_driver_that_comes_back_with_another_version_is_bridged(master, bridge
 
 def test_a_subscriber_of_another_version_gets_messages_of_its_own(master, bridge, ros2_node):
     subscriber = Ros1Peer(master)
-    definition, content = VERSIONS[1]
+    definition, content = "float32 y\nfloat32 theta", struct.pack("<2f", 2, 3)  # no other node here has said it
     subscriber.do("subscribe_own", topic="/fo/down", type=TYPE, definition=definition)
     publisher = ros2_node.publisher("/fo/down", Pose)
 

@@ -25,6 +25,7 @@ enum class EventKind : int32_t {
   kUnheard = 12,       // a subscriber has not been heard for three seconds
   kHeard = 13,         // it is heard again
   kOtherVersion = 14,  // a subscriber was turned away because of its type; the text is its connection header without the length
+  kNotPublished = 15,  // one was turned away because its topic is not published, or not at the moment; the same text
 };
 
 constexpr size_t kMostEventBytes = 1 << 16;
@@ -55,7 +56,7 @@ class Events {
 
  private:
   static bool dispensable(EventKind kind) {
-    return (kind >= EventKind::kBadMessage && kind <= EventKind::kCallFailed) || kind == EventKind::kOtherVersion;
+    return (kind >= EventKind::kBadMessage && kind <= EventKind::kCallFailed) || kind >= EventKind::kOtherVersion;
   }
 
   static constexpr size_t kMostWaiting = 1000;

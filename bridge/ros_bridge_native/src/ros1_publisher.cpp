@@ -115,7 +115,10 @@ class OutConnection : public Handler, public std::enable_shared_from_this<OutCon
     }
     if (fields.count("service")) return hand_over(fields, sizeof length + length);
     const auto publishers = server_->find(fields["topic"]);
-    if (publishers.empty()) return turn_away("topic [" + fields["topic"] + "] is not published here");
+    if (publishers.empty()) {
+      server_->events.put(EventKind::kNotPublished, 0, header_.substr(sizeof length, kMostEventBytes));
+      return turn_away("topic [" + fields["topic"] + "] is not published here");
+    }
     const std::string reason = mismatch(fields, publishers.front()->identity);
     if (!reason.empty()) {
       server_->events.put(EventKind::kOtherVersion, 0, header_.substr(sizeof length, kMostEventBytes));
