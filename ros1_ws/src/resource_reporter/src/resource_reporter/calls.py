@@ -28,7 +28,7 @@ def plain(value: Any) -> Any:
         return value.to_sec()
     if isinstance(value, float):
         return value if math.isfinite(value) else None
-    return [plain(part) for part in value] if isinstance(value, list | tuple) else value
+    return [plain(part) for part in value] if isinstance(value, (list, tuple)) else value
 
 
 def tell_call(service: str, request: Any, response: Any, begin_s: float, error: str = "") -> None:
@@ -56,7 +56,7 @@ class ToldService:
         return response
 
 
-@functools.cache
+@functools.lru_cache(maxsize=None)
 def publisher() -> rospy.Publisher:
     """Return the process's own; to be made before its first call: subscribers need a moment to connect."""
     return rospy.Publisher(TOPIC, String, queue_size=DEPTH)
