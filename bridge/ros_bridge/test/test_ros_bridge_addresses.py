@@ -47,9 +47,8 @@ def probes(base, bridge):
         "service in ROS 1": links.in_ros1("/moved/in_ros1"),
         "service in ROS 2": links.in_ros2("/moved/in_ros2"),
     }
-    if RELAY.is_file():
-        base.run(str(RELAY), "/moved/relay_in", "/moved/relay_out")
-        probes["roscpp"] = links.round_trip("/moved/relay_in", "/moved/relay_out")
+    base.run(str(RELAY), "/moved/relay_in", "/moved/relay_out")
+    probes["roscpp"] = links.round_trip("/moved/relay_in", "/moved/relay_out")
     times_until_all_arrive(probes)
     yield probes
     ros2.tidy()
