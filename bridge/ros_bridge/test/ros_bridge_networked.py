@@ -122,6 +122,20 @@ def times_until_all_arrive(probes: dict[str, Probe], within_s: float = HANGS_S) 
     return {name: taken.get(name, within_s) for name in probes}
 
 
+def all_carry_again(disturb: Callable[[], None], probes: dict[str, Probe], within_s: float) -> None:
+    """Fail unless every link carries again within the time after ``disturb`` returns: the best of three counts.
+
+    A busy machine only adds to what a link takes, and not each time. A link that is tried again later and later is late each time.
+    """
+    times: list[dict[str, float]] = []
+    for _ in range(3):
+        disturb()
+        times.append(times_until_all_arrive(probes))
+        if max(times[-1].values()) < within_s:
+            return
+    raise AssertionError(f"not within {within_s} s: {times}")
+
+
 @dataclass
 class Heard:
     """Events of a ROS 1 peer, read once and kept."""
