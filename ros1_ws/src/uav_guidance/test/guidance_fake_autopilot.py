@@ -49,7 +49,11 @@ class FakeVehicle:
         self.transcript: list[tuple[Any, ...]] = []
         self.now_s = start_s
         self.refuse_arming = ""
+        self.says_why = True
         self.refuse_guided = False
+        self.kind = (13, 3)
+        """HEARTBEAT's type and autopilot."""
+        self.system_status = 4
         self.lost_answers: dict[str, int] = {}
         """How many answers to a command get lost from now on, by its name."""
         self.deaf = False
@@ -64,6 +68,7 @@ class FakeVehicle:
         self._takeoff: tuple[float, float] | None = None
         self._climb_to: float | None = None
         self._late_text: tuple[float, str] | None = None
+        self._late_severity = 2
         self._booted_s = 0.0
         self._told_ready = False
         self._checked_s = -math.inf
@@ -77,6 +82,15 @@ class FakeVehicle:
     def pilot(self, mode: int) -> None:
         """The pilot takes another mode."""
         self._change_mode(mode)
+
+    def failsafe(self, mode: int, text: str, *, severity: int = 4, late_s: float = 0.0) -> None:
+        """A failsafe takes another mode and says so, ``late_s`` after it."""
+        self.system_status = 5
+        self._late_text, self._late_severity = (self.now_s + late_s, text), severity
+        self._change_mode(mode)
+
+    def say(self, severity: int, text: str) -> None:
+        self._send(mavlink.MAVLink_statustext_message(severity, text.encode()))
 
     def restart(self, mode: int) -> None:
         """The autopilot's computer restarts in the air: streams, boot time, what it was told, and where it counts from."""
@@ -162,7 +176,7 @@ class FakeVehicle:
         why = self.refuse_arming or ("" if self.ready else "GPS 1: waiting for home")
         if why:
             # As on the real one, the text leaves after the answer.
-            self._late_text = (self.now_s + 0.1, f"Arm: {why}")
+            self._late_text = (self.now_s + 0.1, f"Arm: {why}") if self.says_why else None
             return mavlink.MAV_RESULT_FAILED
         body.armed, self._armed_s = True, self.now_s
         self._send_home()
@@ -231,10 +245,10 @@ class FakeVehicle:
         if self.now_s - self._heartbeat_s >= 1.0:
             self._heartbeat_s = self.now_s
             base_mode = 1 | (128 if self.body.armed else 0)
-            self._send(mavlink.MAVLink_heartbeat_message(13, 3, base_mode, self.body.mode, 4, 3))
+            self._send(mavlink.MAVLink_heartbeat_message(*self.kind, base_mode, self.body.mode, self.system_status, 3))
         if self._late_text is not None and self.now_s >= self._late_text[0]:
-            self._send(mavlink.MAVLink_statustext_message(2, self._late_text[1].encode()))
-            self._late_text = None
+            self.say(self._late_severity, self._late_text[1])
+            self._late_text, self._late_severity = None, 2
         for number, (period_s, last_s) in list(self._intervals.items()):
             if self.now_s - last_s >= period_s - 1e-6:
                 self._intervals[number] = (period_s, self.now_s)

@@ -104,5 +104,5 @@ class PureFlight:
             return
         self._streams.hear(message.get_msgId(), self.now_s)
         if message.get_type() == "STATUSTEXT":
-            self.guidance.on_text(message.severity, message.text if isinstance(message.text, str) else message.text.decode())
+            self.guidance.on_text(message.severity, message.text if isinstance(message.text, str) else message.text.decode(), self.now_s)
         self.guidance.on_message(message, self.now_s)

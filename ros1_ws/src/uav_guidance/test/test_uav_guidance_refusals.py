@@ -58,5 +58,5 @@ def test_take_off_of_a_vehicle_that_is_not_ready_says_why(flight):
     flight.until(lambda r: r.authority)
     flight.vehicle._ready_from_s = math.inf
     flight.until(lambda r: not r.vehicle.ready)
-    flight.guidance.on_text(2, "PreArm: Compass not healthy")
+    flight.guidance.on_text(2, "PreArm: Compass not healthy", flight.now_s)
     assert flight.ask(TakeoffRequest(3.0, 1.0)).reason == "the autopilot is not ready: Compass not healthy"

@@ -58,14 +58,15 @@ class Authority:
         if vehicle.mode not in {Mode.GUIDED, Mode.LAND} or (self._land_seen and vehicle.mode != Mode.LAND):
             self._land_asked = self._land_seen = False
         before = self.held
-        self.held = self.mode_told and (vehicle.mode == Mode.GUIDED or (vehicle.mode == Mode.LAND and self._land_asked))
+        ours = vehicle.mode == Mode.GUIDED or (vehicle.mode == Mode.LAND and self._land_asked)
+        self.held = self.mode_told and not vehicle.foreign and ours
         if self.held == before:
             return AuthorityChange.NONE
         return AuthorityChange.GAINED if self.held else AuthorityChange.LOST
 
     def wants_start(self, vehicle: VehicleSnapshot, now_s: float) -> bool:
         """Return whether to take GUIDED now, once after a start of the node or the autopilot: ready, on the ground, not flown before."""
-        if self._start_settled or not self.mode_told or abs(now_s - self._start_refused_s) < START_AGAIN_S:
+        if self._start_settled or not self.mode_told or vehicle.foreign or abs(now_s - self._start_refused_s) < START_AGAIN_S:
             return False
         if vehicle.armed or self.held or vehicle.off_ground:
             self._start_settled = True

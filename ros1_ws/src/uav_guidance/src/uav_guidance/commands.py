@@ -53,6 +53,8 @@ class Command:
     parameters: tuple[float, float, float, float, float, float, float] = (0.0,) * 7
     confirmation: int = 0
     evidence: Evidence = NO_EVIDENCE
+    known_obstacle: str = ""
+    """Why it may be refused, known before it is sent: the reason where the autopilot refuses without a word."""
 
 
 def set_mode(mode: Mode) -> Command:
@@ -61,9 +63,10 @@ def set_mode(mode: Mode) -> Command:
     return Command(f"mode {mode.name}", DO_SET_MODE, (1.0, float(mode), 0.0, 0.0, 0.0, 0.0, 0.0), evidence=evidence)
 
 
-def arm() -> Command:
-    """Return the command to arm; a HEARTBEAT that says armed is evidence of it."""
-    return Command("arm", ARM_DISARM, (1.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0), evidence=Evidence("HEARTBEAT", lambda vehicle: vehicle.armed))
+def arm(failing_check: str = "") -> Command:
+    """Return the command to arm; a HEARTBEAT that says armed is evidence of it. ``failing_check``: what was told last."""
+    evidence = Evidence("HEARTBEAT", lambda vehicle: vehicle.armed)
+    return Command("arm", ARM_DISARM, (1.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0), evidence=evidence, known_obstacle=failing_check)
 
 
 def disarm() -> Command:
@@ -156,7 +159,7 @@ class Procedure:
             return False
         refused_s, refused_ms, result = self._refusal
         if now_s - refused_s >= TEXT_LIMIT_S or min(now_s - refused_s, self._heard_s(refused_ms)) >= TEXT_GRACE_S:
-            words = "; ".join(self._texts)
+            words = "; ".join(self._texts) or self._commands[0].known_obstacle
             reason = f"{self._commands[0].name} {result}" + (f": {words}" if words else "")
             self.outcome = Outcome(accepted=False, reason=reason)
         return True

@@ -38,6 +38,7 @@ from uav_guidance.requests import (
     require,
 )
 from uav_guidance.settings import GuidanceSettings
+from uav_guidance.takeover import Takeover
 from uav_guidance.vectors import Vec3
 from uav_guidance.vehicle import Landed, Mode, VehicleSnapshot, in_map, leapt, mode_name, updated
 
@@ -79,6 +80,7 @@ class Guidance:
         self._procedure: Procedure | None = None
         self._start_procedure: Procedure | None = None
         self._prearm_text = ""
+        self._takeover = Takeover()
         self._answers: dict[type[Request], Callable[[Any, float], GuidanceDecision]] = {
             TakeoffRequest: self._take_off,
             PositionRequest: self._set_position,
@@ -122,16 +124,21 @@ class Guidance:
         self._in_map = None
         if self.odometry.boots > before.boots:
             self._start_over(now_s)
+        if self.odometry.mode != before.mode:
+            self._takeover.mode_changed(now_s)
         if kind == "HEARTBEAT":
             self._authority.hear_heartbeat(self.vehicle)
             self._check_authority(now_s)
         elif kind == "SYS_STATUS":
             self._readiness.hear_checks(self.vehicle, now_s, held=self._authority.held)
+            if self.vehicle.ready:
+                self._prearm_text = ""
         if self._procedure is not None:
             self._procedure.on_vehicle(kind, self.vehicle)
 
-    def on_text(self, severity: int, text: str) -> None:
+    def on_text(self, severity: int, text: str, now_s: float) -> None:
         """Take a whole STATUSTEXT of the autopilot."""
+        self._takeover.hear_text(severity, text, now_s)
         if text.startswith(PREARM_PREFIX):
             self._prearm_text = text.removeprefix(PREARM_PREFIX)
         if self._procedure is not None:
@@ -222,7 +229,7 @@ class Guidance:
         check_height(request.height_m, self._settings)
         check_takeoff(self.vehicle, self._prearm_text)
         reference = Takeoff(self._settings, height_m=request.height_m, speed_m_s=request.speed_m_s)
-        return self._accept(reference, [*self._to_guided(), arm(), take_off(request.height_m)], now_s)
+        return self._accept(reference, [*self._to_guided(), arm(self._prearm_text), take_off(request.height_m)], now_s)
 
     def _set_position(self, request: PositionRequest, now_s: float) -> GuidanceDecision:
         self._require_authority(now_s)
@@ -275,6 +282,7 @@ class Guidance:
 
     def _take_authority(self, _request: AuthorityRequest, now_s: float) -> GuidanceDecision:
         require(self.link(now_s), "no link to the autopilot")
+        require(not self.vehicle.foreign, self._foreign_reason())
         self._readiness.restarted = False
         if self._authority.held:
             return GuidanceDecision(accepted=True, reference_id=self._reference_id)
@@ -378,12 +386,17 @@ class Guidance:
             return "the link to the autopilot is lost"
         if not self._authority.mode_told:
             return "the link is back, the autopilot has not told its mode yet"
+        if self.vehicle.foreign:
+            return self._foreign_reason()
         mode = mode_name(self.vehicle.mode)
         if self._readiness.restarted:
             return f"the autopilot has restarted, in {mode}"
         if self._authority.held or (self.vehicle.on_ground and not self.vehicle.ready):
             return f"the vehicle stands in {mode}, its own checks are not passed"
-        return f"the vehicle is in {mode}: the pilot or a failsafe has it"
+        return self._takeover.reason(self.vehicle)
+
+    def _foreign_reason(self) -> str:
+        return f"the autopilot is {self.vehicle.foreign}: only ArduPilot on a multicopter is flown"
 
     def _introduce(self, now_s: float) -> None:
         """Note that mode, landed state, home and place are known, or that they don't come although there was time."""

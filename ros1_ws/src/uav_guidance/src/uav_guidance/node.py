@@ -223,7 +223,7 @@ class GuidanceNode:
         text = self._texts.take(message.text, message.id, message.chunk_seq)
         if text is not None:
             log.info("autopilot: %s", text)
-            self._guidance.on_text(message.severity, text)
+            self._guidance.on_text(message.severity, text, _now_s())
 
     def _stamped_pose(self, boot_ms: int, arrival: rospy.Time) -> PoseStamped | None:
         fine_ns = self._fine_clock.now_ns(time.monotonic_ns())

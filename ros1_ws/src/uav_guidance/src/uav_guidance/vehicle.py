@@ -8,6 +8,8 @@ from dataclasses import dataclass, replace
 from enum import IntEnum
 from typing import Any
 
+from pymavlink.dialects.v20 import ardupilotmega as mavlink
+
 from uav_guidance.frames import (
     Quaternion,
     enu_from_ned,
@@ -26,6 +28,18 @@ PREARM_CHECK = 0x10000000  # MAV_SYS_STATUS_PREARM_CHECK
 MOST_ACCEL_M_S2 = 5.0  # of a multicopter in guided flight
 LATE_S = 1.0  # a place or an attitude that was told longer ago than something else is not known any more
 REBOOT_MS = 1000  # the autopilot's clock may step back by less (messages out of order)
+
+MULTICOPTERS = frozenset(
+    {
+        mavlink.MAV_TYPE_QUADROTOR,
+        mavlink.MAV_TYPE_HEXAROTOR,
+        mavlink.MAV_TYPE_OCTOROTOR,
+        mavlink.MAV_TYPE_TRICOPTER,
+        mavlink.MAV_TYPE_COAXIAL,
+        mavlink.MAV_TYPE_DODECAROTOR,
+        mavlink.MAV_TYPE_DECAROTOR,
+    }
+)
 
 GlobalPlace = tuple[int, int, int]
 
@@ -78,11 +92,28 @@ def mode_name(mode: int | None) -> str:
     return Mode(mode).name if mode in Mode._value2member_map_ else str(mode)
 
 
+def _foreign(autopilot: int, vehicle_type: int) -> str:
+    """Return what an autopilot is that is no ArduPilot on a multicopter; empty if it is one."""
+    if autopilot == mavlink.MAV_AUTOPILOT_ARDUPILOTMEGA and vehicle_type in MULTICOPTERS:
+        return ""
+    return f"{_name('MAV_AUTOPILOT', autopilot)} on a {_name('MAV_TYPE', vehicle_type)}"
+
+
+def _name(enum: str, value: int) -> str:
+    """Return MAVLink's name of a value without its prefix."""
+    entry = mavlink.enums[enum].get(value)
+    return f"{enum} {value}" if entry is None else entry.name.removeprefix(f"{enum}_")
+
+
 @dataclass(frozen=True)
 class VehicleSnapshot:
     """A snapshot of the vehicle, metres, radians, body FLU; places in `odom` (ENU, origin at the EKF origin), or by `in_map` in `map`."""
 
     heartbeat_s: float | None = None
+    foreign: str = ""
+    """What the autopilot is, by HEARTBEAT, where it is no ArduPilot on a multicopter: its modes and commands have other meanings."""
+    critical: bool = False
+    """Whether HEARTBEAT's system_status is MAV_STATE_CRITICAL: a failsafe of the autopilot is active."""
     mode: int | None = None
     armed: bool = False
     ready: bool = False
@@ -144,7 +175,14 @@ def leapt(before: VehicleSnapshot, after: VehicleSnapshot, most_m: float) -> boo
 
 
 def _heartbeat(vehicle: VehicleSnapshot, message: Any, now_s: float) -> VehicleSnapshot:
-    return replace(vehicle, heartbeat_s=now_s, mode=int(message.custom_mode), armed=bool(message.base_mode & ARMED_FLAG))
+    return replace(
+        vehicle,
+        heartbeat_s=now_s,
+        foreign=_foreign(message.autopilot, message.type),
+        critical=message.system_status == mavlink.MAV_STATE_CRITICAL,
+        mode=int(message.custom_mode),
+        armed=bool(message.base_mode & ARMED_FLAG),
+    )
 
 
 def _sys_status(vehicle: VehicleSnapshot, message: Any, _now_s: float) -> VehicleSnapshot:
@@ -160,7 +198,8 @@ def _of_this_boot(vehicle: VehicleSnapshot, message: Any) -> VehicleSnapshot:
     """Forget what was said before a restart; the attitude shows it at once, a position comes half a minute later."""
     if message.time_boot_ms + REBOOT_MS >= max(vehicle.boot_ms, vehicle.attitude_boot_ms):
         return vehicle
-    return VehicleSnapshot(heartbeat_s=vehicle.heartbeat_s, mode=vehicle.mode, armed=vehicle.armed, boots=vehicle.boots + 1)
+    fresh = VehicleSnapshot(heartbeat_s=vehicle.heartbeat_s, foreign=vehicle.foreign, critical=vehicle.critical)
+    return replace(fresh, mode=vehicle.mode, armed=vehicle.armed, boots=vehicle.boots + 1)
 
 
 def _local_position(vehicle: VehicleSnapshot, message: Any, now_s: float) -> VehicleSnapshot:
