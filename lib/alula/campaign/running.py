@@ -11,8 +11,11 @@ from pathlib import Path
 from alula.campaign.plan import SIMULATOR, Campaign, PlannedRun
 from alula.campaign.rows import rows_of
 from alula.campaign.table import Table
+from alula.common.faults import FaultError, parse_fault
+from alula.common.robots import find_robot
+from alula.common.scenarios import load_scenario
 from alula.records.errors import AnalysisError
-from alula.runtime.live.options import ask_options, words_of
+from alula.runtime.live.options import ask_offer, words_of
 from alula.runtime.live.spec import RequestError
 
 TOGETHER = 10
@@ -58,9 +61,26 @@ def run(campaign: Campaign, table: Table, out: Path, progress: Progress, options
 
 
 def options_of(campaign: Campaign) -> tuple[str, ...]:
-    """Return the options of its live runs as words of their command lines; raises AnalysisError where the robot has no such options."""
+    """Return the options of its live runs as words of their command lines, once all faults of the runs are known to the robot.
+
+    Raises:
+        AnalysisError: the robot has no such option or fault, or can't be run live here.
+    """
+    if campaign.over != SIMULATOR:
+        return ()
     try:
-        return tuple(words_of(campaign.options, asyncio.run(ask_options()))) if campaign.options else ()
+        offer = asyncio.run(ask_offer())
+    except RequestError as error:
+        raise AnalysisError(str(error)) from None
+    known = {name: {**offer.faults, **dict(load_scenario(name).faults)} for name in campaign.scenarios}
+    for planned in () if find_robot().robots else campaign.runs:  # a fleet's robots each know their own
+        for text in planned.faults:
+            try:
+                parse_fault(text, known[planned.scenario])
+            except FaultError as error:
+                raise AnalysisError(f"the scenario {planned.scenario}: {error}") from None
+    try:
+        return tuple(words_of(campaign.options, offer.options))
     except RequestError as error:
         raise AnalysisError(f"`options`: {error}") from None
 

@@ -113,21 +113,21 @@ def _add_own(parser: ArgumentParser, here: Checkout | None) -> None:
             parser.add_argument(f"--{option.name}", help=option.about, action="store_true")
 
 
-def own_options(here: Checkout | None) -> list[RunOption]:
+def own_options(here: Checkout | None) -> Sequence[RunOption]:
     """Return what the robot's part declares; what can't be known here is left out."""
-    from alula.runtime.live.options import FLAG, options_of, read_options
+    from alula.runtime.live.options import FLAG, offer_of, read_offer
     from alula.runtime.live.part import part_of_robot
 
     try:
-        return options_of(part_of_robot())
+        return offer_of(part_of_robot()).options
     except RobotError:
         pass
     if here is None or not here.has("ros1"):
         return []
     try:
         words = here.words_of("run", FLAG)
-        return read_options(subprocess.run(words, capture_output=True, text=True, check=True, timeout=OPTIONS_S).stdout)
-    except (subprocess.SubprocessError, OSError, ValueError):
+        return read_offer(subprocess.run(words, capture_output=True, text=True, check=True, timeout=OPTIONS_S).stdout).options
+    except (subprocess.SubprocessError, OSError, ValueError, KeyError):
         return []
 
 

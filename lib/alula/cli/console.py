@@ -26,7 +26,7 @@ from alula.console.admission import Admission, is_loopback
 from alula.console.certificates import fingerprint, own_certificate, server_context
 from alula.console.link import ActError, Link, Mission, Skillsets
 from alula.console.server import Console
-from alula.runtime.live.options import ask_options
+from alula.runtime.live.options import ask_offer
 
 
 def parse(arguments: Sequence[str] | None) -> argparse.Namespace:
@@ -146,7 +146,7 @@ def main(arguments: Sequence[str] | None = None, make_link: Callable[[], Link] =
         token = "" if is_loopback(options.host) else secrets.token_urlsafe(24)
         tls, known_by = tls_of(options)
         admission = Admission(options.host, port_of(options), token, tls)
-        console = Console(admission, LateLink(make_link), fixed=fixed, beside=robots_beside(options), ask_options=ask_options)
+        console = Console(admission, LateLink(make_link), fixed=fixed, beside=robots_beside(options), ask_offer=ask_offer)
         asyncio.run(serve_until_told(console, admission, known_by))
     except (ValueError, OSError, RobotError) as error:
         sys.stderr.write(f"alula console: {error}\n")

@@ -35,7 +35,7 @@ from alula.console.embedded import REPORT
 from alula.console.feed import Feed, place_of
 from alula.console.link import ActError, Link
 from alula.console.page import make_page
-from alula.runtime.live.options import RunOption
+from alula.runtime.live.options import RunOffer, RunOption
 from alula.runtime.live.spec import RequestError
 
 FEED = "/feed"
@@ -75,7 +75,7 @@ class Console:
 
     The runs of the robots ``beside`` it are called ``ROBOT/RUN``, those of its own ``RUN``; those of a fleet's robots, which lie in
     the run of its mission, ``RUN/ROBOT``. Only its own robot's are started here.
-    ``ask_options`` says which options the robot's live runs have; it raises RequestError where none can be started.
+    ``ask_offer`` says which options the robot's live runs have; it raises RequestError where none can be started.
     """
 
     def __init__(
@@ -85,14 +85,14 @@ class Console:
         *,
         fixed: Path | None = None,
         beside: Sequence[RobotFolder] = (),
-        ask_options: Callable[[], Awaitable[Sequence[RunOption]]] | None = None,
+        ask_offer: Callable[[], Awaitable[RunOffer]] | None = None,
     ) -> None:
         self._admission = admission
         self._fixed = fixed
         self._beside = tuple(beside)
         self._fleet = robots_of_fleet()
         self._offers: dict[str, object] = {"scenarios": scenario_names(), "worlds": acts.world_names(), "over": [acts.MOCKS], "options": []}
-        self._ask_options = ask_options
+        self._ask_offer = ask_offer
         self._options: Sequence[RunOption] = ()
         self._page = make_page(title="Alula", entries=None).encode()
         self._feeds: dict[Path, tuple[Feed, asyncio.Task[None]]] = {}
@@ -207,7 +207,7 @@ class Console:
     async def _learn_options(self) -> None:
         """Ask once, as it takes a second or two; until then, and where no live run can be started here, the page offers mocks only."""
         try:
-            self._options = await self._ask_options() if self._ask_options else ()
+            self._options = (await self._ask_offer()).options if self._ask_offer else ()
         except RequestError as error:
             sys.stderr.write(f"alula console: runs can be started over mocks only: {error}\n")
             return

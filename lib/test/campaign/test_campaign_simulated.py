@@ -12,8 +12,10 @@ from campaign_mocks import fly_recorded
 
 from alula.campaign.plan import SIMULATOR, PlannedRun, load_campaign
 from alula.campaign.rows import rows_of
+from alula.campaign.running import options_of
 from alula.common.record import FILE, MISSION, RecordWriter
 from alula.common.scenarios import load_scenario
+from alula.records.errors import AnalysisError
 
 ALULA_ROOT = Path(os.environ["ALULA_ROOT"])
 CAMPAIGNS = ALULA_ROOT / "tests/campaigns"
@@ -93,3 +95,24 @@ def test_the_campaigns_of_thirty_flights_try_everything_that_can_fail_in_the_sim
         assert () in {flight.faults for flight in campaign.runs if flight.scenario == name}
     out_s = {round(fault.end_s - fault.begin_s, 6) for flight in campaign.runs for fault in flight.requests if fault.how == "out"}
     assert out_s == {1.0, 5.0, 20.0}
+
+
+@pytest.mark.parametrize(
+    ("fault", "words"),
+    [
+        ("zet@3", "the scenario mapping: fault 'zet@3': there is no 'zet' to break; choose one of "),
+        ("zed:frozzen@3", "the scenario mapping: fault 'zed:frozzen@3': zed can't be 'frozzen'; choose one of "),
+        ("radio:out@3", "the scenario mapping: fault 'radio:out@3': there is no 'radio' to break"),
+    ],
+)
+def test_a_fault_that_a_flight_can_not_have_is_refused_before_the_first_one(fault, words, tmp_path):
+    file = tmp_path / "c.yaml"
+    file.write_text(f"over: simulator\nscenarios: [mapping]\nfaults: [[zed@3], ['{fault}']]\n", encoding="utf-8")
+    with pytest.raises(AnalysisError) as refused:
+        options_of(load_campaign(file))
+    assert str(refused.value).startswith(words)
+
+
+@pytest.mark.parametrize("name", ["uav-simulator.yaml", "uav-simulator-short.yaml"])
+def test_flights_of_the_drones_campaigns_can_have_all_their_faults(name):
+    assert isinstance(options_of(load_campaign(CAMPAIGNS / name)), tuple)

@@ -20,7 +20,7 @@ from alula.common.runs import Run
 from alula.console.admission import Admission
 from alula.console.link import ActError, Link, Skillsets
 from alula.console.server import FEED, Console
-from alula.runtime.live.options import RunOption
+from alula.runtime.live.options import RunOffer, RunOption
 
 WAIT_S = 60.0
 
@@ -138,7 +138,7 @@ class Served:
             loop = asyncio.get_running_loop()
             self._stop = lambda: loop.call_soon_threadsafe(over.set)
             admission = Admission("127.0.0.1", self.port, "")
-            async with Console(admission, self._link, fixed=self._fixed, ask_options=self._told).open():
+            async with Console(admission, self._link, fixed=self._fixed, ask_offer=self._told).open():
                 up.set()
                 await over.wait()
 
@@ -146,8 +146,8 @@ class Served:
         self._thread.start()
         assert up.wait(WAIT_S)
 
-    async def _told(self) -> Sequence[RunOption]:
-        return self._options
+    async def _told(self) -> RunOffer:
+        return RunOffer(tuple(self._options))
 
     @property
     def address(self) -> str:

@@ -1,4 +1,4 @@
-"""The options that a robot's part adds to its live runs, as data: for those who can't import the part, and ask ``alula run --options``."""
+"""What a robot's part adds to its live runs, as data: for those who can't import the part, and ask ``alula run --options``."""
 
 from __future__ import annotations
 
@@ -10,7 +10,7 @@ import re
 import signal
 import subprocess
 from collections.abc import Mapping, Sequence
-from dataclasses import asdict, dataclass
+from dataclasses import asdict, dataclass, field
 from pathlib import Path
 
 from alula.runtime.live.part import RunPart
@@ -41,11 +41,20 @@ class RunOption:
         return f"--{self.name}={value}" if self.takes_value else f"--{self.name}"
 
 
-def options_of(part: RunPart) -> list[RunOption]:
-    """Return what a part declares, in its order."""
+@dataclass(frozen=True)
+class RunOffer:
+    """A robot's own options in their order, and what can fail in every scenario, each with the ways in which it can."""
+
+    options: tuple[RunOption, ...] = ()
+    faults: Mapping[str, Sequence[str]] = field(default_factory=dict)
+
+
+def offer_of(part: RunPart) -> RunOffer:
+    """Return what a part declares."""
     parser = argparse.ArgumentParser(add_help=False)
     part.add_options(parser)
-    return [_option(action) for action in parser._actions]  # noqa: SLF001  (argparse offers no other way to look at what was declared)
+    actions = parser._actions  # noqa: SLF001  (argparse offers no other way to look at what was declared)
+    return RunOffer(tuple(map(_option, actions)), {what: tuple(ways) for what, ways in part.faults.items()})
 
 
 def _option(action: argparse.Action) -> RunOption:
@@ -60,16 +69,18 @@ def _option(action: argparse.Action) -> RunOption:
 
 
 def as_json(part: RunPart) -> str:
-    """Return what `read_options` reads."""
-    return json.dumps([asdict(option) for option in options_of(part)])
+    """Return what `read_offer` reads."""
+    return json.dumps(asdict(offer_of(part)))
 
 
-def read_options(text: str) -> list[RunOption]:
-    """Read what `as_json` wrote; raises ValueError, TypeError."""
-    return [RunOption(**{**said, "choices": tuple(said["choices"])}) for said in json.loads(text)]
+def read_offer(text: str) -> RunOffer:
+    """Read what `as_json` wrote; raises ValueError, TypeError, KeyError."""
+    said = json.loads(text)
+    options = tuple(RunOption(**{**one, "choices": tuple(one["choices"])}) for one in said["options"])
+    return RunOffer(options, {what: tuple(ways) for what, ways in said["faults"].items()})
 
 
-async def ask_options() -> list[RunOption]:
+async def ask_offer() -> RunOffer:
     """Ask the robot's ``alula run``; raises RequestError, with its words, where the robot can't be run live here.
 
     Who is cancelled while it waits leaves no process behind.
@@ -91,8 +102,8 @@ async def ask_options() -> list[RunOption]:
                     os.killpg(asked.pid, signal.SIGTERM)
         if asked.returncode:
             raise RequestError((why.strip().splitlines() or [f"alula run {FLAG} ended with {asked.returncode}"])[-1])
-        return read_options(told)
-    except (OSError, subprocess.TimeoutExpired, ValueError, TypeError) as error:
+        return read_offer(told)
+    except (OSError, subprocess.TimeoutExpired, ValueError, TypeError, KeyError) as error:
         raise RequestError(f"alula run {FLAG}: {error}") from None
 
 
