@@ -11,6 +11,8 @@ from alula.common.run_log import END, note, read
 
 OPERATOR, SUPERVISOR, FRONT, SIGNAL = "operator", "supervisor", "front", "signal"
 """Who ends a run; SIGNAL: a program or a person outside of it."""
+TOLD_TO_END = "told to end by "
+"""How the reason of a mission begins that was ended by a signal: who had it sent, and why, is for the run to say."""
 
 
 @dataclass(frozen=True)
@@ -35,6 +37,11 @@ def ended_by_signal(number: signal.Signals | None) -> ReportedEnd:
 def note_end(out: Path, ended: ReportedEnd) -> None:
     """Write down who ends the run; it counts unless somebody else has done so already."""
     note(out, END, asdict(ended))
+
+
+def true_reason(reason: str | None, ended: ReportedEnd | None) -> str | None:
+    """Return why a mission was aborted: who ended the run in place of the signal that the mission got; the mission's reason otherwise."""
+    return ended.sentence() if ended is not None and (reason or "").startswith(TOLD_TO_END) else reason
 
 
 def read_end(out: Path) -> ReportedEnd | None:

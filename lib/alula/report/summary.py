@@ -9,6 +9,7 @@ from typing import Any, TypedDict
 from alula.common.faults import parse_fault
 from alula.common.robots import page_words, robots_of_fleet
 from alula.common.scenarios import load_scenario
+from alula.report.ends import read_end, true_reason
 from alula.report.facts import Death, RunFacts
 from alula.report.files import Problems, ReportError, mapping, read_json, sequence
 from alula.report.history import History
@@ -56,7 +57,7 @@ TOLD_ABOVE = ("scenario", "outcome", "reason", "problems", "start_s", "lift_off_
 
 
 def read_outcome(facts: RunFacts, history: History, problems: Problems) -> tuple[str | None, str | None]:
-    """Return the mission's outcome and its reason as its own account gives them."""
+    """Return the mission's outcome and its reason, by its own account; of one that a signal ended, who had it sent and why."""
     values = history.mission
     outcome, reason = (str(values[name]) if values.get(name) is not None else None for name in ("outcome", "reason"))
     for problem in sequence(values.get("problems")):
@@ -68,7 +69,7 @@ def read_outcome(facts: RunFacts, history: History, problems: Problems) -> tuple
         problems.note(
             "the replay stopped before the mission's end" if facts.replay_of else "the mission's process ended before the mission did"
         )
-    return outcome, reason or None
+    return outcome, true_reason(reason or None, read_end(facts.out_dir)) if outcome == "aborted" else reason or None
 
 
 def read_bridge(facts: RunFacts, problems: Problems) -> dict[str, object] | None:

@@ -9,7 +9,7 @@ from typing import Any
 from alula.common.robots import page_words
 from alula.common.run_log import read_waits
 from alula.report.deaths import Death
-from alula.report.ends import SIGNAL, ReportedEnd, read_end
+from alula.report.ends import SIGNAL, TOLD_TO_END, ReportedEnd, read_end
 from alula.report.phases import home
 
 MEANING = {
@@ -22,7 +22,6 @@ MEANING = {
     "running": "the mission's process ended before the mission did",
 }
 BY_EXIT_CODE = {0: "accomplished", 1: "given_up", 2: "not_started"}
-TOLD_TO_END = "told to end by "
 """Begins the reason of a mission that a signal has ended: who sent it, it can't know."""
 PICTURES = (".svg", ".png")
 
@@ -47,18 +46,19 @@ def duration_words(summary: Mapping[str, Any]) -> str:
     return f"duration {number(summary.get('duration_s'), 's', 1)}"
 
 
-def was_ended(summary: Mapping[str, Any]) -> bool:
+def was_ended(summary: Mapping[str, Any], ended: ReportedEnd | None) -> bool:
     """Tell whether the mission came to no end of its own."""
-    outcome = summary.get("outcome")
-    return outcome in {None, "running"} or (outcome == "aborted" and str(summary.get("reason")).startswith(TOLD_TO_END))
+    outcome, reason = summary.get("outcome"), str(summary.get("reason"))
+    told = reason.startswith(TOLD_TO_END) or (ended is not None and reason == ended.sentence())
+    return outcome in {None, "running"} or (outcome == "aborted" and told)
 
 
 def outcome_words(summary: Mapping[str, Any], died: Sequence[Death], out: Path, ended: ReportedEnd | None) -> str:
     """Return how the mission ended, in words; where its files are lost, by the exit code of its process, or by what died."""
     outcome, code, reason = summary.get("outcome"), summary.get("mission_exit"), summary.get("reason")
-    if outcome == "aborted" and ended is None and was_ended(summary):
+    if outcome == "aborted" and ended is None and was_ended(summary, ended):
         ended = ReportedEnd(SIGNAL, str(reason))
-    if ended is not None and was_ended(summary):
+    if ended is not None and was_ended(summary, ended):
         return f"mission {ended.sentence()}"
     if outcome == "served":
         return f"{MEANING[outcome]}, until the run was told to end: {ended.why if ended else reason}"
@@ -147,7 +147,7 @@ def verdict_lines(summary: Mapping[str, Any], died: Sequence[Death], out: Path) 
     """Return the verdict, a line each; who ended the run stands in its folder."""
     ended = read_end(out)
     lines = ["", outcome_words(summary, died, out, ended), *death_lines(died)]
-    if ended is not None and not was_ended(summary) and summary.get("outcome") != "served":
+    if ended is not None and not was_ended(summary, ended) and summary.get("outcome") != "served":
         lines.append(f"  the run was {ended.sentence()}")
     lines += [f"  it still waited for {wait}" for wait, over in read_waits(out).items() if not over]
     if summary.get("mock"):

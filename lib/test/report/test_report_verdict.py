@@ -4,12 +4,16 @@ from __future__ import annotations
 
 import signal
 from pathlib import Path
+from types import SimpleNamespace
 
 import pytest
 
 from alula.common.run_log import FILE, note_wait
 from alula.report.deaths import Death
-from alula.report.ends import FRONT, OPERATOR, SIGNAL, SUPERVISOR, ReportedEnd, ended_by_signal, note_end, read_end
+from alula.report.ends import FRONT, OPERATOR, SIGNAL, SUPERVISOR, ReportedEnd, ended_by_signal, note_end, read_end, true_reason
+from alula.report.facts import RunFacts
+from alula.report.files import Problems
+from alula.report.summary import read_outcome
 from alula.report.verdict import verdict_lines
 
 LATER = {"detected_s": 40.5, "fallback_running_s": None, "moving_again_s": None}
@@ -125,8 +129,9 @@ def test_whoever_ends_a_mission_is_told_by_name(
     if ended is not None:
         note_end(tmp_path, ended)
         note_end(tmp_path, ReportedEnd(OPERATOR, "who came later"))
-    lines = verdict_lines({"outcome": outcome, "reason": reason, "mission_exit": 1, "landed": None}, [], tmp_path)
-    assert lines == ["", told]
+    for said in (reason, true_reason(reason, ended)):  # as the mission says it, and as the summary does
+        lines = verdict_lines({"outcome": outcome, "reason": said, "mission_exit": 1, "landed": None}, [], tmp_path)
+        assert lines == ["", told]
 
 
 def test_a_mission_that_had_come_to_its_end_keeps_its_outcome(tmp_path: Path) -> None:
@@ -160,3 +165,10 @@ def test_a_signal_to_the_command_is_the_operators_when_it_is_ctrl_c() -> None:
 def test_an_outcome_is_told_with_its_reason() -> None:
     summary = {"outcome": "given_up", "reason": "no sensor left", "landed": True}
     assert verdict_lines(summary, [], OUT)[1] == "mission given up: no sensor left"
+
+
+def test_the_summary_of_a_run_that_came_to_its_limit_says_so(tmp_path: Path) -> None:
+    note_end(tmp_path, ReportedEnd(SUPERVISOR, "its limit of 30 s is over"))
+    facts = RunFacts("mapping", 1, tmp_path, (), (), 1)
+    history = SimpleNamespace(mission={"outcome": "aborted", "reason": SIGINT})
+    assert read_outcome(facts, history, Problems()) == ("aborted", "ended by the supervisor: its limit of 30 s is over")
