@@ -103,17 +103,21 @@ def duration_s(history: History, observed: Observed, phases: Phases) -> float | 
     return phases.since(end_s)
 
 
-def note_doubts(facts: RunFacts, observed: Observed, phases: Phases, problems: Problems) -> None:
+def note_doubts(facts: RunFacts, history: History, observed: Observed, phases: Phases, problems: Problems) -> None:
     """Say what the numbers alone would hide: a run without a departure, faults that never came."""
     scenario = load_scenario(facts.scenario)
     if not phases.departed and home() is not None and scenario.mission:  # who only serves skills may stay where it is
         problems.note(f"no {page_words()['departure']} is known: times count from {phases.zero_from}")
     broken = {fault.sensor for fault in injected(observed)}
-    others = dict(scenario.faults).keys() - dict(scenario.processes).keys()  # the radio's: nothing of them is in the bag
-    for fault in facts.faults:
-        what = parse_fault(fault).what
-        if observed.tells_faults and what not in others and what not in broken:
-            problems.note(f"the fault {fault} never happened")
+    # What scenarios add is in no bag, as the radio's; mocks tell all.
+    untold = set() if facts.mock else dict(scenario.faults).keys() - dict(scenario.processes).keys()
+    ends = [end_s for end_s in (history.last_s, observed.last_s) if end_s is not None]
+    for text in facts.faults:
+        fault = parse_fault(text)
+        if fault.begin_s is not None and phases.departed and ends and (over_s := max(ends) - phases.zero_s) < fault.begin_s:
+            problems.note(f"the fault {text} never happened: the run was over {over_s:.1f} s after the {page_words()['departure']}")
+        elif observed.tells_faults and fault.what not in untold | broken:
+            problems.note(f"the fault {text} never happened")
 
 
 def summarise(
@@ -131,7 +135,7 @@ def summarise(
     """Return ``summary.json`` of a run; what could not be read becomes a sentence among the problems."""
     outcome, reason = read_outcome(facts, history, problems)
     bridge = read_bridge(facts, problems)
-    note_doubts(facts, observed, phases, problems)
+    note_doubts(facts, history, observed, phases, problems)
     return {
         "scenario": facts.scenario,
         "outcome": outcome,

@@ -215,4 +215,19 @@ def test_mocks_tell_each_fault_of_a_sensor_and_when_it_ended(tmp_path):
     summary = mocked(tmp_path, asked, ("zed", "dark", 20.0), ("zed", "ok", 30.0), ("zed", "mock", 50.0))
     assert [(one["mode"], one["t_s"]) for one in summary["injected"]] == [("dark", 20.0), ("mock", 50.0)]
     assert [one["until_s"] for one in summary["answers"]] == [30.0, None]
-    assert "the fault lidar@700 never happened" in summary["problems"]
+    assert never(summary) == [f"the fault {fault} never happened: the run was over 50.3 s after the lift-off" for fault in asked[2:]]
+
+
+def never(summary):
+    return [problem for problem in summary["problems"] if "never happened" in problem]
+
+
+def test_a_fault_of_a_scenario_that_never_came_over_mocks_is_told(tmp_path):
+    flight(("zed", 20.3)).write(tmp_path / RECORD)
+    faults = ("radio:out@900", "encoder@10", "control:lost")
+    summary = make_report(RunFacts("inspection", 0, tmp_path, faults, (), 0, mock=True))
+    assert never(summary) == [
+        "the fault radio:out@900 never happened: the run was over 20.3 s after the lift-off",
+        "the fault encoder@10 never happened",
+        "the fault control:lost never happened",
+    ]
