@@ -25,7 +25,7 @@ from alula.report.ends import OPERATOR, ReportedEnd, note_end
 from alula.runtime.live.options import RunOption, entry, words_of
 from alula.runtime.live.spec import RequestError
 
-START_S = 20.0
+SILENT_S = 120.0  # wall clock; before a run begins it may have to build what has changed, and says each step
 END_S = 5.0
 LOOK_S = 0.05
 MAX_FAULTS = 8
@@ -134,7 +134,7 @@ def start(wanted: WantedRun) -> Path:
     """Start a run and return its folder, as soon as that is there.
 
     The run is a process of its own that this one does not end: a vehicle in the air must not fall because a page's server ended. Only
-    one that has not begun within START_S is ended: whoever is told that it has not started may start another one.
+    one that has said nothing for SILENT_S and has not begun is ended: whoever is told that it has not started may start another one.
 
     Raises:
         ActError: it does not start; the message is its own.
@@ -144,15 +144,18 @@ def start(wanted: WantedRun) -> Path:
     said = runs_folder() / f".{out.name}.log"
     with said.open("wb") as log:
         process = subprocess.Popen(wanted.words(out), stdin=subprocess.DEVNULL, stdout=log, stderr=log, start_new_session=True)
-    end = time.monotonic() + START_S
+    length, since_s = 0, time.monotonic()
     while not (out / "run.json").exists():
-        late = time.monotonic() >= end
+        if said.stat().st_size > length:
+            length, since_s = said.stat().st_size, time.monotonic()
+        late = time.monotonic() - since_s >= SILENT_S
         if late:
             _end(process)
         if process.poll() is not None:
             words = said.read_text(encoding="utf-8", errors="replace").strip().splitlines()
             last = words[-1] if words else "it said nothing" if late else f"alula run ended with {process.returncode}"
-            raise ActError(f"the run had not begun after {START_S:g} s and was ended; its last words: {last}" if late else last)
+            silence = f"the run had not begun, said nothing for {SILENT_S:g} s and was ended; its last words: " if late else ""
+            raise ActError(f"{silence}{last}")
         time.sleep(LOOK_S)
     return out
 

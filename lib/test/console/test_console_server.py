@@ -358,13 +358,27 @@ def test_a_run_that_does_not_begin_is_ended_and_told(
     script.chmod(0o755)
     monkeypatch.setenv("ALULA_ROOT", str(tmp_path))
     builds = lambda: any("building" in log.read_text() for log in (tmp_path / "runs").glob(".*.log"))  # noqa: E731
-    asked = itertools.count()  # the first time for when it began
-    clock = SimpleNamespace(monotonic=lambda: 100.0 if next(asked) and builds() else 0.0, sleep=time.sleep)
+    silent = itertools.count(step=50.0)  # the seconds since it has said so, at each look
+    clock = SimpleNamespace(monotonic=lambda: next(silent) if builds() else 0.0, sleep=time.sleep)
     monkeypatch.setattr(acts, "time", clock)
-    with pytest.raises(ActError, match="had not begun after 20 s and was ended; its last words: building the skillsets"):
+    with pytest.raises(ActError, match="had not begun, said nothing for 120 s and was ended; its last words: building the skillsets"):
         acts.start(WantedRun("mapping", 0, mock=True))
     with pytest.raises(ProcessLookupError):
         os.kill(int((tmp_path / "pid").read_text()), 0)
+
+
+def test_a_run_that_builds_for_minutes_and_says_so_is_waited_for(
+    make_run: Callable[..., Path], tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    script = tmp_path / "alula"
+    steps = "for step in 1 2 3 4; do echo building $step; sleep 0.3; done"
+    out = 'while [ "$1" != --out ]; do shift; done'
+    script.write_text(f'#!/bin/sh\n{out}\n{steps}\nmkdir -p "$2"\necho > "$2/run.json"\n', encoding="utf-8")
+    script.chmod(0o755)
+    monkeypatch.setenv("ALULA_ROOT", str(tmp_path))
+    steps_s = lambda: 100.0 * sum(log.read_text().count("building") for log in (tmp_path / "runs").glob(".*.log"))  # noqa: E731
+    monkeypatch.setattr(acts, "time", SimpleNamespace(monotonic=steps_s, sleep=time.sleep))
+    assert (acts.start(WantedRun("mapping", 0, mock=True)) / "run.json").exists()
 
 
 def test_only_the_link_to_a_robot_needs_ros() -> None:
