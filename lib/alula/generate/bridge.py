@@ -23,7 +23,7 @@ def bridge_configuration(robot: Robot) -> str:
 
 
 def topics(robot: Robot) -> list[BridgedTopic]:
-    """Return the topics of the bindings, of all data, and every skillset's resource states; each name once."""
+    """Return the topics of the bindings, of all data, and every skillset's resource states and heartbeats; each name once."""
     found = list(robot.bindings.topics)
     for skillset in robot.skillsets:
         for data in skillset.data:
@@ -34,6 +34,8 @@ def topics(robot: Robot) -> list[BridgedTopic]:
         # The functional layer compares what it reported with what the resource manager holds.
         name = f"/{skillset.name}/resource_states"
         found.append(BridgedTopic(name, "ros2_to_ros1", "skillset_interfaces/ResourceStates", latched=True, depth=1))
+        # Who watches over the robot on its own computer listens for them. Not latched: the last one of dead managers is no heartbeat.
+        found.append(BridgedTopic(f"/{skillset.name}/alive", "ros2_to_ros1", "std_msgs/Header", latched=False, depth=1))
     return list({topic.name: topic for topic in reversed(found)}.values())[::-1]
 
 

@@ -35,6 +35,8 @@ Serve = Callable[[Mapping[str, Any], Reply], None]
 
 CALL_S = 5.0
 """Default time limit of a call."""
+ALIVE_PERIOD_S = 0.5
+"""Managers send a heartbeat so often (wall clock), whatever their hooks do: who is in another world has nothing else to tell by."""
 
 
 @dataclass(frozen=True)

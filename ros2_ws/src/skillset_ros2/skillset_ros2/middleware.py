@@ -16,7 +16,7 @@ from rclpy.node import Node
 from std_msgs.msg import Header
 
 from alula.runtime.codecs import Codecs, ServiceCodec, set_stamp, stamp_ns_of
-from alula.runtime.middleware import CALL_S, Goal, GoalListener, OnError, OnHeartbeat, OnReply, OnValue, Serve, Topic
+from alula.runtime.middleware import ALIVE_PERIOD_S, CALL_S, Goal, GoalListener, OnError, OnHeartbeat, OnReply, OnValue, Serve, Topic
 from alula.runtime.timers import Job
 from skillset_ros2.actions import RclpyLink, RclpyServer
 from skillset_ros2.base import QUIET_PUBLISHER, RclpyBase
@@ -149,23 +149,30 @@ class RclpyMiddleware(RclpyBase):
     # --- heartbeats ----------------------------------------------------------------------------------------------------
 
     def announce(self, instance_id: str, on_rival: OnError) -> None:
-        """Tell of these managers, latched; DDS itself sends the heartbeats. Those that were there first stay."""
+        """Send heartbeats, latched, from the executor: one that hangs goes silent. Those that were there first stay."""
         begun_ns = time.time_ns()
         heartbeat = Header(frame_id=instance_id)
         set_stamp(heartbeat.stamp, begun_ns)
         told = f"managers of {self._skillset} are there already ({self.node.resolve_topic_name(self.name('alive'))}); end them first"
+        later: set[str] = set()
 
         def hear(other: Any) -> None:
             mine, others = (begun_ns, instance_id), (stamp_ns_of(other.stamp), other.frame_id)
             if others[1] != instance_id and others < mine:
                 on_rival(told)
-            elif others[1] != instance_id:
+            elif others[1] != instance_id and others[1] not in later:
+                later.add(others[1])
                 self.log(f"other managers of {self._skillset} were started later; they will end")
+
+        def beat() -> None:
+            if not self._closed:
+                self._send_heartbeat()
+                self.later(ALIVE_PERIOD_S, beat)
 
         self.listen(self.name("alive"), Header, hear, latched(1))
         publisher: Any = self.node.create_publisher(Header, self.name("alive"), ALIVE, event_callbacks=QUIET_PUBLISHER)
         self._send_heartbeat = lambda: publisher.publish(heartbeat)
-        self._send_heartbeat()
+        beat()
 
     def watch(self, on_heartbeat: OnHeartbeat, on_doubt: Job) -> None:
         """Follow the heartbeats of the managers, by DDS."""

@@ -12,7 +12,7 @@ from rclpy.qos import DurabilityPolicy, HistoryPolicy, LivelinessPolicy, QoSProf
 from alula.model.ros_types import camel
 
 LIVELINESS_LEASE_S = 2.0
-"""Without a heartbeat for so long (wall clock), a manager process is taken for dead; DDS itself sends the heartbeats."""
+"""Without a heartbeat for so long (wall clock), a manager process is taken for dead. Between messages DDS itself tells that it lives."""
 
 
 OF_ALL_ROBOTS = ("/parameter_events", "/rosout", "/tf", "/tf_static")

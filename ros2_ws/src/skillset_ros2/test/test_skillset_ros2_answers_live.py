@@ -17,10 +17,12 @@ from rclpy.parameter import Parameter  # noqa: E402
 from skillset_interfaces.msg import SkillStates  # noqa: E402
 from skillset_interfaces.srv import SetPaused, Why  # noqa: E402
 from skillset_ros2_rig import READY_S, SOON_S, Navigation, until  # noqa: E402
+from std_msgs.msg import Header  # noqa: E402
 
 from alula.model.execution_state import ExecutionState  # noqa: E402
 from alula.runtime.core.errors import SkillRuntimeError  # noqa: E402
 from alula.runtime.hooks import SkillHooks  # noqa: E402
+from alula.runtime.middleware import ALIVE_PERIOD_S  # noqa: E402
 from alula.runtime.workers import Workers  # noqa: E402
 from alula_testing.navigation import FLYING  # noqa: E402
 from skillset_ros2 import ActionClient, SkillsetNode  # noqa: E402
@@ -63,6 +65,31 @@ def test_managers_that_answer_after_they_were_given_up_are_found_again(anyhow):
     finally:
         go_on.set()
     until(lambda: navigation.client.ready, "their late answer counts as a heartbeat")
+
+
+def test_heartbeats_are_messages_too_and_end_where_the_executor_hangs(anyhow):
+    """Another world hears nothing of DDS liveliness."""
+    navigation, go_on, hangs = anyhow, threading.Event(), threading.Event()
+    heard: list[Header] = []
+    periods: list[None] = []
+    navigation.node.create_subscription(Header, "navigation/alive", heard.append, LATCHED)
+    until(lambda: len(heard) >= 3, "heartbeats come again and again")
+    assert {beat.frame_id for beat in heard} == {navigation.managers.managers.instance_id}
+
+    def hang() -> None:
+        hangs.set()
+        go_on.wait(READY_S)
+
+    try:
+        navigation.managers.executor.create_task(hang)
+        assert hangs.wait(READY_S)
+        count = len(heard)
+        navigation.node.create_timer(ALIVE_PERIOD_S, lambda: periods.append(None))
+        until(lambda: len(periods) >= 4, "time goes by")
+        assert len(heard) <= count + 1, "one may have been under way"
+    finally:
+        go_on.set()
+    until(lambda: len(heard) >= count + 3, "and go on")
 
 
 def test_why_answers_over_the_graph(anyhow):

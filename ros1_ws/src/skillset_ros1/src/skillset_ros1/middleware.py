@@ -19,7 +19,19 @@ from roslib.message import get_message_class
 from std_msgs.msg import Header
 
 from alula.runtime.codecs import Codecs, set_stamp, stamp_ns_of
-from alula.runtime.middleware import CALL_S, Goal, GoalListener, OnError, OnHeartbeat, OnReply, OnValue, Serve, Topic, thinned
+from alula.runtime.middleware import (
+    ALIVE_PERIOD_S,
+    CALL_S,
+    Goal,
+    GoalListener,
+    OnError,
+    OnHeartbeat,
+    OnReply,
+    OnValue,
+    Serve,
+    Topic,
+    thinned,
+)
 from alula.runtime.timers import Job
 from skillset_ros1.actions import RospyLink, RospyServer, is_connected
 from skillset_ros1.base import RospyBase
@@ -27,8 +39,6 @@ from skillset_ros1.calls import call
 from skillset_ros1.convert import message_class
 from skillset_ros1.names import QUEUE, action_types, now_ns
 
-ALIVE_PERIOD_S = 0.5
-"""Managers send a heartbeat so often (wall clock), whatever their hooks do: ROS 1 itself does not tell of a node that died."""
 LEASE_S = 2.0
 """Without a heartbeat for so long (wall clock), managers are doubted, as in the ROS 2 world."""
 BROKEN_LEASE_S = 1.5 * ALIVE_PERIOD_S
