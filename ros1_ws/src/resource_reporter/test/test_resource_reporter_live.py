@@ -2,6 +2,9 @@
 
 from __future__ import annotations
 
+import os
+import subprocess
+import sys
 import threading
 import time
 from collections.abc import Iterator
@@ -13,11 +16,23 @@ rospy = pytest.importorskip("rospy")
 from skillset_interfaces.msg import ResourceState, ResourceStates  # noqa: E402
 from skillset_interfaces.srv import Transition, TransitionRequest, TransitionResponse  # noqa: E402
 
-from alula_testing.waits import until  # noqa: E402
+from alula_testing.waits import HANGS_S, until  # noqa: E402
 from resource_reporter import ResourceReporter  # noqa: E402
 from resource_reporter.calls import publisher  # noqa: E402
 
 SKILLSET = "reported"
+FAILING = """
+import rospy
+from resource_reporter import ResourceReporter
+rospy.init_node("failing")
+reporter = ResourceReporter("reported")
+reporter.report("zed_status", "OK")
+while not reporter._ledger._actual:
+    rospy.sleep(0.01)
+reporter.when_settled(lambda: {}["of the reporter's thread"])
+print("a job waits", flush=True)
+rospy.spin()
+"""
 ARROWS = {("UNKNOWN", "OK"), ("UNKNOWN", "BROKEN"), ("OK", "BROKEN"), ("BROKEN", "OK")}
 
 
@@ -185,6 +200,19 @@ def test_what_waits_for_a_skillset_that_has_gone_is_done(skillset, reporter):
     assert done == []
     skillset.close()
     until(lambda: done == ["done"], what="it is done")
+
+
+def test_an_error_in_the_reporters_thread_ends_the_node(skillset, ros_master):
+    skillset.hangs = threading.Event()
+    skillset.serve()
+    pipes = {"stdout": subprocess.PIPE, "stderr": subprocess.PIPE, "env": {**os.environ, "ROS_MASTER_URI": ros_master}}
+    with subprocess.Popen([sys.executable, "-c", FAILING], text=True, **pipes) as node:
+        assert node.stdout.readline() == "a job waits\n"
+        skillset.hangs.set()
+        _, said = node.communicate(timeout=HANGS_S)
+    assert node.returncode == 1, said
+    assert "an error in the thread report_reported ends this node" in said
+    assert 'KeyError: "of the reporter\'s thread"' in said
 
 
 def heard(reporter: ResourceReporter) -> bool:

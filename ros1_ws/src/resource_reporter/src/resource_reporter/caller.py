@@ -1,4 +1,4 @@
-"""A call of the transition service that never takes longer than it may: rospy's own has no time limit."""
+"""A call of a service that never takes longer than it may: rospy's own has no time limit."""
 
 from __future__ import annotations
 
@@ -6,11 +6,9 @@ import contextlib
 import socket
 import threading
 from dataclasses import dataclass, field
+from typing import Any
 
 import rospy
-from skillset_interfaces.srv import Transition, TransitionResponse
-
-from resource_reporter.ledger import Call
 
 CALL_LIMIT_S = 2.0
 MOST_ABANDONED = 4
@@ -25,31 +23,32 @@ class _Attempt:
     """One call in a thread of its own, which may be abandoned."""
 
     done: threading.Event = field(default_factory=threading.Event)
-    response: TransitionResponse | None = None
+    response: Any = None
     error: str = ""
 
 
-class TransitionCaller:
-    """Call ``/<skillset>/transition`` over a kept connection (no look-up at the master: about 1 ms), renewed when it broke."""
+class ServiceCaller:
+    """Call a service over a kept connection (no look-up at the master: about 1 ms), renewed when it broke; from one thread at a time."""
 
-    def __init__(self, skillset: str) -> None:
-        self._name = f"/{skillset}/transition"
+    def __init__(self, name: str, kind: Any) -> None:
+        self.name = name
+        self._kind = kind
         self._proxy: rospy.ServiceProxy | None = None
         self._abandoned: list[threading.Thread] = []
 
-    def call(self, call: Call) -> TransitionResponse:
-        """Ask for a transition; CallFailedError after 2 s at the latest."""
+    def call(self, request: Any, *, limit_s: float = CALL_LIMIT_S) -> Any:
+        """Return the answer; CallFailedError after ``limit_s`` (wall clock) at the latest."""
         self._abandoned = [thread for thread in self._abandoned if thread.is_alive()]
         if len(self._abandoned) >= MOST_ABANDONED:
-            self._abandoned[0].join(CALL_LIMIT_S)
-            raise CallFailedError(f"{self._name} does not answer")
+            self._abandoned[0].join(limit_s)
+            raise CallFailedError(f"{self.name} does not answer")
         attempt = _Attempt()
-        thread = threading.Thread(target=self._run, args=(call, attempt), daemon=True)
+        thread = threading.Thread(target=self._run, args=(request, attempt), daemon=True)
         thread.start()
-        if not attempt.done.wait(CALL_LIMIT_S):
+        if not attempt.done.wait(limit_s):
             self.close()
             self._abandoned.append(thread)
-            raise CallFailedError(f"{self._name} did not answer within {CALL_LIMIT_S} s")
+            raise CallFailedError(f"{self.name} did not answer within {limit_s:.3g} s")
         if attempt.response is None:
             self.close()
             raise CallFailedError(attempt.error)
@@ -64,12 +63,12 @@ class TransitionCaller:
                 transport.socket.shutdown(socket.SHUT_RDWR)
             transport.close()
 
-    def _run(self, call: Call, attempt: _Attempt) -> None:
-        if self._proxy is None:
-            self._proxy = rospy.ServiceProxy(self._name, Transition, persistent=True)
+    def _run(self, request: Any, attempt: _Attempt) -> None:
         try:
-            attempt.response = self._proxy(call.resource, call.to, call.reason)
+            if self._proxy is None:
+                self._proxy = rospy.ServiceProxy(self.name, self._kind, persistent=True)
+            attempt.response = self._proxy(request)
         except Exception as error:  # noqa: BLE001  # rospy lets through all that the sockets below it raise
-            attempt.error = f"{self._name}: {error}"
+            attempt.error = f"{self.name}: {error}"
         finally:
             attempt.done.set()

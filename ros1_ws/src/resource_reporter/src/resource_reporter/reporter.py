@@ -8,10 +8,11 @@ from collections.abc import Callable
 
 import rospy
 from skillset_interfaces.msg import ResourceStates
-from skillset_interfaces.srv import TransitionRequest
+from skillset_interfaces.srv import Transition, TransitionRequest
 
-from resource_reporter.caller import CallFailedError, TransitionCaller
+from resource_reporter.caller import CallFailedError, ServiceCaller
 from resource_reporter.calls import publisher, tell_call
+from resource_reporter.failing import ends_the_node
 from resource_reporter.ledger import Call, Ledger
 
 # A latched topic may have been missed only while its publisher was away: nothing has to be polled. This bounds one wait.
@@ -25,6 +26,7 @@ class ResourceReporter:
 
     To be made after ``rospy.init_node``. ``report`` may be called from any thread, as often as one likes, and never blocks: the
     service is called by a thread of its own, at once, and until ``/<skillset>/resource_states`` agrees with what was reported last.
+    An error in that thread ends the node, with exit code 1.
     """
 
     def __init__(self, skillset: str) -> None:
@@ -36,7 +38,7 @@ class ResourceReporter:
         self._unsettled_since_s: float | None = None
         self._told_unknown: set[str] = set()
         publisher()
-        self._caller = TransitionCaller(skillset)
+        self._caller = ServiceCaller(f"/{skillset}/transition", Transition)
         self._worker = threading.Thread(target=self._work, name=f"report_{skillset}", daemon=True)
         self._worker.start()
         self._subscriber = rospy.Subscriber(f"/{skillset}/resource_states", ResourceStates, self._on_states, tcp_nodelay=True)
@@ -63,6 +65,11 @@ class ResourceReporter:
                 return
         job()
 
+    def knows(self) -> bool:
+        """Return whether the skillset knows of all states reported so far: it shows, has accepted or has refused them."""
+        with self._changed:
+            return self._ledger.settled
+
     def close(self) -> None:
         """End the worker and drop the connections."""
         self._subscriber.unregister()
@@ -72,6 +79,7 @@ class ResourceReporter:
         self._caller.close()
         self._worker.join(LONGEST_WAIT_S)
 
+    @ends_the_node
     def _on_states(self, message: ResourceStates) -> None:
         with self._changed:
             shown = message.resources
@@ -81,6 +89,7 @@ class ResourceReporter:
                 rospy.logerr("the skillset %s has no resource %s", self._skillset, name)
             self._changed.notify()
 
+    @ends_the_node
     def _work(self) -> None:
         while (call := self._next_call()) is not None:
             self._make(call)
@@ -118,10 +127,10 @@ class ResourceReporter:
 
     def _make(self, call: Call) -> None:
         """Make one call, outside the lock, and note its answer."""
-        service, begin_s = f"/{self._skillset}/transition", rospy.get_time()
+        service, begin_s = self._caller.name, rospy.get_time()
         request = TransitionRequest(call.resource, call.to, call.reason)
         try:
-            answer = self._caller.call(call)
+            answer = self._caller.call(request)
         except CallFailedError as error:
             tell_call(service, request, None, begin_s, str(error))
             self._note_refusal(call, str(error), answered=False)
