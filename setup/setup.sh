@@ -105,7 +105,7 @@ key_workspace() { # WORLD FOLDER...
   echo "$(tree_digest "$@")-$(cat "$state/stamps/venv$world" "$state/given$world.env" "$state/stamps/wheels" 2>/dev/null)-$(digest "$ALULA_ROOT"/setup/{"workspace.py","build_ros$world.py",link_packages.py,interfaces.cmake})"
 }
 title_ros1="ROS 1 workspace (catkin_make)"
-key_ros1() { key_workspace 1 "$ALULA_ROOT"/ros1_ws/src/{skillset_interfaces,skillset_ros1,resource_reporter,node_core}; }
+key_ros1() { key_workspace 1 "$ALULA_ROOT"/ros1_ws/src/{skillset_interfaces,skillset_ros1,resource_reporter,alula_base,node_core}; }
 make_ros1() { make_workspace 1; }
 title_ros2="ROS 2 workspace (colcon build)"
 key_ros2() { key_workspace 2 "$ALULA_ROOT/bridge" "$ALULA_ROOT"/ros2_ws/src/{skillset_ros2,skill_panel}; }

@@ -21,7 +21,7 @@ if TYPE_CHECKING:
 
 ROOT, STATE = Path(os.environ["ALULA_ROOT"]), Path(os.environ["ALULA_STATE"])
 GENERAL = {
-    "1": ("skillset_interfaces", "skillset_ros1", "resource_reporter", "node_core"),
+    "1": ("skillset_interfaces", "skillset_ros1", "resource_reporter", "alula_base", "node_core"),
     "2": ("skillset_interfaces", "tf2_msgs", "ros_bridge", "ros_bridge_native", "skillset_ros2", "skill_panel"),
 }
 """Alula's packages that any robot uses, by world; a robot has them from the installation, also where its folders hold them."""

@@ -64,11 +64,11 @@ def test_the_general_packages_of_ros_2_are_built_by_plain_colcon(tmp_path: Path)
 
 @pytest.mark.timeout(0)
 def test_the_general_packages_of_ros_1_are_built_by_plain_catkin_make(tmp_path: Path) -> None:
-    general = [ALULA_ROOT / "ros1_ws/src" / name for name in ("skillset_ros1", "resource_reporter")]
+    general = [ALULA_ROOT / "ros1_ws/src" / name for name in ("skillset_ros1", "resource_reporter", "alula_base")]
     workspace = copy(tmp_path, INTERFACES, LIBRARY, *general)
     build(workspace, {"CMAKE_PREFIX_PATH": "/usr", "ROS_VERSION": "1"}, "catkin_make", "-DPYTHON_EXECUTABLE=/usr/bin/python3")
     site = workspace / "devel/lib/python3/dist-packages"
-    files = imported_from(site, "/usr/bin/python3", "alula.common.robots", "resource_reporter", "skillset_interfaces.srv")
+    files = imported_from(site, "/usr/bin/python3", "alula.common.robots", "resource_reporter", "alula_base", "skillset_interfaces.srv")
     assert all(file.is_relative_to(workspace) for file in files), files
 
 

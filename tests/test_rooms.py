@@ -14,7 +14,7 @@ ALULA_ROOT = Path(__file__).resolve().parents[1]
 ON_TOP = sorted(path.name for path in (ALULA_ROOT / "flight").iterdir() if (path / "__init__.py").is_file())
 BELOW = ("bridge", "lib", "ros1_ws/src", "ros2_ws/src", "skillsets")
 ROS = r"rclpy|rospy|roslib|roslaunch|rosbag|genpy|actionlib|rcl_interfaces|\w+_msgs|skillset_interfaces"
-ADAPTERS = "skillset_ros1|skillset_ros2|resource_reporter|node_core|skill_panel|ros_bridge"
+ADAPTERS = "skillset_ros1|skillset_ros2|resource_reporter|alula_base|node_core|skill_panel|ros_bridge"
 DRONE_PACKAGES = "ground_station|lidar_mapping|lidar_obstacles|perception_core|radio_link|video_stream|zed_depth"
 DRONE = rf"uav_\w+|{DRONE_PACKAGES}|navigation_\w+|perception_managers|mapping_managers|video_managers"
 DRONE_WORDS = r"ardupilot|autopilots?|drones?|guidance|imu|lidar|lift[-_ ]?off|mavlink|radio\w*|take[-_ ]?off|telepilot|vehicles?|video|zed"
@@ -31,7 +31,8 @@ RULES = {
     "lib/alula": rf"{ROS}|{ADAPTERS}|{DRONE}|{DRONE_WORDS}",
     # The adapters and the bridge: no robot.
     "ros1_ws/src/skillset_ros1": rf"{DRONE}|{DRONE_WORDS}",
-    "ros1_ws/src/resource_reporter": rf"{DRONE}|{DRONE_WORDS}",
+    "ros1_ws/src/resource_reporter": rf"{DRONE}|{DRONE_WORDS}|alula",
+    "ros1_ws/src/alula_base": rf"{DRONE}|{DRONE_WORDS}|alula",
     "ros1_ws/src/node_core": rf"{DRONE}|{DRONE_WORDS}",
     "ros2_ws/src/skillset_ros2": rf"{DRONE}|{DRONE_WORDS}",
     "ros2_ws/src/skill_panel": rf"{DRONE}|{DRONE_WORDS}",

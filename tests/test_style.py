@@ -12,6 +12,7 @@ ALULA_ROOT = Path(__file__).resolve().parents[1]
 ROS1_PACKAGES = (
     "uav_guidance",
     "resource_reporter",
+    "alula_base",
     "node_core",
     "skillset_ros1",
     "perception_core",
