@@ -6,8 +6,9 @@ all runs of each skillset, all runs of each mission.
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
-from dataclasses import replace
+import re
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass, replace
 from functools import partial
 from pathlib import Path
 from time import monotonic
@@ -28,12 +29,13 @@ from alula.model.span import Span
 from alula.records.causes.fault_file import states_of_faults
 from alula.trees.document import read_source
 from alula.trees.errors import FileError
-from alula.trees.reading import PROJECT
+from alula.trees.library import ENDINGS, Library
+from alula.trees.library import ignore as ignore_problem
+from alula.trees.palette import name_in_files
+from alula.trees.reading import read_files
 
 Tell = Callable[[str], None]
 """Takes a line about progress, or about what is left out."""
-MISSIONS = (".xml", PROJECT)
-"""How the name of a mission's file ends."""
 TIME_S = 30.0
 """What the proofs of a file may take."""
 
@@ -47,6 +49,8 @@ def check_files(
     *paths: str | Path,
     robot: str | Path | None = None,
     palettes: Sequence[str | Path] = (),
+    main: str = "",
+    packages: Mapping[str, str | Path] | None = None,
     proofs: bool = True,
     closed_world: bool = False,
     timeout_s: float = TIME_S,
@@ -58,9 +62,12 @@ def check_files(
     a ``counterexample``.
 
     Args:
-        paths: models (``*.skill``, ``*.rl``), folders of them, missions (``*.xml``, ``*.btproj``); none: the robot's models.
+        paths: models (``*.skill``, ``*.rl``), missions (``*.xml``, ``*.btproj``), folders of both, whose trees may use one another; none:
+            the robot's models.
         robot: its folder, whose models and nodes the missions are made of; None: that of the current folder or above.
         palettes: of missions, files of more types of nodes (TreeNodesModel).
+        main: the ID of the main tree, where a mission does not say it.
+        packages: folders of ROS packages, by their names, for includes that name one.
         proofs: False: leave out the proofs.
         closed_world: assume that transitions that are neither extern nor used by an effect are never taken.
         timeout_s: for the proofs of a file; what could not be decided in it is a finding.
@@ -70,7 +77,9 @@ def check_files(
         AlulaError: no files are given, and there is no robot.
     """
     with meaning(None if robot is None else load_robot_folder(Path(robot).resolve())):
-        files = checked_files(list(map(str, paths)) or robot_models(find_robot()), palettes=list(map(str, palettes)), tell=tell)
+        given = list(map(str, paths)) or robot_models(find_robot())
+        others = {name: Path(folder) for name, folder in (packages or {}).items()}
+        files = checked_files(given, palettes=list(map(str, palettes)), main=main, packages=others, tell=tell)
         if proofs:
             prove_files(files, timeout_s, closed_world=closed_world, tell=tell)
     return [finding for file in files for finding in file.findings]
@@ -83,18 +92,32 @@ def robot_models(robot: RobotFolder) -> list[str]:
 
 def is_mission(path: str) -> bool:
     """Tell whether a file is a mission, by its name."""
-    return path.endswith(MISSIONS)
+    return path.endswith(ENDINGS)
 
 
 def checked_files(
-    places: Sequence[str], standard_input: BinaryIO | None = None, *, palettes: Sequence[str] = (), tell: Tell = ignore
+    places: Sequence[str],
+    standard_input: BinaryIO | None = None,
+    *,
+    palettes: Sequence[str] = (),
+    main: str = "",
+    packages: Mapping[str, Path] | None = None,
+    tell: Tell = ignore,
 ) -> list[ModelFile]:
     """Return the models, then the missions, with their findings; `-` is the standard input where that is given."""
-    paths = dict.fromkeys(path for place in dict.fromkeys(places) if not is_mission(place) for path in models_in(place))
+    library = Library(packages)
+    missions: dict[str, None] = {}
+    paths: dict[str, None] = {}
+    for place in dict.fromkeys(places):
+        trees = [str(path) for path in library.files(Path(place))] if is_mission(place) or Path(place).is_dir() else []
+        missions |= dict.fromkeys(trees)
+        if not is_mission(place):
+            found = models_in(place)
+            paths |= dict.fromkeys(found if found != [place] or not trees else ())
     read = models.check_files(list(paths), standard_input)
     for model in read:
         check_fields(model)
-    return [*read, *checked_missions([place for place in dict.fromkeys(places) if is_mission(place)], palettes, tell)]
+    return [*read, *checked_missions(list(missions), palettes, tell, library=library, main=main)]
 
 
 def prove_files(files: Sequence[ModelFile], timeout_s: float, *, closed_world: bool = False, tell: Tell = ignore) -> None:
@@ -153,12 +176,29 @@ def _not_begun(skillsets: Sequence[Skillset], timeout_s: float) -> Diagnostic:
 # --- missions -----------------------------------------------------------------------------------------------------------
 
 
-def checked_missions(paths: Sequence[str], palettes: Sequence[str] = (), tell: Tell = ignore) -> list[ModelFile]:
-    """Return each mission with its findings; what can't be read is told, too, in one line."""
+def checked_missions(
+    paths: Sequence[str], palettes: Sequence[str] = (), tell: Tell = ignore, *, library: Library | None = None, main: str = ""
+) -> list[ModelFile]:
+    """Return each mission with its findings; what can't be read is told, too, in one line.
+
+    Several are a library for one another; ``main`` is the main tree of the one that has it.
+    """
     if not paths:
         return []
-    skillsets, part, messages = _robot(tell)
-    return [_checked(path, skillsets, [Path(palette) for palette in palettes], part, messages, tell) for path in paths]
+    robot = _robot(tell)
+    library = library or Library()
+    if len(paths) > 1:
+        library.add(map(Path, paths))
+    files = {Path(path).resolve(): ModelFile(path) for path in paths}
+    for path, file in files.items():
+        mine = main if path in {Path(one.place.path).resolve() for one in library.trees.get(main, ())} or len(paths) == 1 else ""
+        for finding in _checked(file.path, robot, [Path(one) for one in palettes], library, mine, tell):
+            its = files.get(Path(finding.span.file).resolve(), file)  # one file's tree is checked in another, too, that uses it
+            if finding not in its.findings:
+                its.findings.append(finding)
+    for file in files.values():
+        file.findings.sort(key=lambda one: (one.span.file != file.path, one.span.file, one.span.line, one.span.column))
+    return list(files.values())
 
 
 def prove_missions(files: Sequence[ModelFile], timeout_s: float, tell: Tell = ignore) -> None:
@@ -168,9 +208,15 @@ def prove_missions(files: Sequence[ModelFile], timeout_s: float, tell: Tell = ig
         return
     from alula.prove.mission.prover import prove_mission  # which brings its solvers along
 
-    skillsets, part, _ = _robot(ignore)  # what is to be told of it was told when they were checked
+    robot = _robot(ignore)  # what is to be told of it was told when they were checked
+    skillsets, part = robot.skillsets, robot.part
     faults = states_of_faults(skillsets, tell) if skillsets else {}
+    library = Library()
+    library.add(Path(file.path) for file in files if files[1:])
     for file in sound if skillsets else []:
+        path = Path(file.path)
+        if not robot.has(path, read_source(path)) or read_files(path, ignore_problem, library=library, whole=False).is_part:
+            continue  # a tree of another program, or a part of other missions, which are looked at
         report = partial(_tell_runs, tell, file.path)
         proved = prove_mission(Path(file.path), skillsets, part, faults=faults, timeout_s=timeout_s, tell=report)
         file.findings += [*proved.findings, *map(_accepted, proved.accepted)]
@@ -185,26 +231,42 @@ def _tell_runs(tell: Tell, path: str, progress: str) -> None:
     tell(f"{path}: looking at its runs: {progress}")
 
 
-def _robot(tell: Tell) -> tuple[tuple[Skillset, ...], MissionPart, Messages]:
-    """Return what is known of the robot, nothing where there is none: a foreign tree has its palette."""
+@dataclass(frozen=True)
+class _Robot:
+    """What missions are checked with; ``root`` is None where there is no robot: a tree of others has its palette."""
+
+    root: Path | None = None
+    skillsets: tuple[Skillset, ...] = ()
+    part: MissionPart = NO_PART
+    messages: Messages = NO_MESSAGES
+
+    def has(self, path: Path, source: bytes) -> bool:
+        """Tell whether a file is a mission of this robot: it lies in its folder, or names a skillset or a node of it."""
+        if self.root is None or self.root in path.resolve().parents:
+            return self.root is not None
+        names = [f"{one.name}." for one in self.skillsets] + [f"<{name_in_files(node)}" for node in self.part.nodes]
+        return any(re.search(rb"\b" * name[0].isalpha() + re.escape(name.encode()) + rb"\b", source) for name in names)
+
+
+def _robot(tell: Tell) -> _Robot:
     try:
         robot = find_robot()
     except RobotError as error:
         tell(f"no skills are known: {error}")
-        return (), NO_PART, NO_MESSAGES
-    return models_of(robot, tell), part_of(robot, tell), messages_of(robot)
+        return _Robot()
+    return _Robot(robot.root, models_of(robot, tell), part_of(robot, tell), messages_of(robot))
 
 
-def _checked(
-    path: str, skillsets: Sequence[Skillset], palettes: Sequence[Path], part: MissionPart, messages: Messages, tell: Tell
-) -> ModelFile:
-    file = ModelFile(path)
+def _checked(path: str, robot: _Robot, palettes: Sequence[Path], library: Library, main: str, tell: Tell) -> list[Diagnostic]:
     try:
-        file.findings = findings_of(path, read_source(Path(path)), skillsets, palettes, part, messages)
+        source = read_source(Path(path))
+        own = robot if robot.has(Path(path), source) else _Robot()
+        others = own.root is None
+        found = findings_of(path, source, own.skillsets, palettes, own.part, own.messages, library, main, of_others=others)
     except FileError as error:
-        file.findings = [Diagnostic("ALU001", error.problem.message, Span(path, 0, 0, 0))]
-    for finding in file.findings:
+        found = [Diagnostic("ALU001", error.problem.message, Span(path, 0, 0, 0))]
+    for finding in found:
         if finding.code.startswith("ALU0") and finding.severity is Severity.ERROR:
             cure = f"; {finding.hint}" if finding.hint else ""
             tell(f"{finding.span if finding.span.line else path}: {finding.message}{cure}")
-    return file
+    return found

@@ -82,7 +82,7 @@ def check(
 
     with suppress(_Enough):
         verify(files, palette, report)
-    if files.main in files.trees and not any(problem.code in ENDLESS for problem in found):
+    if files.trees and not any(problem.code in ENDLESS for problem in found):
         found += _wholes(files, palette, traits, (*RULES, *rules), beside, foreign=foreign)
     places: dict[tuple[object, ...], Problem] = {}
     for problem in found:
@@ -98,11 +98,12 @@ def _wholes(
     given, others = tuple(model.ports) if model else (), Writers()
     # A tree of these is ticked by itself, also where the main one has it as a subtree, over other entries then.
     started = [name for name in (*beside.before, *beside.later) if name in files.trees and name != files.main]
-    for name in dict.fromkeys((files.main, *started, *_others(files))):
+    mains = [files.main] if files.main in files.trees else []
+    for name in dict.fromkeys((*mains, *started, *_others(files))):
         root = expand(files, palette, name)
         if root is None:
             continue
-        known = given if name == files.main or name in started else None
+        known = given if name in started or (name == files.main and not files.is_part) else None
         whole = Whole(root, programs, reach, traits, known, others, name in beside.later, foreign)
         for rule in rules:
             yield from islice(rule(whole), MOST)

@@ -15,6 +15,7 @@ from alula.missions.part import NO_PART, MissionPart
 from alula.model.model import Skillset
 from alula.model.span import Span
 from alula.trees.errors import FileError, Place, Problem
+from alula.trees.library import Library
 
 _WORD = re.compile(r"""<?[^\s=<>"'/]+""")
 """What a place without a length stands for: a tag, an attribute's name, a value."""
@@ -27,10 +28,14 @@ def findings_of(
     palettes: Sequence[Path] = (),
     part: MissionPart = NO_PART,
     messages: Messages = NO_MESSAGES,
+    library: Library | None = None,
+    main: str = "",
+    *,
+    of_others: bool = False,
 ) -> list[Diagnostic]:
-    """Return what is wrong with a mission; what keeps it from being read at all is the only finding then (ALU0..)."""
+    """Return what `check_mission` finds wrong with a mission; what keeps it from being read at all is the only finding then (ALU0..)."""
     try:
-        problems = check_mission(Path(path), source, skillsets, palettes, part, messages)
+        problems = check_mission(Path(path), source, skillsets, palettes, part, messages, library, main, of_others=of_others)
     except FileError as error:
         problem = error.problem
         code = problem.code if problem.code.startswith("ALU0") else "ALU004"

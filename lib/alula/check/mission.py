@@ -16,6 +16,7 @@ from alula.missions.palette import no_class, palette_of
 from alula.missions.part import NO_PART, MissionPart
 from alula.model.model import Skillset
 from alula.trees.errors import FileError, Problem
+from alula.trees.library import Library
 from alula.trees.palette import Palette
 from alula.trees.reading import TreeFiles, read_models, read_text
 
@@ -29,21 +30,27 @@ def check_mission(
     palettes: Sequence[Path] = (),
     part: MissionPart = NO_PART,
     messages: Messages = NO_MESSAGES,
+    library: Library | None = None,
+    main: str = "",
+    *,
+    of_others: bool = False,
 ) -> list[Problem]:
     """Return what is wrong with a mission, each thing once.
 
-    ``source`` is what its file has, or will have, ``part`` what the robot adds, ``messages`` what is known of the fields of its data.
+    ``source`` is what its file has, or will have, ``part`` what the robot adds, ``messages`` what is known of the fields of its data,
+    ``library`` the files whose trees it may use, ``main`` its main tree instead of what it says itself. A tree ``of_others`` is loaded by a
+    program that chooses the main tree, fills the blackboard, and has nodes that no file declares.
 
     Raises:
         FileError: the file, one that it includes, or a palette can't be read or is no XML of trees.
     """
     found: list[Problem] = []
-    files = read_text(source, str(path), found.append)
+    files = read_text(source, str(path), found.append, main=main, library=library, whole=not of_others)
     skills = Skills(skillsets, messages)
     rules = SkillRules(skills)
     known = palette_for(files, skillsets, palettes, part)
     own = (rules.units, rules.results, rules.resources, NameRules(skills).names)
-    found += check(files, known, SkillTraits(skills), own, beside=BESIDE, foreign=bool(palettes))
+    found += check(files, known, SkillTraits(skills), own, beside=BESIDE, foreign=bool(palettes) or of_others)
     if not palettes and (problem := no_class(files, known)) is not None:
         found.append(replace(problem, warning=True))
     endless = [problem for problem in found if problem.code.startswith("ALU0")]

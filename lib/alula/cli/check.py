@@ -40,7 +40,7 @@ def main(arguments: Sequence[str] | None = None) -> int:
         sys.stderr.write(f"{COMMAND}: no files are named, and {error}\n")
         return 2
     warn = warner(COMMAND)
-    files = checked_files(given, sys.stdin.buffer, palettes=options.palette, tell=warn)
+    files = checked_files(given, sys.stdin.buffer, palettes=options.palette, main=options.main, packages=options.package, tell=warn)
     if options.proofs and options.to is None:
         prove_files(files, options.time, closed_world=options.closed_world, tell=warn)
     for file in files:

@@ -1,4 +1,4 @@
-"""``alula tree FILE``: draw a mission, and tick it without any robot.
+"""``alula tree FILE|FOLDER...``: draw a mission, and tick it without any robot.
 
 Ends with 0, and with 2 when a file can't be read or is wrong, or the tree can't be ticked.
 """
@@ -8,7 +8,7 @@ from __future__ import annotations
 import argparse
 import json
 import sys
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from pathlib import Path
 
 from alula.check.mission import palette_for
@@ -21,7 +21,8 @@ from alula.common.robots import RobotError, find_robot
 from alula.missions.drawing import draw, drawn_as_text
 from alula.missions.part import NO_PART
 from alula.trees.answers import Answers, AnswersError, StepClock, read_answers, scripted_tree, ticks
-from alula.trees.errors import TreeError
+from alula.trees.errors import TreeError, did_you_mean
+from alula.trees.library import Library
 from alula.trees.palette import Palette
 from alula.trees.reading import TreeFiles, read_files
 from alula.trees.view import view_of
@@ -44,19 +45,53 @@ def run(given: argparse.Namespace) -> int:
     """Do what is asked for; raises AnswersError, TreeError, OSError."""
     if given.ticks is not None and (given.ticks < 0 or given.answers is None):
         raise AnswersError(f"--ticks {given.ticks}: is a number of ticks, and goes with --answers FILE")
-    files = read_files(given.file)
+    found = mains(given.files, given.main, given.package)
+    for option in ("svg", "answers"):
+        if getattr(given, option) is not None and found[1:]:
+            raise TreeError(f"--{option}: is of one tree; choose it with `--main`: {', '.join(files.main for files in found)}")
     answers = Answers({}) if given.answers is None else read_answers(given.answers)
-    clock = StepClock()
-    tree = scripted_tree(files, palette(files, given.palette), answers, clock)
-    if given.answers is not None:
-        for tick in ticks(tree, answers, TICKS if given.ticks is None else given.ticks, clock):
-            sys.stdout.write((tick.as_json() if given.json else tick.as_text()) + "\n")
-    view, title = view_of(tree.root), f"{given.file.name}: {files.main}"
-    if given.svg is not None:
-        write_text(given.svg, draw(view, title))
-    if given.answers is None:
-        sys.stdout.write(json.dumps(view.as_dict()) + "\n" if given.json else drawn_as_text(view, title))
+    for files in found:
+        clock = StepClock()
+        tree = scripted_tree(files, palette(files, given.palette), answers, clock)
+        if given.answers is not None:
+            for tick in ticks(tree, answers, TICKS if given.ticks is None else given.ticks, clock):
+                sys.stdout.write((tick.as_json() if given.json else tick.as_text()) + "\n")
+        view, title = view_of(tree.root), f"{Path(files.path).name}: {files.main}"
+        if given.svg is not None:
+            write_text(given.svg, draw(view, title))
+        if given.answers is None:
+            sys.stdout.write(json.dumps(view.as_dict()) + "\n" if given.json else drawn_as_text(view, title))
     return 0
+
+
+def mains(places: Sequence[Path], main: str, packages: Mapping[str, Path]) -> list[TreeFiles]:
+    """Return each main tree of the first place with the files that it needs; the other places are a library for it.
+
+    Of a folder these are all trees that are a part of no other, of a file the one that it says, or all such where it says none; with
+    ``main`` the tree of that ID. Raises TreeError.
+    """
+    library = Library(packages)
+    paths = library.files(places[0])
+    if len(places) > 1 or places[0].is_dir():
+        library.add(places)
+    if not paths:
+        raise TreeError(f"{places[0]}: there is no file of trees in this folder")
+    if main and len(paths) > 1:
+        having = list(dict.fromkeys(one.place for one in library.trees.get(main, ())))
+        if not having:
+            cure = did_you_mean(main, library.trees) or f"there are {', '.join(sorted(library.trees))}"
+            raise TreeError(f"{places[0]}: no file in this folder has a tree '{main}'; {cure}")
+        if having[1:]:
+            raise TreeError(f"{having[0]}: '{main}' stands in {having[1]}, too; name the file that is meant")
+        paths = [Path(having[0].path)]
+    found = []
+    for path in paths:
+        files = read_files(path, main=main, library=library, whole=False)
+        if places[0].is_dir() and not main and (files.is_part or not files.trees):
+            continue
+        tops = [files.main] if files.main else files.tops
+        found += [read_files(path, main=top, library=library) for top in tops or [""]]
+    return found
 
 
 def palette(files: TreeFiles, more: Sequence[Path]) -> Palette:

@@ -13,8 +13,8 @@ from alula.trees.document import Element
 from alula.trees.errors import TickError, did_you_mean
 from alula.trees.factory import make_tree
 from alula.trees.node import Action, Control, Node, Wiring
-from alula.trees.palette import CHILDREN, Category, Direction, NodeType, Palette, Port, node_type
-from alula.trees.reading import CATEGORIES, TreeFiles, is_port, node_name, type_name
+from alula.trees.palette import CATEGORIES, CHILDREN, Category, Direction, NodeType, Palette, Port, node_type
+from alula.trees.reading import TreeFiles, is_port, node_name, type_name
 from alula.trees.status import ANSWERS, IDLE, NAMES, Answer
 from alula.trees.tree import Tree
 

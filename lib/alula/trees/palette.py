@@ -25,6 +25,9 @@ class Category(Enum):
     SUBTREE = "SubTree"
 
 
+CATEGORIES = {category.value: category for category in Category}
+
+
 class Direction(Enum):
     """Whether a port is read, written, or both; as in a TreeNodesModel."""
 

@@ -7,8 +7,8 @@ from collections.abc import Iterator
 from alula.trees.document import DEEPEST, Attribute, Element
 from alula.trees.errors import Problem, Report, did_you_mean, refuse
 from alula.trees.node import pointer
-from alula.trees.palette import Direction, NodeType, Palette
-from alula.trees.reading import CATEGORIES, TreeFiles, is_port, type_name
+from alula.trees.palette import CATEGORIES, Direction, NodeType, Palette
+from alula.trees.reading import TreeFiles, is_port, type_name
 
 MOST_NODES = 65_535
 """A node's uid has 16 bits in Groot2's protocol."""
@@ -16,6 +16,7 @@ MOST_NODES = 65_535
 
 def verify(files: TreeFiles, palette: Palette, report: Report = refuse) -> None:
     """Report what is wrong with any tree of the files."""
+    _verify_uses(files, report)
     for name, tree in files.trees.items():
         if palette.get(name) is not None:
             report(Problem(tree.place_of("ID"), f"the tree '{name}' has the name of a node", "call it otherwise"))
@@ -45,10 +46,21 @@ def _verify_node(element: Element, files: TreeFiles, palette: Palette, report: R
             _verify_reactive(element, report)
 
 
+def _verify_uses(files: TreeFiles, report: Report) -> None:
+    """Report each tree that there is not, where it is used first."""
+    missing: dict[str, list[Element]] = {}
+    for name in files.trees:
+        for element in files.uses(name):
+            if type_name(element) and type_name(element) not in files.trees:
+                missing.setdefault(type_name(element), []).append(element)
+    for name, uses in missing.items():
+        more = f", which is used {len(uses)} times" if uses[1:] else ""
+        cure = did_you_mean(name, files.trees) or "include the file that has it, or give that file or its folder, too"
+        report(Problem(uses[0].place_of("ID"), f"there is no tree '{name}'{more}", cure, code="ALU617"))
+
+
 def _verify_subtree(element: Element, files: TreeFiles, report: Report) -> None:
     name = type_name(element)
-    if name not in files.trees:
-        report(Problem(element.place_of("ID"), f"there is no tree '{name}'", did_you_mean(name, files.trees), code="ALU617"))
     if element.children:
         report(Problem(element.children[0].place, f"<SubTree> '{name}' has children", "they belong into the tree itself"))
     model = files.models.get(name)

@@ -121,7 +121,8 @@ def test_a_checker_gets_all_that_is_wrong():
         "f.xml:1:34: <BehaviorTree> has no ID; name it: the file has several",
         "f.xml:1:34: the tree '' has 0 nodes at its top; it needs one",
         "f.xml:1:49: the tree 'a' has 0 nodes at its top; it needs one",
-        'f.xml:1:1: has several trees, and does not say which is the main one; add main_tree_to_execute="..."',
+        "f.xml:1:1: has several trees, and does not say which is the main one; "
+        'add main_tree_to_execute="...", or choose with `--main`: BehaviorTree_0, a',
     ]
 
 

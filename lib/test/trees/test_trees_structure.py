@@ -55,9 +55,9 @@ def test_all_that_is_wrong_is_reported_without_a_tree():
     body = "<Sequence><Sequenc/><SubTree ID='b'><Foo/></SubTree><Sleep mse='1'/></Sequence>"
     verify(read_text(f"<root><BehaviorTree ID='Sequence'>{body}</BehaviorTree></root>"), palette(), problems.append)
     assert [problem.message for problem in problems] == [
+        "there is no tree 'b'",
         "the tree 'Sequence' has the name of a node",
         "unknown node 'Sequenc'",
-        "there is no tree 'b'",
         "<SubTree> 'b' has children",
         "unknown node 'Foo'",
         "'Sleep' has no port 'mse'",

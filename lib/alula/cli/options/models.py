@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from argparse import ArgumentParser
+from argparse import Action, ArgumentParser, Namespace
 from pathlib import Path
 
 from alula.cli.parser import completed_by
@@ -15,7 +15,7 @@ MOST_SITUATIONS = 200_000
 UNLIKELY = 1e-3
 FILES_HELP = (
     "skillsets in the paper's notation (*.skill) or the Robot Language (*.rl), folders of them, or `-`: the standard input; "
-    "missions (*.xml), projects of Groot2 (*.btproj)"
+    "missions (*.xml), projects of Groot2 (*.btproj), folders of them, whose trees may use one another"
 )
 MISSION_HELP = "a mission: BehaviorTree.CPP 4's XML"
 PALETTE_HELP = "a TreeNodesModel with more types of node, as Groot2's"
@@ -26,6 +26,7 @@ def check(parser: ArgumentParser) -> None:
     parser.add_argument("files", nargs="*", metavar="FILE", help=f"{FILES_HELP} (default: the robot's)")
     parser.add_argument("--json", action="store_true", help="print one JSON object: each finding's place, code, counterexample")
     parser.add_argument("--palette", action="append", default=[], metavar="FILE", help=f"with a mission: {PALETTE_HELP}")
+    _trees(parser)
     parser.add_argument(
         "--closed-world", action="store_true", help="assume that transitions that are neither extern nor used by an effect are never taken"
     )
@@ -41,6 +42,24 @@ def check(parser: ArgumentParser) -> None:
     )
     parser.add_argument("--strict", action="store_true", help="treat warnings as errors")
     parser.add_argument("--to", choices=NOTATIONS, help="print the models in this notation instead")
+
+
+class _AddPackage(Action):
+    """Takes ``NAME=DIR`` into a dictionary."""
+
+    def __call__(self, parser: ArgumentParser, namespace: Namespace, values: object, option_string: str | None = None) -> None:
+        """Add one; wrong ones end the process with exit code 2."""
+        name, _, folder = str(values).partition("=")
+        if not name or not folder or not Path(folder).is_dir():
+            parser.error(f"argument {option_string}: {values} is no NAME=DIR with a folder that is there")
+        setattr(namespace, self.dest, {**getattr(namespace, self.dest), name: Path(folder)})
+
+
+def _trees(parser: ArgumentParser) -> None:
+    """Add what commands about files of trees take in common."""
+    parser.add_argument("--main", default="", metavar="ID", help="the main tree, where a file has several and does not say it")
+    package = "the folder of a ROS package that an <include> names (default: those around, and those that are sourced)"
+    parser.add_argument("--package", action=_AddPackage, default={}, metavar="NAME=DIR", help=package)
 
 
 def odds(parser: ArgumentParser) -> None:
@@ -62,9 +81,16 @@ def odds(parser: ArgumentParser) -> None:
 
 def tree(parser: ArgumentParser) -> None:
     """Add what ``alula tree`` takes."""
-    parser.add_argument("file", type=Path, metavar="FILE", help=MISSION_HELP)
+    parser.add_argument(
+        "files",
+        nargs="+",
+        type=Path,
+        metavar="FILE",
+        help=f"{MISSION_HELP}; then files and folders whose trees it uses; a folder alone: each of its trees that is a part of no other",
+    )
     parser.add_argument("--svg", type=Path, metavar="FILE", help="write the drawing there, too")
     parser.add_argument("--palette", type=Path, action="append", default=[], metavar="FILE", help=PALETTE_HELP)
+    _trees(parser)
     parser.add_argument("--answers", type=Path, metavar="FILE", help='what leaves answer: {"leaf name": ["RUNNING", "SUCCESS"], ...}')
     parser.add_argument("--ticks", type=int, metavar="N", help=f"with answers, how often it is ticked ({TICKS})")
     parser.add_argument("--json", action="store_true", help="print the tree, or each tick, as JSON")
