@@ -101,7 +101,7 @@ def test_what_is_just_outside_of_the_vehicle_is_an_obstacle(distance_m) -> None:
     assert found.distance_m == pytest.approx(distance_m, abs=0.05)
 
 
-def test_where_returns_were_just_lost_is_unknown_unless_an_obstacle_is_seen() -> None:
+def test_where_returns_were_just_lost_is_unknown_also_when_an_obstacle_is_seen() -> None:
     rng = np.random.default_rng(8)
     # The vehicle flies to its left, which is the sensor's x: sector 18 of 36 begins there. Far walls on both sides.
     walls = np.column_stack([rng.choice([-20.0, 20.0], 900), rng.uniform(-9, 9, 900), rng.uniform(-5, 5, 900)])
@@ -121,7 +121,8 @@ def test_where_returns_were_just_lost_is_unknown_unless_an_obstacle_is_seen() ->
     assert look_with([14, 21], left).unknown == ""
     box = np.array([5.0, 0.0, 0.0]) + rng.uniform(-0.2, 0.2, (30, 3))
     seen = look_with([18], left, np.vstack([walls, box]))
-    assert (seen.unknown, seen.nearest is not None) == ("", True)
+    assert seen.nearest is not None
+    assert seen.unknown == "the LiDAR has just lost its returns from where the vehicle goes"
 
 
 def yard(*, elevations_deg, columns=720, gap_deg=None) -> np.ndarray:
@@ -155,6 +156,29 @@ def test_a_way_that_is_seen_is_free(rings_deg) -> None:
 @pytest.mark.parametrize("begin_deg", [-10.0, -7.0, -5.0, -1.0, 0.0])
 def test_a_gap_that_was_there_from_the_start_is_unknown(begin_deg) -> None:
     assert "does not see all of the way ahead: 0 returns from" in forward(yard(elevations_deg=RINGS, gap_deg=(begin_deg, begin_deg + 10.0)))
+
+
+def test_a_gap_is_unknown_also_when_something_is_seen_beside_it() -> None:
+    """A post 2.3 m ahead is in the gap; what is seen is a thing at the corridor's edge, 6 m ahead."""
+    full = yard(elevations_deg=RINGS)
+    azimuth_deg = np.degrees(np.arctan2(full[:, 1], full[:, 0]))
+    rng = np.random.default_rng(4)
+    edge = np.array([6.0, 1.6, 0.0]) + rng.uniform(-0.2, 0.2, (60, 3)) * [1.0, 2.5, 1.0]
+    gapped = np.vstack([full[(azimuth_deg < -12.0) | (azimuth_deg > 13.0)], edge])
+    motion = VehicleMotion(velocity_enu_m_s=(1.0, 0.0, 0.0))
+
+    def forwards(points):
+        return LidarAhead(LidarSettings().ahead).look(
+            sweep(points), T_base_lidar=np.eye(4), poses=crab(position=(0.0, 0.0, 2.0)), motion=motion
+        )
+
+    seen = forwards(gapped)
+    assert seen.nearest is not None
+    assert seen.nearest.distance_m == pytest.approx(6.0, abs=0.2)
+    assert seen.unknown == "the LiDAR does not look where the vehicle goes: 0 returns from there"
+    whole = forwards(np.vstack([full, edge]))
+    assert whole.nearest is not None
+    assert whole.unknown == "", "an obstacle alone makes nothing unknown"
 
 
 @pytest.mark.parametrize("count", [60, 240])
@@ -211,3 +235,25 @@ def test_obstacles_of_a_real_street_are_where_trying_all_finds_them(scan) -> Non
     assert sum(right is not None for _, right in found) >= 6
     for distance_m, right in found:
         assert distance_m == (right if right is None else pytest.approx(right, abs=0.012)), found
+
+
+@pytest.mark.skipif(not KITTI.exists(), reason=f"no real data at {KITTI}: set ALULA_DATA")
+@pytest.mark.parametrize("scan", ["000000", "000001", "000002"])
+def test_what_a_lost_part_of_a_real_street_hides_is_not_told_as_free(scan) -> None:
+    """25 degrees ahead are lost: an obstacle that was there is told where it was, or the way as unknown."""
+    points = np.fromfile(KITTI / f"{scan}.bin", np.float32).reshape(-1, 4)[:, :3]
+    azimuth_deg, hidden = np.degrees(np.arctan2(points[:, 1], points[:, 0])), 0
+    for towards_deg in range(0, 360, 20):
+        aside_deg = (azimuth_deg - towards_deg + 180.0) % 360.0 - 180.0
+        turn = np.radians(towards_deg)
+        motion = VehicleMotion(velocity_enu_m_s=(float(np.cos(turn)), float(np.sin(turn)), 0.0))
+        whole, cut = (
+            LidarAhead(LidarSettings(length_m=30.0).ahead).look(
+                sweep(seen), T_base_lidar=np.eye(4), poses=crab(position=(0.0, 0.0, 1.73)), motion=motion
+            )
+            for seen in (points, points[(aside_deg < -12.0) | (aside_deg > 13.0)])
+        )
+        if whole.nearest is not None and (cut.nearest is None or cut.nearest.distance_m > whole.nearest.distance_m + 0.5):
+            hidden += 1
+            assert cut.unknown, (towards_deg, whole.nearest, cut.nearest)
+    assert hidden >= 2

@@ -41,6 +41,9 @@ def test_obstacle_messages_say_infinity_for_nothing() -> None:
     unknown = obstacle_message(0, "zed", None, "no texture")
     assert (unknown.detected, unknown.unknown, unknown.reason) == (False, True, "no texture")
     some = obstacle_message(0, "lidar", Nearest(distance_m=4.0, point_enu_m=(1.0, 2.0, 3.0), size_m=(0.5, 1.0, 2.0)))
+    assert not some.unknown
+    both = obstacle_message(0, "lidar", Nearest(distance_m=4.0, point_enu_m=(1.0, 2.0, 3.0), size_m=(0.5, 1.0, 2.0)), "a gap")
+    assert (both.detected, both.distance_m, both.unknown, both.reason) == (True, 4.0, True, "a gap")
     assert (some.size_m.x, some.size_m.y, some.size_m.z) == (0.5, 1.0, 2.0)
     assert (some.detected, some.distance_m, some.nearest_enu_m.z, some.header.frame_id) == (True, 4.0, 3.0, "odom")
 

@@ -97,6 +97,18 @@ def test_an_obstacle_that_no_sensor_sees_any_more_is_not_forgotten(flying):
     assert flying.report.course.obstacle_m == math.inf
 
 
+def test_an_obstacle_far_ahead_does_not_free_the_way_to_it_where_that_is_not_seen(flying):
+    flying.go(30.0, 0.0, speed=1.5)
+    watch(flying, 3.0)
+    watch(flying, 2.5, flying.vehicle.enu[0] + 9.0, unknown=True)
+    assert flying.report.course.obstacle_stop
+    assert flying.report.course.unwatched
+    assert math.isfinite(flying.report.course.obstacle_m), "it is known all the same"
+    see(flying, None, "lidar")
+    flying.run(0.1)
+    assert not flying.report.course.obstacle_stop, "another sensor sees the way"
+
+
 def test_a_way_that_can_not_be_judged_is_not_free(flying):
     flying.go(30.0, 0.0, speed=1.5)
     watch(flying, 3.0)

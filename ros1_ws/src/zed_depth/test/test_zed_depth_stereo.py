@@ -116,6 +116,10 @@ def test_obstacle_is_where_the_wall_stands_in_the_map() -> None:
     assert found.point_enu_m[1] == pytest.approx(8.9, abs=0.3)
     back = look(NS, VehicleMotion(velocity_enu_m_s=(0.0, -1.0, 0.0)))
     assert (back.nearest, back.unknown) == (None, "the camera does not look where the vehicle goes")
+    assert look(NS).unknown == ""
+    depth[80:190, 210:270] = np.nan  # a nearer obstacle may be there
+    assert look(NS).nearest is not None
+    assert look(NS).unknown == "only 0% of a part of the view ahead has a depth"
     depth[:] = np.nan
     blind = look(NS)
     assert (blind.nearest, blind.unknown) == (None, "only 0% of a part of the view ahead has a depth")

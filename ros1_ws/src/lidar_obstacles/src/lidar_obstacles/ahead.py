@@ -80,12 +80,12 @@ class LidarAhead:
         direction = direction_of_motion(position, pose[:3, 0], motion)
         around = self._around(sweep, pose, T_base_lidar, direction)
         nearest = self._nearest(deskew(around.near, poses, T_base_lidar, position), position, direction)
-        if nearest is None and around.ahead.min() < settings.min_ahead:
-            return Ahead(None, _not_seen(around.ahead))
-        if nearest is None and around.down < settings.min_ahead:
-            return Ahead(None, f"the LiDAR does not look down to the way ahead: {around.down} returns from so low")
-        if nearest is None and gone is not None and _towards(direction @ pose[:3, :3] @ T_base_lidar[:3, :3], gone):
-            return Ahead(None, "the LiDAR has just lost its returns from where the vehicle goes")
+        if around.ahead.min() < settings.min_ahead:
+            return Ahead(nearest, _not_seen(around.ahead))
+        if around.down < settings.min_ahead:
+            return Ahead(nearest, f"the LiDAR does not look down to the way ahead: {around.down} returns from so low")
+        if gone is not None and _towards(direction @ pose[:3, :3] @ T_base_lidar[:3, :3], gone):
+            return Ahead(nearest, "the LiDAR has just lost its returns from where the vehicle goes")
         return Ahead(nearest)
 
     def _nearest(self, points: NDArray[np.float32], position: Floats, direction: Floats) -> Nearest | None:

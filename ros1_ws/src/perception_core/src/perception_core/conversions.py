@@ -62,13 +62,12 @@ def is_rigid(transform: Transform) -> bool:
 
 
 def obstacle_message(stamp_ns: int, source: str, nearest: Nearest | None, unknown: str = "") -> Obstacle:
-    """Return what one sensor says of one measurement: the nearest obstacle, that none is seen, or why that can't be said."""
+    """Return what one sensor says of one measurement: the nearest obstacle or none, and why nothing more can be said of the corridor."""
     stamp = Time(stamp_ns // NS, stamp_ns % NS)
     message = Obstacle(header=Header(stamp=stamp, frame_id=ODOMETRY), source=source, detected=nearest is not None, distance_m=math.inf)
     if nearest is not None:
         message.distance_m = nearest.distance_m
         message.nearest_enu_m = Point(*nearest.point_enu_m)
         message.size_m = Vector3(*nearest.size_m)
-    else:
-        message.unknown, message.reason = bool(unknown), unknown
+    message.unknown, message.reason = bool(unknown), unknown
     return message

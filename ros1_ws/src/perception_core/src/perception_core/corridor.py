@@ -80,7 +80,7 @@ class Nearest:
 
 @dataclass(frozen=True)
 class Ahead:
-    """What is ahead: the nearest obstacle, or None; then ``unknown`` says why the corridor can't be called free, or nothing."""
+    """What is ahead: the nearest obstacle that is seen, or None; ``unknown`` says why a nearer one may be there that is not seen."""
 
     nearest: Nearest | None
     unknown: str = ""

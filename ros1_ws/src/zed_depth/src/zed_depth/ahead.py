@@ -60,10 +60,8 @@ def look_ahead(
     points, areas = points_of(depth_m, geometry, wanted, stride_px=stride_px)
     in_map = points @ T_map_camera[:3, :3].T + T_map_camera[:3, 3]
     nearest = nearest_obstacle(in_map, pose[:3, 3], direction, settings.corridor, settings.support, areas)
-    if nearest is not None:
-        return Ahead(nearest)
     T_camera_map = np.asarray(np.linalg.inv(T_map_camera), dtype=np.float64)  # noqa: N806 -- T_target_source
-    return Ahead(None, _unknown(depth_m, geometry, T_camera_map, pose[:3, 3], direction, settings))
+    return Ahead(nearest, _unknown(depth_m, geometry, T_camera_map, pose[:3, 3], direction, settings))
 
 
 def _along(axis: Floats, depths_m: NDArray[np.float32], geometry: StereoGeometry, stride_px: int) -> NDArray[np.float32]:
@@ -84,7 +82,7 @@ def _unknown(
     direction: Floats,
     settings: ZedAheadSettings,
 ) -> str:
-    """Return why nothing can be said of the corridor though no obstacle is seen, or an empty text."""
+    """Return why an obstacle may be in the corridor that is not seen, or an empty text."""
     corridor = settings.corridor
     across, up = np.meshgrid(
         np.linspace(-corridor.half_width_m, corridor.half_width_m, GRID[0]),
