@@ -12,9 +12,12 @@ import pytest
 
 rospy = pytest.importorskip("rospy")
 
+import yaml  # noqa: E402
 from geometry_msgs.msg import Twist  # noqa: E402
-from std_msgs.msg import Empty, String  # noqa: E402
+from nav_msgs.msg import Odometry  # noqa: E402
+from std_msgs.msg import Empty, Header, String  # noqa: E402
 
+from alula.generate.scaffold.skeleton import files_of  # noqa: E402
 from alula_testing.waits import until  # noqa: E402
 
 NEEDED = ["PyYAML", "rospkg", "defusedxml", "netifaces", "ifaddr", "python-gnupg", "pycryptodome", "catkin_pkg"]
@@ -97,4 +100,37 @@ def test_the_dead_man_stops_a_robot(python: list[str], ros_master: str, start_no
     }
     assert states[-1]["calls"]["brake"]["said"].startswith("/old/brake: ")
     for part in (*subscribers, heart):
+        part.unregister()
+
+
+def test_the_base_of_a_new_robot_stops_when_the_managers_are_silent(python: list[str], ros_master: str, start_node, tmp_path: Path) -> None:
+    """What `alula new robot` makes for the base's computer, which has nothing of the library."""
+    files = files_of("cart")
+    base = tmp_path / "base"
+    base.write_text(files["ros1_ws/src/cart_base/scripts/base"], encoding="utf-8")
+    rospy.set_param("/alula_base", yaml.safe_load(files["ros1_ws/src/cart_base/config/dead_man.yaml"]))
+    speeds: list[float] = []
+    states: list[dict] = []
+    subscribers = [
+        rospy.Subscriber("/cart/odom", Odometry, lambda message: speeds.append(message.twist.twist.linear.x)),
+        rospy.Subscriber("/alula_base/state", String, lambda message: states.append(json.loads(message.data))),
+    ]
+    heart, commands = rospy.Publisher("/cart/alive", Header, queue_size=1), rospy.Publisher("/cart/cmd_vel", Twist, queue_size=1)
+    for script in (base, SCRIPT):
+        start_node([*python, PATH + WATCH, places(), str(script)])
+    # The base listens to its driver and to the dead man.
+    until(lambda: speeds and states and heart.get_num_connections() and commands.get_num_connections(), what="both nodes are there")
+
+    def under_way() -> bool:
+        heart.publish(Header())
+        twist = Twist()
+        twist.linear.x = 0.5
+        commands.publish(twist)
+        return speeds[-1] == 0.5 and states[-1]["state"] == "heard"
+
+    until(under_way, what="it drives", every_s=0.1)
+    until(lambda: speeds[-1] == 0.0, what="it stands")
+    until(lambda: states[-1]["calls"]["wheels"]["done"], what="that is told")
+    assert states[-1]["state"] == "silent"
+    for part in (*subscribers, heart, commands):
         part.unregister()
