@@ -29,13 +29,14 @@ sys.path += sys.argv.pop(1).split(":")  # behind this Python's own packages
 REPORT = """
 from std_msgs.msg import Header, UInt8MultiArray
 from resource_reporter import calls, ledger, reporter
+import node_core.ros
 calls.publisher.cache_info()
 told = calls.plain([Header(seq=1, frame_id="a"), UInt8MultiArray(data=(1, 2))])
 json.dump({"version": sys.version_info[:2], "told": told}, sys.stdout)
 """
 WATCH = 'runpy.run_path(sys.argv.pop(1), run_name="__main__")'
 SCRIPT = Path(__file__).parents[1] / "scripts/dead_man"
-SOURCES = ("resource_reporter/src", "alula_base/src")
+SOURCES = ("resource_reporter/src", "alula_base/src", "node_core/src")
 
 
 @pytest.fixture(scope="module", params=["3.8", "3.9"])
