@@ -1,12 +1,29 @@
-"""The skillset interface over rclpy: ``SkillsetNode`` (managers), ``SkillsetClient``, ``Robot``, ``ActionClient``, their executor."""
+"""The skillset interface over rclpy: managers, clients, and bases of skills whose function is an action or a service."""
 
 from alula.runtime.handle import SkillHandle
 from skillset_ros2.action_client import ActionClient
+from skillset_ros2.action_skill import ActionSkill
 from skillset_ros2.base import QUIET
 from skillset_ros2.client import SkillsetClient
 from skillset_ros2.executor import NodeExecutor
+from skillset_ros2.function_skill import Ending
 from skillset_ros2.node import SkillsetNode
 from skillset_ros2.robot import Robot
+from skillset_ros2.service_skill import ServiceSkill
 from skillset_ros2.spin import run_skillset
+from skillset_ros2.watch import Watch
 
-__all__ = ["QUIET", "ActionClient", "NodeExecutor", "Robot", "SkillHandle", "SkillsetClient", "SkillsetNode", "run_skillset"]
+__all__ = [
+    "QUIET",
+    "ActionClient",
+    "ActionSkill",
+    "Ending",
+    "NodeExecutor",
+    "Robot",
+    "ServiceSkill",
+    "SkillHandle",
+    "SkillsetClient",
+    "SkillsetNode",
+    "Watch",
+    "run_skillset",
+]

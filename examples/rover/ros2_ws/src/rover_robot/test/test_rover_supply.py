@@ -5,8 +5,8 @@ from __future__ import annotations
 from types import SimpleNamespace
 
 import pytest
+from skillset_ros2 import Watch
 
-from rover_robot.hooks.clock import Watch
 from rover_robot.hooks.power import HOME_S, RESERVE, Battery, Supply
 
 

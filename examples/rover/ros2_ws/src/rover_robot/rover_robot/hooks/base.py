@@ -14,9 +14,9 @@ from base_managers.hooks import (
 )
 from geometry_msgs.msg import Twist
 from nav_msgs.msg import Odometry
+from skillset_ros2 import Watch
 
-from rover_robot.hooks.clock import Watch
-from rover_robot.hooks.journey import Journey
+from rover_robot.hooks.journey import Journey, ends
 
 if TYPE_CHECKING:
     from alula import Execution, SkillHooks
@@ -28,25 +28,31 @@ STANDS_M_S, STANDS_RAD_S = 0.01, 0.02
 class DriveTo(Journey, AbstractDriveToSkill):
     """By the navigation's plan."""
 
+    server = "move_base"
+
 
 class FollowCorridor(Journey, AbstractFollowCorridorSkill):
     """Between two walls."""
+
+    server = "follow_corridor"
 
 
 class Creep(Journey, AbstractCreepSkill):
     """Without the laser."""
 
+    server = "creep"
+
 
 class Dock(Journey, AbstractDockSkill):
     """Into the dock."""
 
-    arrived = "DOCKED"
+    server, results = "dock", ends("DOCKED")
 
 
 class Localise(Journey, AbstractLocaliseSkill):
     """Where it is: the localisation turns the rover."""
 
-    arrived, blocked, aborted = "FOUND", "LOST", "LOST"
+    server, results, lost = "localize", ends("FOUND", "LOST"), "LOST"
 
 
 class StopHere(AbstractStopHereSkill):
@@ -83,10 +89,10 @@ def make_hooks(node: Node) -> dict[str, SkillHooks]:
     """Make the hooks of all skills."""
     watch = Watch(node)
     return {
-        "drive_to": DriveTo(node, watch, "move_base"),
-        "follow_corridor": FollowCorridor(node, watch, "follow_corridor"),
-        "creep": Creep(node, watch, "creep"),
-        "dock": Dock(node, watch, "dock"),
-        "localise": Localise(node, watch, "localize"),
+        "drive_to": DriveTo(watch),
+        "follow_corridor": FollowCorridor(watch),
+        "creep": Creep(watch),
+        "dock": Dock(watch),
+        "localise": Localise(watch),
         "stop_here": StopHere(node, watch),
     }

@@ -2,18 +2,19 @@
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, ClassVar
 
 from alula import SkillHooks
 from cargo_managers.hooks import AbstractAskSkill, AbstractLoadSkill, AbstractOpenDoorSkill, AbstractUnloadSkill
+from skillset_ros2 import ServiceSkill, Watch
 from std_msgs.msg import String
 from std_srvs.srv import SetBool
 
-from rover_robot.hooks.clock import Watch
-
 if TYPE_CHECKING:
+    from collections.abc import Mapping
+
     from alula import Execution
-    from rclpy.client import Client
+    from cargo_managers.inputs import OpenDoorInputs
     from rclpy.node import Node
 
 ANSWER = "done "
@@ -86,47 +87,23 @@ class Unload(Question, AbstractUnloadSkill):
         return f"Please take the parcel {inputs.parcel} out of my box."  # type: ignore[attr-defined]
 
 
-class OpenDoor(AbstractOpenDoorSkill):
-    """Calls the building's service of the door."""
+class OpenDoor(ServiceSkill, AbstractOpenDoorSkill):
+    """Calls the building's service of the door; an interruption waits no more: a door may be open."""
 
-    def __init__(self, node: Node, watch: Watch) -> None:
-        self._node, self._watch = node, watch
-        self._execution: Execution | None = None
-        self._clients: dict[str, Client[SetBool.Request, SetBool.Response]] = {}
-        self._called_s = 0.0
-        watch.every(self._look)
+    service, server, answer_s = SetBool, "door", DOOR_S
+    results: ClassVar[Mapping[bool, str]] = {True: "OPEN", False: "SHUT"}
+    lost = "UNREACHABLE"
 
-    def on_dispatch(self, execution: Execution) -> None:
-        """Call it."""
-        self._called_s, self._execution = self._watch.now_s, execution
-        service = self._client(execution.inputs.door)
-        service.call_async(SetBool.Request(data=True)).add_done_callback(lambda future: self._on_answer(execution, future.result()))
+    def server_for(self, inputs: OpenDoorInputs) -> str:
+        """Return the service of the door."""
+        return f"{self.server}/{inputs.door}/open"
 
-    def on_interrupt(self, execution: Execution) -> None:
-        """Wait no more: a door may be open."""
-        if execution is self._execution:
-            self._execution = None
-
-    def _client(self, door: str) -> Client[SetBool.Request, SetBool.Response]:
-        """Return the one client of a door."""
-        if door not in self._clients:
-            self._clients[door] = self._node.create_client(SetBool, f"door/{door}/open")
-        return self._clients[door]
-
-    def _on_answer(self, execution: Execution, answer: SetBool.Response) -> None:
-        if execution is self._execution:
-            self._execution = None
-            end = self.terminated_OPEN if answer.success else self.terminated_SHUT
-            end(execution, answer.message)
-
-    def _look(self) -> None:
-        execution = self._execution
-        if execution is not None and self._watch.now_s - self._called_s > DOOR_S:
-            self._execution = None
-            self.terminated_UNREACHABLE(execution, f"the building does not answer for {DOOR_S:g} s")
+    def request(self, _inputs: object) -> SetBool.Request:
+        """Ask for the door to be opened."""
+        return SetBool.Request(data=True)
 
 
 def make_hooks(node: Node) -> dict[str, SkillHooks]:
     """Make the hooks of all skills."""
     watch = Watch(node)
-    return {name: make(node, watch) for name, make in (("ask", Ask), ("load", Load), ("unload", Unload), ("open_door", OpenDoor))}
+    return {"ask": Ask(node, watch), "load": Load(node, watch), "unload": Unload(node, watch), "open_door": OpenDoor(watch)}

@@ -7,9 +7,8 @@ from typing import TYPE_CHECKING, Any
 from alula import SkillHooks
 from perception_managers.hooks import AbstractBumperSkill, AbstractScanSkill
 from sensor_msgs.msg import LaserScan
+from skillset_ros2 import Watch
 from std_msgs.msg import Bool
-
-from rover_robot.hooks.clock import Watch
 
 if TYPE_CHECKING:
     from alula import Execution

@@ -7,8 +7,7 @@ from typing import TYPE_CHECKING
 
 from power_managers.hooks import AbstractChargeSkill, AbstractSupplySkill
 from sensor_msgs.msg import BatteryState
-
-from rover_robot.hooks.clock import Watch
+from skillset_ros2 import Watch
 
 if TYPE_CHECKING:
     from alula import Execution, SkillHooks

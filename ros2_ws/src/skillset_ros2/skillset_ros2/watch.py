@@ -1,21 +1,19 @@
-"""The mission clock of a node, and what is asked several times a second of it."""
+"""The mission clock of a node, and what hooks ask several times a second of it."""
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING
+from collections.abc import Callable
 
-if TYPE_CHECKING:
-    from collections.abc import Callable
-
-    from rclpy.node import Node
+from rclpy.node import Node
 
 PERIOD_S = 0.2
 
 
 class Watch:
-    """Calls what it is given every 0.2 s of mission clock."""
+    """Calls what it is given every 0.2 s of mission clock, on the executor of its node: one timer for all hooks of a node."""
 
     def __init__(self, node: Node) -> None:
+        self.node = node
         self._clock = node.get_clock()
         self._looks: list[Callable[[], None]] = []
         node.create_timer(PERIOD_S, self._look)
