@@ -21,7 +21,9 @@ from alula.common.robots import RobotError, find_robot
 from alula.missions.drawing import draw, drawn_as_text
 from alula.missions.part import NO_PART
 from alula.trees.answers import Answers, AnswersError, StepClock, read_answers, scripted_tree, ticks
+from alula.trees.document import read_document
 from alula.trees.errors import TreeError, did_you_mean
+from alula.trees.format3 import DECLARED, OLD, convert
 from alula.trees.library import Library
 from alula.trees.palette import Palette
 from alula.trees.reading import TreeFiles, read_files
@@ -45,6 +47,8 @@ def run(given: argparse.Namespace) -> int:
     """Do what is asked for; raises AnswersError, TreeError, OSError."""
     if given.ticks is not None and (given.ticks < 0 or given.answers is None):
         raise AnswersError(f"--ticks {given.ticks}: is a number of ticks, and goes with --answers FILE")
+    if given.to is not None or given.out is not None:
+        return converted(given)
     found = mains(given.files, given.main, given.package)
     for option in ("svg", "answers"):
         if getattr(given, option) is not None and found[1:]:
@@ -61,6 +65,23 @@ def run(given: argparse.Namespace) -> int:
             write_text(given.svg, draw(view, title))
         if given.answers is None:
             sys.stdout.write(json.dumps(view.as_dict()) + "\n" if given.json else drawn_as_text(view, title))
+    return 0
+
+
+def converted(given: argparse.Namespace) -> int:
+    """Write a file of format 3 as one of format 4, and tell what a person has to decide; raises TreeError, OSError."""
+    if given.to is None or len(given.files) != 1 or given.files[0].is_dir():
+        raise TreeError("--to 4 FILE --out FILE converts one file; of what it includes, each file by itself")
+    document = read_document(given.files[0])
+    if document.root.tag != "root" or document.root.get(DECLARED, OLD) != OLD:
+        raise TreeError(f"{given.files[0]}: is no file of BehaviorTree.CPP 3; there is nothing to convert")
+    decisions = convert(document)
+    if given.out is None:
+        sys.stdout.write(document.text())
+    else:
+        write_text(given.out, document.text())
+    for problem in decisions:
+        sys.stderr.write(f"{problem}\n")
     return 0
 
 

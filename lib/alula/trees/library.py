@@ -9,6 +9,7 @@ from pathlib import Path
 
 from alula.trees.document import Document, Element, read_document, read_source
 from alula.trees.errors import FileError, Problem, Report
+from alula.trees.format3 import modernised
 from alula.trees.palette import CATEGORIES, Category, Direction, NodeType, Port, node_type
 from alula.trees.values import ANY, TYPES
 
@@ -52,7 +53,7 @@ class Library:
             if path.resolve() in self.documents:
                 continue
             try:
-                document = read_document(path)
+                document = modernised(read_document(path))
             except FileError as error:
                 self.broken.append(error.problem)
                 continue

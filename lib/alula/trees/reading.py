@@ -9,10 +9,10 @@ from pathlib import Path
 
 from alula.trees.document import Document, Element, parse_document, read_document
 from alula.trees.errors import FileError, Problem, Report, did_you_mean, refuse
+from alula.trees.format3 import FORMAT, modernised
 from alula.trees.library import MODELS, PROJECT, Library, models_of
 from alula.trees.palette import CATEGORIES, Category, NodeType, Palette
 
-FORMAT = "4"
 FORBIDDEN = re.compile(r"""[\x00-\x20\x7f<>&"'/\\:*?|.]""")
 """What the ID of a tree must not have in it since BehaviorTree.CPP 4.8.4."""
 PRECONDITIONS = ("_failureIf", "_successIf", "_skipIf", "_while")
@@ -84,14 +84,14 @@ def read_files(path: Path, report: Report = refuse, *, main: str = "", library: 
         FileError: a file can't be read or is no XML; all else goes to ``report``.
     """
     library = library or Library()
-    document = library.documents.get(path.resolve()) or read_document(path)
+    document = library.documents.get(path.resolve()) or modernised(read_document(path))
     return _read(document, path, report, main, library, whole=whole)
 
 
 def read_models(path: Path) -> Palette:
     """Return the types of node that a file tells of in its TreeNodesModel; it may have no trees. Raises FileError."""
     files = TreeFiles()
-    _Reader(files, refuse, Library()).add(read_document(path), (path.resolve(),))
+    _Reader(files, refuse, Library()).add(modernised(read_document(path)), (path.resolve(),))
     return files.declared()
 
 
@@ -99,7 +99,7 @@ def read_text(
     text: str | bytes, path: str = "<text>", report: Report = refuse, *, main: str = "", library: Library | None = None, whole: bool = True
 ) -> TreeFiles:
     """Read the text of a file; what it includes is looked for beside ``path``. Takes and raises what `read_files` does."""
-    return _read(parse_document(text, path), Path(path), report, main, library or Library(), whole=whole)
+    return _read(modernised(parse_document(text, path)), Path(path), report, main, library or Library(), whole=whole)
 
 
 def _read(document: Document, path: Path, report: Report, main: str, library: Library, *, whole: bool) -> TreeFiles:
@@ -216,7 +216,7 @@ class _Reader:
                 cure = "the path counts from the package on" if element.get("ros_pkg") else "the path counts from this file on"
                 self._report(Problem(element.place_of("path"), f"there is no file {path}", cure))
                 return
-            self.add(self._library.documents.get(path.resolve()) or read_document(path), (*chain, path.resolve()))
+            self.add(self._library.documents.get(path.resolve()) or modernised(read_document(path)), (*chain, path.resolve()))
 
     def _define(self, element: Element, trees: int) -> None:
         if element.tag == "BehaviorTree":

@@ -114,9 +114,9 @@ def test_includes_are_read_once_and_from_their_own_folder(tmp_path):
 
 def test_a_checker_gets_all_that_is_wrong():
     problems: list[Problem] = []
-    read_text('<root BTCPP_format="3"><include/><BehaviorTree/><BehaviorTree ID="a"/></root>', "f.xml", problems.append)
+    read_text('<root BTCPP_format="5"><include/><BehaviorTree/><BehaviorTree ID="a"/></root>', "f.xml", problems.append)
     assert [str(problem) for problem in problems] == [
-        "f.xml:1:7: is of BehaviorTree.CPP 3; format 4 is read",
+        "f.xml:1:7: is of BehaviorTree.CPP 5; format 4 is read",
         'f.xml:1:24: <include> has no path; write <include path="other.xml"/>',
         "f.xml:1:34: <BehaviorTree> has no ID; name it: the file has several",
         "f.xml:1:34: the tree '' has 0 nodes at its top; it needs one",

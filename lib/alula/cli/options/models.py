@@ -8,6 +8,7 @@ from pathlib import Path
 from alula.cli.parser import completed_by
 
 NOTATIONS = ("paper", "rl")
+FORMAT = "4"
 SHELLS = ("bash", "zsh", "fish")
 PROOFS_S = 30.0
 TICKS = 10
@@ -92,6 +93,8 @@ def tree(parser: ArgumentParser) -> None:
     parser.add_argument("--palette", type=Path, action="append", default=[], metavar="FILE", help=PALETTE_HELP)
     _trees(parser)
     parser.add_argument("--answers", type=Path, metavar="FILE", help='what leaves answer: {"leaf name": ["RUNNING", "SUCCESS"], ...}')
+    parser.add_argument("--to", choices=[FORMAT], help="convert a file of BehaviorTree.CPP 3 instead, and tell what is left to decide")
+    parser.add_argument("--out", type=Path, metavar="FILE", help="with --to, where it is written (default: the standard output)")
     parser.add_argument("--ticks", type=int, metavar="N", help=f"with answers, how often it is ticked ({TICKS})")
     parser.add_argument("--json", action="store_true", help="print the tree, or each tick, as JSON")
 
