@@ -68,10 +68,12 @@ def check(
     *,
     beside: Beside = Beside(),
     foreign: bool = False,
+    of_others: bool = False,
 ) -> list[Problem]:
     """Return what is wrong with the files, each thing once, in the order of the source; ``rules`` are more than those of trees alone.
 
-    The blackboard of a ``foreign`` mission may be filled from outside with what no file tells of.
+    The blackboard of a ``foreign`` mission may be filled from outside with what no file tells of; trees ``of_others`` have nodes that no
+    file declares.
     """
     found: list[Problem] = []
 
@@ -81,7 +83,7 @@ def check(
         found.append(problem)
 
     with suppress(_Enough):
-        verify(files, palette, report)
+        verify(files, palette, report, of_others=of_others)
     if files.trees and not any(problem.code in ENDLESS for problem in found):
         found += _wholes(files, palette, traits, (*RULES, *rules), beside, foreign=foreign)
     places: dict[tuple[object, ...], Problem] = {}

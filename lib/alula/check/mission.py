@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections import Counter
 from collections.abc import Sequence
 from dataclasses import replace
 from pathlib import Path
@@ -50,14 +51,34 @@ def check_mission(
     rules = SkillRules(skills)
     known = palette_for(files, skillsets, palettes, part)
     own = (rules.units, rules.results, rules.resources, NameRules(skills).names)
-    found += check(files, known, SkillTraits(skills), own, beside=BESIDE, foreign=bool(palettes) or of_others)
-    if not palettes and (problem := no_class(files, known)) is not None:
+    found += check(files, known, SkillTraits(skills), own, beside=BESIDE, foreign=bool(palettes) or of_others, of_others=of_others)
+    if of_others:
+        found = _told_once(found)
+    if not palettes and not of_others and (problem := no_class(files, known)) is not None:
         found.append(replace(problem, warning=True))
     endless = [problem for problem in found if problem.code.startswith("ALU0")]
     if endless:
         raise FileError(endless[0])
     spelled_out = {problem.place for problem in found if problem.code == "ALU606"}
     return [problem for problem in found if problem.code != "ALU605" or problem.place not in spelled_out]
+
+
+_ONCE = {
+    "ALU607": "and so it is in {} more places, which is right where the program writes them",
+    "ALU611": "and so it is in {} more places",
+}
+"""Warnings about trees of others of which a file tells the first only."""
+
+
+def _told_once(problems: Sequence[Problem]) -> list[Problem]:
+    """Return problems with but one of a kind that depends on a program which nobody knows."""
+    counts = Counter((one.code, one.place.path) for one in problems if one.warning and one.code in _ONCE)
+    told: list[Problem] = []
+    for one in problems:
+        count = counts.pop((one.code, one.place.path), 0) if one.warning and one.code in _ONCE else 1
+        if count:
+            told.append(replace(one, message=f"{one.message}, {_ONCE[one.code].format(count - 1)}") if count > 1 else one)
+    return told
 
 
 def palette_for(files: TreeFiles, skillsets: Sequence[Skillset], palettes: Sequence[Path], part: MissionPart) -> Palette:

@@ -1,5 +1,7 @@
 """``alula palette FOLDER``: the skills, resources and own nodes of a robot as a TreeNodesModel, which Groot2 imports.
 
+Of a folder of trees: what their models declare, or with ``--guess`` what they use and nobody declares.
+
 Ends with 0, and with 2 when a model is wrong or can't be read.
 """
 
@@ -19,8 +21,12 @@ from alula.language.fleet import load_models
 from alula.language.models import ModelFile, check_files, models_in
 from alula.missions.palette import mission_palette
 from alula.missions.part import NO_PART
+from alula.trees import nav2
+from alula.trees.errors import FileError, TreeError
 from alula.trees.groot.tree_xml import model_xml
-from alula.trees.palette import NodeType
+from alula.trees.guessing import guessed_types
+from alula.trees.library import Library
+from alula.trees.palette import Category, NodeType, Palette
 from alula.trees.standard import standard_palette
 
 COMMAND = "alula palette"
@@ -31,12 +37,42 @@ def main(words: Sequence[str] | None = None) -> int:
     """Write the palette to the standard output; return the exit code."""
     given = parse("palette", words)
     try:
-        types = list(robot_types(given.folder))
+        types = list(tree_types(given.places, guess=given.guess))
     except LanguageError as error:
         sys.stderr.write(f"{error}\n")
         return WRONG
+    except TreeError as error:
+        sys.stderr.write(f"{COMMAND}: {error}\n")
+        return WRONG
     sys.stdout.write(model_xml(types))
     return 0
+
+
+def tree_types(places: Sequence[str], *, guess: bool) -> Iterator[NodeType]:
+    """Yield what trees of others declare, or what they use and nobody declares; of a robot's models what its missions have.
+
+    Raises:
+        LanguageError, TreeError: a model has errors, or a file can't be read.
+    """
+    library = Library()
+    library.add(path for place in map(Path, places) for path in ([place] if place.is_file() else library.files(place)))
+    if library.broken and not library.documents:
+        raise FileError(library.broken[0])
+    for problem in library.broken:
+        warner(COMMAND)(str(problem))
+    if not library.documents and not guess and len(places) == 1:
+        yield from robot_types(places[0])
+        return
+    if not library.documents:
+        raise TreeError(f"{places[0]}: there are no trees, so there is nothing to tell of")
+    declared = [one for one in library.models.values() if one.category is not Category.SUBTREE]
+    if not guess:
+        yield from declared
+        return
+    known = Palette({one.name: one for one in (*declared, *nav2.palette(), *mission_palette((), NO_PART))}.values())
+    found = [one for one in guessed_types(library.elements(), known) if one.name not in library.trees]
+    warner(COMMAND)(f"{len(found)} nodes are guessed from their uses: look at categories, directions and types before you rely on them")
+    yield from found
 
 
 def robot_types(folder: str) -> Iterator[NodeType]:

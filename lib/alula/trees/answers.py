@@ -12,8 +12,9 @@ from alula.trees.blackboard import Clock
 from alula.trees.document import Element
 from alula.trees.errors import TickError, did_you_mean
 from alula.trees.factory import make_tree
+from alula.trees.guessing import category_of
 from alula.trees.node import Action, Control, Node, Wiring
-from alula.trees.palette import CATEGORIES, CHILDREN, Category, Direction, NodeType, Palette, Port, node_type
+from alula.trees.palette import CHILDREN, Category, Direction, NodeType, Palette, Port, node_type
 from alula.trees.reading import TreeFiles, is_port, node_name, type_name
 from alula.trees.status import ANSWERS, IDLE, NAMES, Answer
 from alula.trees.tree import Tree
@@ -189,8 +190,5 @@ def _uses(files: TreeFiles) -> dict[str, list[Element]]:
 
 def _guessed(name: str, uses: Collection[Element]) -> NodeType:
     """Return a type by what its uses in files show."""
-    tag = next((use.tag for use in uses if use.tag in CATEGORIES), "")
-    most = max(len(use.children) for use in uses)
-    category = CATEGORIES[tag] if tag else (Category.ACTION, Category.DECORATOR)[most] if most < 2 else Category.CONTROL
     ports = dict.fromkeys(attribute for use in uses for attribute in use.attributes if is_port(attribute))
-    return node_type(name, category, [Port(port, direction=Direction.INOUT) for port in ports])
+    return node_type(name, category_of(name, uses), [Port(port, direction=Direction.INOUT) for port in ports])

@@ -85,6 +85,11 @@ class Library:
                 for model in models_of(element, ignore):
                     self.models.setdefault(model.name, model)
 
+    def elements(self) -> Iterator[Element]:
+        """Yield all trees, file by file, also those without an ID."""
+        for document in self.documents.values():
+            yield from (one for one in document.root.children if one.tag == "BehaviorTree")
+
     def tree(self, name: str, user: str) -> Element | None:
         """Return the tree of a name that a file uses: the one nearest to it, of equally near ones the first; None where there is none."""
         folder = Path(user).parent.resolve()

@@ -2,10 +2,12 @@
 
 from __future__ import annotations
 
+import difflib
 from collections.abc import Iterator
 
 from alula.trees.document import DEEPEST, Attribute, Element
 from alula.trees.errors import Problem, Report, did_you_mean, refuse
+from alula.trees.guessing import guessed_types
 from alula.trees.node import pointer
 from alula.trees.palette import CATEGORIES, Direction, NodeType, Palette
 from alula.trees.reading import TreeFiles, is_port, type_name
@@ -14,9 +16,18 @@ MOST_NODES = 65_535
 """A node's uid has 16 bits in Groot2's protocol."""
 
 
-def verify(files: TreeFiles, palette: Palette, report: Report = refuse) -> None:
-    """Report what is wrong with any tree of the files."""
+ALIKE = 0.9
+"""From here on a name that nobody knows is a slip of the pen, not a node of one's own."""
+SHOWN = 5
+"""Names of nodes that one message shows."""
+
+
+def verify(files: TreeFiles, palette: Palette, report: Report = refuse, *, of_others: bool = False) -> None:
+    """Report what is wrong with any tree of the files; of trees ``of_others``, what nobody has declared is one warning."""
     _verify_uses(files, report)
+    if of_others:
+        known = [*palette, *_undeclared(files, palette, report)]
+        palette = Palette(known)
     for name, tree in files.trees.items():
         if palette.get(name) is not None:
             report(Problem(tree.place_of("ID"), f"the tree '{name}' has the name of a node", "call it otherwise"))
@@ -57,6 +68,28 @@ def _verify_uses(files: TreeFiles, report: Report) -> None:
         more = f", which is used {len(uses)} times" if uses[1:] else ""
         cure = did_you_mean(name, files.trees) or "include the file that has it, or give that file or its folder, too"
         report(Problem(uses[0].place_of("ID"), f"there is no tree '{name}'{more}", cure, code="ALU617"))
+
+
+def _undeclared(files: TreeFiles, palette: Palette, report: Report) -> list[NodeType]:
+    """Report the nodes of the files that nobody has declared, and return what their uses show; names that are slips are left out."""
+    own = {document.path for document in files.documents}
+    guessed = guessed_types(files.trees.values(), palette)
+    first: dict[str, Element] = {}
+    for tree in files.trees.values():
+        for element in tree.iterate():
+            first.setdefault(type_name(element), element)
+    guessed = [
+        one
+        for one in guessed
+        if one.name not in files.trees and not difflib.get_close_matches(one.name, palette.names(), n=1, cutoff=ALIKE)
+    ]
+    told = sorted((one for one in guessed if first[one.name].place.path in own), key=lambda one: first[one.name].place.line)
+    if told:
+        names = ", ".join(one.name for one in told[:SHOWN]) + (", ..." if told[SHOWN:] else "")
+        message = f"{len(told)} nodes are not declared: {names}" if told[1:] else f"the node '{names}' is not declared"
+        cure = "`alula palette --guess FOLDER` makes a first list of them, for `--palette`"
+        report(Problem(first[told[0].name].place, message, cure, "ALU601", warning=True))
+    return guessed
 
 
 def _verify_subtree(element: Element, files: TreeFiles, report: Report) -> None:

@@ -189,8 +189,8 @@ def test_a_palette_tells_of_foreign_nodes(tmp_path, capsys, monkeypatch):
     )
     mission = tmp_path / "drive.xml"
     mission.write_text(whole('<Drive speed="1"/>'))
-    assert main([str(mission)]) == 1
-    assert "unknown node 'Drive'" in capsys.readouterr().out
+    assert main([str(mission)]) == 0  # a tree of another program, which may have such a node
+    assert "warning ALU601: the node 'Drive' is not declared" in capsys.readouterr().out
     assert main([str(mission), "--palette", str(palette)]) == 0
     assert capsys.readouterr().out == f"{mission}: ok\n"
     mission.write_text(whole('<Drive speed="fast"/>'))

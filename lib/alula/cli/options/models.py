@@ -101,7 +101,9 @@ def tree(parser: ArgumentParser) -> None:
 
 def palette(parser: ArgumentParser) -> None:
     """Add what ``alula palette`` takes."""
-    parser.add_argument("folder", metavar="FOLDER", help="the robot's models, as skillsets/uav")
+    of_trees = "or trees of others: what they declare"
+    parser.add_argument("places", nargs="+", metavar="FOLDER", help=f"the robot's models, as skillsets/uav; {of_trees}")
+    parser.add_argument("--guess", action="store_true", help="of trees of others, what they use and nobody declares, as its uses show")
 
 
 def generate(parser: ArgumentParser) -> None:

@@ -1,0 +1,105 @@
+"""Nodes that nobody has declared: told once, and guessed from their uses."""
+
+import pytest
+
+from alula.check.findings import findings_of
+from alula.cli.palette import main
+from alula.trees.guessing import guessed_types
+from alula.trees.palette import Category, Direction
+from alula.trees.reading import read_models, read_text
+from alula.trees.standard import standard_palette
+from alula.trees.values import ANY, BOOL, DOUBLE, INT, STRING
+
+TEXT = """<root BTCPP_format="4">
+  <BehaviorTree ID="Main">
+    <Sequence>
+      <IsReady/>
+      <FindObject name="find" label="cup" pose="{pose}" result_count="{n}"/>
+      <Careful limit="2.5"><Grasp pose="{pose}" force="3" gentle="true"/></Careful>
+      <Careful limit="3"><Grasp pose="{pose}" force="4" gentle="false" tool="{tool}"/></Careful>
+      <Choose><AlwaysSuccess/><AlwaysFailure/></Choose>
+      <Condition ID="Seen" object="cup"/>
+      <Sleep msec="{pause}"/>
+      <Pause msec="{pause}"/>
+    </Sequence>
+  </BehaviorTree>
+</root>
+"""
+GUESSED = {
+    "IsReady": (Category.CONDITION, {}),
+    "FindObject": (
+        Category.ACTION,
+        {"label": (Direction.INPUT, STRING), "pose": (Direction.OUTPUT, ANY), "result_count": (Direction.OUTPUT, ANY)},
+    ),
+    "Careful": (Category.DECORATOR, {"limit": (Direction.INPUT, DOUBLE)}),
+    "Grasp": (
+        Category.ACTION,
+        {
+            "pose": (Direction.INPUT, ANY),
+            "force": (Direction.INPUT, INT),
+            "gentle": (Direction.INPUT, BOOL),
+            "tool": (Direction.INPUT, ANY),
+        },
+    ),
+    "Choose": (Category.CONTROL, {}),
+    "Seen": (Category.CONDITION, {"object": (Direction.INPUT, STRING)}),
+    "Pause": (Category.ACTION, {"msec": (Direction.INPUT, standard_palette().get("Sleep").ports["msec"].type)}),
+}
+
+
+def test_types_are_guessed_from_uses():
+    files = read_text(TEXT)
+    found = {one.name: one for one in guessed_types(files.trees.values(), standard_palette())}
+    assert {
+        name: (one.category, {port.name: (port.direction, port.type) for port in one.ports.values()}) for name, one in found.items()
+    } == GUESSED
+    assert found["Careful"].doc == "guessed from 2 uses, first <text>:6:7"
+
+
+def test_a_check_with_the_guess_finds_nothing_unknown(tmp_path, capsys):
+    (tmp_path / "main.xml").write_text(TEXT.replace(' ID="Main"', ""))
+    assert main([str(tmp_path), "--guess"]) == 0
+    out, err = capsys.readouterr()
+    assert err == "alula palette: 7 nodes are guessed from their uses: look at categories, directions and types before you rely on them\n"
+    assert "guessed from 2 uses" in out
+    guess = tmp_path / "guess.model"
+    guess.write_text(out)
+    assert {one.name for one in read_models(guess)} == set(GUESSED)
+    (told,) = findings_of("main.xml", TEXT.encode(), (), of_others=True, palettes=[guess])
+    assert told.code == "ALU607"  # `tool` and `pause`, which nothing writes
+    assert main([str(tmp_path / "main.xml"), str(guess), "--guess"]) == 0
+    assert "0 nodes are guessed" in capsys.readouterr().err
+    assert main([str(guess)]) == 0
+    assert capsys.readouterr().out.count("<Decorator ") == 1
+
+
+def test_undeclared_nodes_of_others_are_told_once_and_slips_one_by_one():
+    text = TEXT.replace("<Sleep ", "<Slepp ").replace("<Choose>", "<Sequencee>").replace("</Choose>", "</Sequencee>")
+    found = [(one.code, one.severity.value, one.message) for one in findings_of("m.xml", text.encode(), (), of_others=True)]
+    assert found[0] == ("ALU601", "warning", "7 nodes are not declared: IsReady, FindObject, Careful, Grasp, Seen, ...")
+    assert [one for one in found if one[0] == "ALU601"][1:] == [("ALU601", "error", "unknown node 'Sequencee'")]
+    ours = [one.severity.value for one in findings_of("m.xml", TEXT.encode(), ()) if one.code == "ALU601"]
+    assert ours == ["error"] * 9
+
+
+def test_a_program_writes_entries_which_is_told_once():
+    text = '<root BTCPP_format="4"><BehaviorTree ID="M"><Sequence><Sleep msec="{a}"/><Sleep msec="{b}"/></Sequence></BehaviorTree></root>'
+    (told,) = findings_of("m.xml", text.encode(), (), of_others=True)
+    assert told.message.endswith("nothing before writes it, and so it is in 1 more places, which is right where the program writes them")
+    assert len(findings_of("m.xml", text.encode(), ())) == 2
+
+
+def test_a_folder_without_trees_has_nothing_to_guess(tmp_path, capsys):
+    assert main([str(tmp_path), "--guess"]) == 2
+    assert capsys.readouterr().err == f"alula palette: {tmp_path}: there are no trees, so there is nothing to tell of\n"
+
+
+@pytest.mark.parametrize(
+    ("literals", "type_"),
+    [(("1", "2"), INT), (("1", "2.5"), DOUBLE), (("true", "FALSE"), BOOL), (("1", "x"), STRING), (("",), STRING), (("1e3",), DOUBLE)],
+)
+def test_types_of_literals(literals, type_):
+    nodes = "".join(f'<Go to="{one}"/>' for one in literals)
+    files = read_text(f'<root BTCPP_format="4"><BehaviorTree ID="M"><Sequence>{nodes}</Sequence></BehaviorTree></root>')
+    (found,) = guessed_types(files.trees.values(), standard_palette())
+    assert found.ports["to"].type is type_
