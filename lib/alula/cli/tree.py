@@ -8,7 +8,7 @@ from __future__ import annotations
 import argparse
 import json
 import sys
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from pathlib import Path
 
 from alula.check.mission import palette_for
@@ -49,14 +49,19 @@ def run(given: argparse.Namespace) -> int:
         raise AnswersError(f"--ticks {given.ticks}: is a number of ticks, and goes with --answers FILE")
     if given.to is not None or given.out is not None:
         return converted(given)
-    found = mains(given.files, given.main, given.package)
+    wrong: list[TreeError] = []
+    found = list(mains(given.files, given.main, given.package, wrong.append))
     for option in ("svg", "answers"):
         if getattr(given, option) is not None and found[1:]:
             raise TreeError(f"--{option}: is of one tree; choose it with `--main`: {', '.join(files.main for files in found)}")
     answers = Answers({}) if given.answers is None else read_answers(given.answers)
     for files in found:
         clock = StepClock()
-        tree = scripted_tree(files, palette(files, given.palette), answers, clock)
+        try:
+            tree = scripted_tree(files, palette(files, given.palette), answers, clock)
+        except TreeError as error:
+            wrong.append(error)
+            continue
         if given.answers is not None:
             for tick in ticks(tree, answers, TICKS if given.ticks is None else given.ticks, clock):
                 sys.stdout.write((tick.as_json() if given.json else tick.as_text()) + "\n")
@@ -65,7 +70,9 @@ def run(given: argparse.Namespace) -> int:
             write_text(given.svg, draw(view, title))
         if given.answers is None:
             sys.stdout.write(json.dumps(view.as_dict()) + "\n" if given.json else drawn_as_text(view, title))
-    return 0
+    for one in wrong:  # a file of a folder keeps no other from being drawn
+        sys.stderr.write(f"{COMMAND}: {one}\n")
+    return WRONG if wrong else 0
 
 
 def converted(given: argparse.Namespace) -> int:
@@ -85,11 +92,11 @@ def converted(given: argparse.Namespace) -> int:
     return 0
 
 
-def mains(places: Sequence[Path], main: str, packages: Mapping[str, Path]) -> list[TreeFiles]:
-    """Return each main tree of the first place with the files that it needs; the other places are a library for it.
+def mains(places: Sequence[Path], main: str, packages: Mapping[str, Path], wrong: Callable[[TreeError], object]) -> Iterator[TreeFiles]:
+    """Yield each main tree of the first place with the files that it needs; the other places are a library for it.
 
     Of a folder these are all trees that are a part of no other, of a file the one that it says, or all such where it says none; with
-    ``main`` the tree of that ID. Raises TreeError.
+    ``main`` the tree of that ID. ``wrong`` takes what keeps a file from being read. Raises TreeError.
     """
     library = Library(packages)
     paths = library.files(places[0])
@@ -105,14 +112,17 @@ def mains(places: Sequence[Path], main: str, packages: Mapping[str, Path]) -> li
         if having[1:]:
             raise TreeError(f"{having[0]}: '{main}' stands in {having[1]}, too; name the file that is meant")
         paths = [Path(having[0].path)]
-    found = []
     for path in paths:
-        files = read_files(path, main=main, library=library, whole=False)
-        if places[0].is_dir() and not main and (files.is_part or not files.trees):
+        try:
+            files = read_files(path, main=main, library=library, whole=False)
+            if places[0].is_dir() and not main and (files.is_part or not files.trees):
+                continue
+            tops = [files.main] if files.main else files.tops
+            found = [read_files(path, main=top, library=library) for top in tops or [""]]
+        except TreeError as error:
+            wrong(error)
             continue
-        tops = [files.main] if files.main else files.tops
-        found += [read_files(path, main=top, library=library) for top in tops or [""]]
-    return found
+        yield from found
 
 
 def palette(files: TreeFiles, more: Sequence[Path]) -> Palette:

@@ -110,6 +110,15 @@ def test_a_folder_is_drawn_tree_by_tree(tmp_path, capsys):
     assert main([str(tmp_path / "main.xml"), str(tmp_path), "--main", "Main"]) == 0
 
 
+def test_a_file_that_is_wrong_keeps_no_other_of_the_folder_from_being_drawn(tmp_path, capsys):
+    write(tmp_path, a=tree("A", "Gone"), b=TREE.format("B", ""), c=tree("C"))
+    (tmp_path / "d.xml").write_text("<root><BehaviorTree></root>")
+    assert main([str(tmp_path)]) == 2
+    out, err = capsys.readouterr()
+    assert out.startswith("c.xml: C\n")
+    assert sorted(line.partition(".xml")[0][-1] for line in err.splitlines()) == ["a", "b", "d"]
+
+
 def test_a_folder_without_trees_and_a_package_without_folder_are_refused(tmp_path, capsys):
     assert main([str(tmp_path)]) == 2
     assert capsys.readouterr().err == f"alula tree: {tmp_path}: there is no file of trees in this folder\n"
