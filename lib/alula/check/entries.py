@@ -22,10 +22,6 @@ from alula.trees.values import ANY, NUMBERS, STRING, TYPES
 NUMBER, TEXT, UNKNOWN = "a number", "a text", ""
 """What a script writes; a port writes what its type is called."""
 _NUMERIC = frozenset({NUMBER, *(one.name for one in NUMBERS)})
-_AT_ONCE = frozenset({"Parallel", "ParallelAll", "ReactiveSequence", "ReactiveFallback", "WhileDoElse", "PipelineSequence"})
-"""Nodes whose children are ticked in an order that their answers make: what one writes, any other may find."""
-
-
 _ASKED = frozenset(PRECONDITIONS)
 
 
@@ -79,7 +75,7 @@ class Uses:
     def _first(self, site: Site) -> Iterator[Use]:
         for attribute in scripts.before(site):
             yield from self._script(site, attribute)
-        if site.element.tag == "SubTree":
+        if site.is_subtree:
             yield from _constants(site)
             return
         yield from self._ports(site, write=False)
@@ -210,7 +206,7 @@ def read_too_early(root: Site, uses: Uses, given: Collection[str], others: Write
 
     def visit(site: Site) -> Iterator[Problem]:
         yield from judged(uses.before(site))
-        if site.kind in _AT_ONCE:
+        if goes_back(site):  # what one writes, any other may find
             by_then.update(use.key for child in site.children for use in uses.of(child) if use.write)
         unset: set[Key] = set()
         for child in site.children:
@@ -243,10 +239,16 @@ def _perhaps_unwritten(use: Use, writer: Use) -> Problem:
     return use.problem("ALU607", message, "have it from the start: an output port of the main tree's model, with a default")
 
 
+def goes_back(site: Site) -> bool:
+    """Tell whether a child of a node may be ticked after another one that stands behind it."""
+    return site.ticking.goes_back(len(site.children))
+
+
 def _unset(parent: Site, child: Site) -> tuple[Key, ...]:
     """Return the entry that a child has surely taken away when the next one's turn comes."""
     key = child.given("key") or ""
-    sure = parent.goes_on is SUCCESS and not any(one.kind in _AT_ONCE for one, _ in child.above())
+    in_order = parent.ticking.lists and parent.ticking.goes_on is SUCCESS
+    sure = in_order and not any(goes_back(one) for one, _ in child.above())
     if child.kind != "UnsetBlackboard" or not sure or pointer(key, "key") is not None or _ASKED.intersection(child.element.attributes):
         return ()
     return (child.board.key(key),)

@@ -11,10 +11,9 @@ from alula.check.traits import Traits
 from alula.trees.ends import ANY_END, Ends, whole_number
 from alula.trees.errors import Problem
 from alula.trees.nodes.parallel import threshold_of
-from alula.trees.palette import Category
 from alula.trees.status import FAILURE, SKIPPED, SUCCESS, Answer
+from alula.trees.ticking import AGAIN, Order
 
-REACTIVE = ("ReactiveSequence", "ReactiveFallback")
 _CONDITIONS: dict[str, Answer] = {"_skipIf": SKIPPED, "_while": SKIPPED, "_successIf": SUCCESS, "_failureIf": FAILURE}
 _WORDS: dict[Answer, str] = {FAILURE: "fails", SKIPPED: "is skipped", SUCCESS: "succeeds"}
 
@@ -51,15 +50,14 @@ class Reach:
         told = self._traits.ends(site)
         if told is not None:
             return told
-        if site.kind == "SubTree":
-            return self.ends(site.children[0]) if site.children else ANY_END
         known = site.described
         return ANY_END if known is None else known.may_end(site.given, [self.ends(child) for child in site.children])
 
 
 def needed(site: Site) -> int | None:
-    """Return how many children of a Parallel have to succeed; None where that is known when it is ticked only."""
-    count = whole_number(site.given, "success_count") if site.kind == "Parallel" else -1
+    """Return how many children of a node that ticks them at once have to succeed; None where that is known when it is ticked only."""
+    port = site.ticking.succeeds_after
+    count = whole_number(site.given, port) if port else -1
     return None if count is None else threshold_of(count, len(site.children))
 
 
@@ -86,10 +84,11 @@ def waits_in_vain(root: Site, reach: Reach, traits: Traits) -> Iterator[tuple[Pr
 
 def _waited(site: Site, reach: Reach) -> Iterator[tuple[Site, str]]:
     """Yield the children whose success a node waits for, with what that keeps from coming."""
-    if site.goes_on is SUCCESS:
+    ticking = site.ticking
+    if ticking.lists and ticking.goes_on is SUCCESS:
         for child, following in pairwise(site.children):
             yield child, f"'{following.name}' after it is never reached"
-    elif site.kind == "Repeat":
+    elif ticking.order is Order.SINGLE and {AGAIN, SUCCESS} <= ticking.follows(SUCCESS):
         yield site.children[0], f"'{site.name}' never repeats it"
     elif is_parallel(site) and SUCCESS not in reach.ends(site):
         yield from ((child, f"'{site.name}' waits for the success of {needed(site)} of its children") for child in site.children)
@@ -111,7 +110,7 @@ def never_reached(child: Site, waits_for: Site, reach: Reach) -> Problem:
 def several_run(root: Site, reach: Reach, excluded: Callable[[Site, Site], bool]) -> Iterator[Problem]:
     """Yield where a reactive node has two children that may take several ticks: one that runs has the other halted."""
     for site in root.walk():
-        if site.kind not in REACTIVE:
+        if site.ticking.order is not Order.REACTIVE:
             continue
         running = [(child, runs) for child in site.children if (runs := reach.runs(child)) is not False]
         for one, other in combinations(running, 2):
@@ -128,4 +127,4 @@ def several_run(root: Site, reach: Reach, excluded: Callable[[Site, Site], bool]
 
 def is_parallel(site: Site) -> bool:
     """Tell whether a node ticks several children at once."""
-    return site.kind in {"Parallel", "ParallelAll"} and site.type is not None and site.type.category is Category.CONTROL
+    return site.ticking.order is Order.AT_ONCE

@@ -18,7 +18,6 @@ from alula.model.model import Skill
 from alula.model.units import KIND_OF_UNIT, UNIT_IN_SI
 from alula.trees.document import Attribute
 from alula.trees.errors import Problem
-from alula.trees.status import FAILURE
 
 _NUMBER_WITH_UNIT = re.compile(r"\s*[-+]?[0-9.]+(?:[eE][-+]?[0-9]+)?\s*([A-Za-z%/]+)\s*")
 
@@ -79,20 +78,7 @@ def _deals(parent: Site, child: Site) -> bool:
     place = parent.children.index(child)
     if "_onFailure" in child.element.attributes:
         return True
-    if parent.goes_on is FAILURE:
-        return place + 1 < len(parent.children)
-    if parent.kind in _BRANCHES:
-        return place == 0
-    if parent.kind in {"Parallel", "ParallelAll"}:
-        return (parent.given("failure_count" if parent.kind == "Parallel" else "max_failures") or "1").strip() != "1"
-    if parent.kind == "TryCatch":
-        return place + 1 < len(parent.children)
-    return parent.goes_on is None and parent.kind not in _PASSING
-
-
-_BRANCHES = frozenset({"IfThenElse", "WhileDoElse"})
-_PASSING = frozenset({"SubTree", "Repeat", "Until", "Delay", "Timeout", "RunOnce", "Precondition", "SkipUnlessUpdated", "WaitValueUpdate"})
-"""Nodes that fail when their child fails; of a node of another one's, nobody knows."""
+    return parent.ticking.heeds_failure(place, len(parent.children), parent.given)
 
 
 def _is_asked(site: Site, whole: Whole) -> bool:
@@ -128,7 +114,7 @@ def _at_once(parallel: Site, leaf: Site) -> bool:
     for parent, child in leaf.above():
         if parent is parallel:
             return True
-        first = parent.children[0] is child and (parent.goes_on is not None or parent.kind in {"SubTree", "Repeat", "RetryUntilSuccessful"})
+        first = parent.children[0] is child and parent.ticking.begins_with_first()
         if not first or guards & set(parent.element.attributes):
             return False
     return False

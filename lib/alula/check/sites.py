@@ -7,10 +7,11 @@ from dataclasses import dataclass, field
 from typing import TypeAlias
 
 from alula.trees.document import Attribute, Element
+from alula.trees.factory import SUBTREE
 from alula.trees.node import Node, pointer
 from alula.trees.palette import NodeType, Palette
 from alula.trees.reading import AUTOREMAP, TreeFiles, is_port, node_name, type_name
-from alula.trees.status import Answer
+from alula.trees.ticking import ANY_TICKING, Ticking
 
 NodeClass: TypeAlias = type[Node]
 Key = tuple[int, str]
@@ -63,7 +64,12 @@ class Site:
     @property
     def kind(self) -> str:
         """The name of its type; that of every subtree is SubTree."""
-        return "SubTree" if self.element.tag == "SubTree" else type_name(self.element)
+        return SUBTREE.name if self.is_subtree else type_name(self.element)
+
+    @property
+    def is_subtree(self) -> bool:
+        """Whether it is the use of another tree."""
+        return self.type is SUBTREE
 
     @property
     def described(self) -> NodeClass | None:
@@ -75,9 +81,9 @@ class Site:
         return known if least <= len(self.children) <= (len(self.children) if most is None else most) else None
 
     @property
-    def goes_on(self) -> Answer | None:
-        """The answer after which its next child's turn comes, None where it does not tick its children in turn."""
-        return self.described.goes_on if self.described else None
+    def ticking(self) -> Ticking:
+        """How it ticks its children."""
+        return self.described.known_ticking() if self.described else ANY_TICKING
 
     @property
     def place(self) -> int:
@@ -125,8 +131,8 @@ class _Expander:
         return self._site(tops[0], Board(0), None) if tops else None
 
     def _site(self, element: Element, board: Board, parent: Site | None) -> Site:
-        site = Site(element, None if element.tag == "SubTree" else self._palette.get(type_name(element)), board, parent)
-        if element.tag == "SubTree":
+        site = Site(element, SUBTREE if element.tag == SUBTREE.name else self._palette.get(type_name(element)), board, parent)
+        if site.is_subtree:
             tree = self._files.trees.get(type_name(element))
             inner, below = (tree.children[:1] if tree else []), self._below(element, board)
         else:

@@ -40,8 +40,8 @@ class PlainTraits:
         return None
 
     def runs(self, site: Site) -> bool | None:
-        """Tell what the type does; a subtree is what is in it, and a condition answers at once."""
-        if site.kind == "SubTree" or (site.type is not None and site.type.category is Category.CONDITION):
+        """Tell what the type does; a condition answers at once."""
+        if site.type is not None and site.type.category is Category.CONDITION:
             return False
         return site.described.may_run if site.described else None
 

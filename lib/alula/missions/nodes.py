@@ -11,6 +11,7 @@ from alula.trees.errors import TickError
 from alula.trees.node import Action, Condition, Decorator, Script, SyncAction, Wiring
 from alula.trees.palette import Palette, input_port
 from alula.trees.status import FAILURE, IDLE, RUNNING, SKIPPED, SUCCESS, Answer
+from alula.trees.ticking import AGAIN, Order, Ticking
 from alula.trees.values import DOUBLE, INT, STRING
 
 IF = input_port("if", STRING, doc="a script that says yes or no")
@@ -115,11 +116,7 @@ class Until(Decorator):
 
     ports = (IF,)
     may_run = True
-
-    @classmethod
-    def may_end(cls, given: Given, children: Sequence[Ends]) -> Ends:  # noqa: ARG003
-        """End as the child."""
-        return children[0]
+    ticking = Ticking(Order.SINGLE, after={SUCCESS: frozenset({*SUCCEEDS, AGAIN})})
 
     def __init__(self, wiring: Wiring) -> None:
         super().__init__(wiring)
@@ -141,10 +138,10 @@ class RetryAfter(Decorator):
     ``attempts`` counts as ``num_attempts`` of RetryUntilSuccessful: with 0 or less it fails at once, but -1 is for ever.
     """
 
-    port = "attempts"
+    ticking = Ticking(Order.SINGLE, after={FAILURE: frozenset({*FAILS, AGAIN})}, rounds="attempts")
     ports = (
         IF,
-        input_port(port, INT, "2", "how many chances it has in all; -1: any number"),
+        input_port("attempts", INT, "2", "how many chances it has in all; -1: any number"),
         input_port("wait", DOUBLE, "0", "how long after the failure", unit="s"),
     )
     may_run = True
@@ -154,7 +151,7 @@ class RetryAfter(Decorator):
     @classmethod
     def may_end(cls, given: Given, children: Sequence[Ends]) -> Ends:
         """End as the child; fail without it where the number may leave no chance."""
-        attempts = whole_number(given, cls.port)
+        attempts = whole_number(given, cls.ticking.rounds)
         return children[0] if attempts is not None and (attempts > 0 or attempts == FOR_EVER) else children[0] | FAILS
 
     def __init__(self, wiring: Wiring) -> None:
@@ -166,7 +163,7 @@ class RetryAfter(Decorator):
     def update(self) -> Answer:
         """Wait for the next chance, or follow the child."""
         if self.status is IDLE:
-            attempts = self.number(self.port)
+            attempts = self.number(self.ticking.rounds)
             self._left, self._again_ns, self.feedback_message = attempts if attempts >= FOR_EVER else 0, None, ""
         self.become(RUNNING)
         if not self._left:

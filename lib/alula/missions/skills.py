@@ -12,6 +12,7 @@ from alula.missions.skill_types import HALT_PORT, OUTCOME_PORT, SEPARATOR, STATE
 from alula.missions.skillset import Client
 from alula.model.execution_state import ExecutionState
 from alula.model.model import Resource, Skill, Skillset
+from alula.trees.ends import ENDS
 from alula.trees.node import Action, Condition, Wiring
 from alula.trees.palette import Palette
 from alula.trees.status import FAILURE, IDLE, RUNNING, SUCCESS, Answer
@@ -34,6 +35,8 @@ class SkillNode(Action):
     a start in any skillset does. The tree goes on without the end of what it halts, so ``outcome`` is INTERRUPTED from the halt on,
     whatever comes of it; only what had ended since the last tick has its own outcome and outputs.
     """
+
+    ends = ENDS
 
     def __init__(self, wiring: Wiring, model: Skill, skillset: str, crew: Crew) -> None:
         super().__init__(wiring)
@@ -97,6 +100,8 @@ class SkillNode(Action):
 
 class ResourceNode(Condition):
     """Succeeds when a resource is in a state."""
+
+    ends = ENDS
 
     def __init__(self, wiring: Wiring, model: Resource, skillset: str, crew: Crew) -> None:
         super().__init__(wiring)

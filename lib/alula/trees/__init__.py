@@ -24,9 +24,11 @@ if TYPE_CHECKING:
     from alula.trees.node import Action, Condition, Control, Decorator, Leaf, Node, Script, SyncAction, register
     from alula.trees.palette import Port, inout_port, input_port, output_port
     from alula.trees.status import FAILURE, IDLE, RUNNING, SKIPPED, SUCCESS, Answer, Status
+    from alula.trees.ticking import AGAIN, Begin, Order, Ticking
     from alula.trees.values import ANY, BOOL, DOUBLE, INT, STRING, UINT, PortType, list_of
 
 __all__ = [
+    "AGAIN",
     "ANY",
     "BOOL",
     "DOUBLE",
@@ -40,18 +42,21 @@ __all__ = [
     "UINT",
     "Action",
     "Answer",
+    "Begin",
     "Condition",
     "Control",
     "Decorator",
     "FileError",
     "Leaf",
     "Node",
+    "Order",
     "Port",
     "PortType",
     "Script",
     "Status",
     "SyncAction",
     "TickError",
+    "Ticking",
     "TreeError",
     "inout_port",
     "input_port",
@@ -65,6 +70,7 @@ _DEFINED_IN = {
     "alula.trees.node": ("Action", "Condition", "Control", "Decorator", "Leaf", "Node", "Script", "SyncAction", "register"),
     "alula.trees.palette": ("Port", "inout_port", "input_port", "output_port"),
     "alula.trees.status": ("FAILURE", "IDLE", "RUNNING", "SKIPPED", "SUCCESS", "Answer", "Status"),
+    "alula.trees.ticking": ("AGAIN", "Begin", "Order", "Ticking"),
     "alula.trees.values": ("ANY", "BOOL", "DOUBLE", "INT", "STRING", "UINT", "PortType", "list_of"),
 }
 

@@ -11,7 +11,7 @@ from alula.trees.document import Element
 from alula.trees.errors import FileError, Problem, TickError
 from alula.trees.node import After, Before, Node, Script, Shared, Wiring, pointer
 from alula.trees.nodes.subtree import SubTree
-from alula.trees.palette import CHILDREN, Category, NodeType, Palette
+from alula.trees.palette import Category, NodeType, Palette
 from alula.trees.reading import AUTOREMAP, POSTCONDITIONS, PRECONDITIONS, TreeFiles, is_port, node_name, type_name
 from alula.trees.script import Program, ScriptError, parse
 from alula.trees.script.scope import Unknown
@@ -19,7 +19,7 @@ from alula.trees.structure import verify
 from alula.trees.tree import Subtree, Tree
 from alula.trees.values import ANY, STRING, literal
 
-SUBTREE = NodeType("SubTree", Category.SUBTREE, {}, "Another tree of the files.", SubTree, CHILDREN[Category.SUBTREE])
+SUBTREE = NodeType("SubTree", Category.SUBTREE, {}, "Another tree of the files.", SubTree, (1, 1))
 
 
 class Surroundings(Protocol):
@@ -174,7 +174,7 @@ class _Builder:
 
     def _node(self, element: Element, subtree: Subtree) -> Node:
         self._count += 1
-        is_subtree = element.tag == "SubTree"
+        is_subtree = element.tag == SUBTREE.name
         known = SUBTREE if is_subtree else self._palette.get(type_name(element))
         if known is None or known.make is None:
             raise FileError(Problem(element.place, f"'{type_name(element)}' is known from a model only", "nothing registers it"))

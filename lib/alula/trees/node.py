@@ -15,10 +15,11 @@ from py_trees.behaviour import Behaviour
 from alula.common.public import public
 from alula.trees.blackboard import Blackboard, Clock, Entry
 from alula.trees.document import Element
-from alula.trees.ends import ANY_END, Ends, Given, stops_at
+from alula.trees.ends import ANY_END, Ends, Given
 from alula.trees.errors import TickError
 from alula.trees.palette import Category, NodeType, Port
 from alula.trees.status import FAILURE, IDLE, RUNNING, SKIPPED, SUCCESS, Answer, Status
+from alula.trees.ticking import ANY_TICKING, Order, Ticking, never_ticked
 
 NANOSECONDS_PER_MS = 1_000_000
 Watcher = Callable[["Node", Status, Status], None]
@@ -96,8 +97,9 @@ def pointer(text: str, name: str) -> str | None:
     return stripped[1:-1] if len(stripped) >= 3 and stripped[0] == "{" and stripped[-1] == "}" else None
 
 
-_TELLS = frozenset({"goes_on", "ends", "may_end", "never_ticked"})
+_TELLS = frozenset({"ticking", "ends", "may_end", "never_ticked"})
 _ANSWERS = ("execute", "update", "on_start", "on_running")
+_HALTS = ("halt", "halt_node", "reset_children", "reset_child", "become", "give_way")
 
 
 @public("alula.trees")
@@ -114,8 +116,8 @@ class Node(Behaviour):  # type: ignore[misc]  # py_trees is seen untyped
     """The attributes that one tick leaves for the next, besides the status; what takes a tree to another moment needs all of them."""
     remembers_running: ClassVar[tuple[str, ...]] = ()
     """Those of them that are set anew when the node begins: while it does not run, nothing hangs on them."""
-    goes_on: ClassVar[Status | None] = None
-    """The answer of a child after which the next child's turn comes; None where it does not tick its children in turn."""
+    ticking: ClassVar[Ticking] = ANY_TICKING
+    """How it ticks its children; what is not said may be anything."""
     ends: ClassVar[Ends] = ANY_END
     """The ends that it may have, where they hang neither on ports nor on children."""
     may_run: ClassVar[bool | None] = None
@@ -140,28 +142,33 @@ class Node(Behaviour):  # type: ignore[misc]  # py_trees is seen untyped
     @classmethod
     def may_end(cls, given: Given, children: Sequence[Ends]) -> Ends:  # noqa: ARG003
         """Return all ends that it may ever have, with these ports, and children that may have these ends."""
-        return cls.ends
+        ticking = cls.known_ticking()
+        return ticking.ends(children[0]) if ticking.order is Order.SINGLE else cls.ends
 
     @classmethod
     def never_ticked(cls, given: Given, children: Sequence[Ends]) -> Iterator[tuple[int, int]]:  # noqa: ARG003
-        """Yield children that are never ticked, each with the child that does not end as it would have to for that.
-
-        Of several in a row, the first. A node that does not tick its children in turn is taken to tick all, unless its class tells more.
-        """
-        if cls.goes_on is not None and (last := stops_at(children, cls.goes_on)) is not None and last + 1 < len(children):
-            yield last + 1, last
+        """Yield children that are never ticked, each with the one that does not end as it would have to; of several in a row the first."""
+        yield from never_ticked(cls.ticking, children)
 
     @classmethod
     def is_described(cls) -> bool:
         """Tell whether what is told of its ends is of this class: one that derives from it, answers otherwise and tells nothing does not.
 
-        `goes_on`, `ends`, `may_end`, `never_ticked` belong to what answers: `execute`, `update`, `on_start`, `on_running`.
+        `ticking`, `ends`, `may_end`, `never_ticked` belong to what answers: `execute`, `update`, `on_start`, `on_running`.
         """
-        teller = next(one for one in cls.__mro__ if not _TELLS.isdisjoint(vars(one)))
-        if teller is Node:
-            return True
-        answering = ((getattr(cls, name, None), getattr(teller, name, None)) for name in _ANSWERS)
-        return all(mine is told or told in {None, Node.update} for mine, told in answering)
+        return cls._does_as(_TELLS, _ANSWERS)
+
+    @classmethod
+    def known_ticking(cls) -> Ticking:
+        """Return how it ticks its children: anything may come of a class that answers or halts otherwise than the one that tells it."""
+        return cls.ticking if cls._does_as(frozenset({"ticking"}), (*_ANSWERS, *_HALTS)) else ANY_TICKING
+
+    @classmethod
+    def _does_as(cls, tells: frozenset[str], names: Sequence[str]) -> bool:
+        """Tell whether methods are those of the class that tells something."""
+        teller = next(one for one in cls.__mro__ if not tells.isdisjoint(vars(one)))
+        both = ((getattr(cls, name, None), getattr(teller, name, None)) for name in names)
+        return teller is Node or all(mine is told or told in {None, Node.update} for mine, told in both)
 
     # --- ticks ---------------------------------------------------------------------------------------------------------
 

@@ -10,14 +10,6 @@ from alula.trees.node import Node
 from alula.trees.palette import Category
 from alula.trees.reading import POSTCONDITIONS, PRECONDITIONS
 
-KINDS: Mapping[str, str] = {
-    **dict.fromkeys(("Sequence", "AsyncSequence", "SequenceWithMemory", "ReactiveSequence", "PipelineSequence"), "sequence"),
-    **dict.fromkeys(("NonblockingSequence", "PersistentSequence"), "sequence"),
-    **dict.fromkeys(("Fallback", "AsyncFallback", "ReactiveFallback", "RoundRobin"), "selector"),
-    **dict.fromkeys(("Parallel", "ParallelAll"), "parallel"),
-    "ScriptCondition": "condition",
-}
-"""What nodes of a type are in the words of the paper's figures; others are what their category is."""
 CATEGORIES: Mapping[Category, str] = {
     Category.ACTION: "action",
     Category.CONDITION: "condition",
@@ -79,7 +71,7 @@ def kind_of(node: Node) -> str:
     """Return what a node is, in the words of the figures."""
     if skill_of(node):
         return "skill"
-    return KINDS.get(node.wiring.type.name) or CATEGORIES[node.wiring.type.category]
+    return node.known_ticking().figure or CATEGORIES[node.wiring.type.category]
 
 
 def skill_of(node: Node) -> str:

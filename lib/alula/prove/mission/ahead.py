@@ -9,29 +9,14 @@ from __future__ import annotations
 from collections.abc import Hashable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
 
-from alula.prove.mission.own import Own
 from alula.prove.mission.reading import OUTCOME, SCRIPT_PORTS, Read
+from alula.trees.ends import ENDS
 from alula.trees.node import Node
-from alula.trees.nodes.decorators import Delay, ForceFailure, ForceSuccess, Inverter, Precondition, RunOnce, Timeout
-from alula.trees.nodes.entries import SkipUnlessUpdated
-from alula.trees.nodes.loops import Loop
-from alula.trees.nodes.parallel import Parallel, ParallelAll
-from alula.trees.nodes.sequences import AsyncFallback, AsyncSequence, Fallback, SequenceWithMemory
-from alula.trees.nodes.sequences import Sequence as InOrder
-from alula.trees.nodes.subtree import SubTree
-from alula.trees.status import RUNNING
+from alula.trees.status import RUNNING, SKIPPED
+from alula.trees.ticking import Order, Ticking
 from alula.trees.tree import Tree
 
-IN_TURN = frozenset({InOrder, Fallback, AsyncSequence, AsyncFallback, SequenceWithMemory})
-"""Nodes that tick no child again that they have passed."""
-AT_ONCE = frozenset({Parallel, ParallelAll})
-"""Nodes that tick no child again that has ended."""
-ONCE = frozenset({SubTree, Inverter, ForceSuccess, ForceFailure, Delay, Timeout})
-"""Nodes that end with their child. All other nodes may tick any child again."""
-
 RUNS = RUNNING.value
-SKIPS = (Precondition, RunOnce, Loop, SkipUnlessUpdated)
-"""Types of node that may be skipped without a condition of theirs."""
 
 
 @dataclass(frozen=True)
@@ -59,6 +44,7 @@ class Looking:
     def __init__(self, trees: Sequence[Tree], read: Read) -> None:
         self.read = read
         self._nodes = [node for tree in trees for node in tree.nodes]
+        self.ticking = [node.known_ticking() for node in self._nodes]
         self.all = frozenset(range(len(self._nodes)))
         self._number = {id(node): number for number, node in enumerate(self._nodes)}
         self._roots = [tree.root for tree in trees]
@@ -76,7 +62,8 @@ class Looking:
         node = self._nodes[number]
         before = node.before
         conditions = before is not None and (before.skip_if is not None or before.while_true is not None)
-        return conditions or isinstance(node, SKIPS) or (isinstance(node, Own) and node.skips) or number in self._opaque
+        ends = node.may_end(node.wiring.ports.get, [ENDS] * len(node.children))
+        return conditions or SKIPPED in ends or not node.is_described() or number in self._opaque
 
     def may_be_skipped(self, number: int) -> bool:
         """Tell whether a node, or one below it, may be skipped, or asks for what is not known."""
@@ -97,26 +84,24 @@ class Looking:
     def _from(self, node: Node, values: Sequence[Mapping[str, Hashable]]) -> frozenset[int]:
         """Return what can be ticked below a node, and it."""
         number = self._number[id(node)]
-        mine = values[number]
-        kind = type(node)
-        if mine["status"] != RUNS or kind not in IN_TURN | AT_ONCE | ONCE or number in self._skips:
+        mine, ticking = values[number], self.ticking[number]
+        if mine["status"] != RUNS or not ticking.tells_passed or number in self._skips:
             return self._below[number]  # what is skipped may begin again
         found = {number}
         for place, child in enumerate(node.children):
             below = self._number[id(child)]
-            if not self._passed(kind, mine, place):
+            if not self._passed(ticking, mine, place):
                 found |= self._from(child, values)
             elif values[below]["status"] == RUNS:  # it was skipped, and is halted some time
                 found |= self._below[below]
         return frozenset(found)
 
     @staticmethod
-    def _passed(kind: type[Node], mine: Mapping[str, Hashable], place: int) -> bool:
-        if kind in IN_TURN:
-            index = mine["_index"]
-            return isinstance(index, int) and place < index
-        done = mine["_done"] if kind in AT_ONCE else None
-        return isinstance(done, tuple) and place in done[1]
+    def _passed(ticking: Ticking, mine: Mapping[str, Hashable], place: int) -> bool:
+        told = mine.get(ticking.place)
+        if ticking.order is Order.IN_TURN:
+            return isinstance(told, int) and place < told
+        return isinstance(told, tuple) and place in told[1]
 
     def _asked(self, nodes: frozenset[int], *, everything: bool) -> Ahead:
         asks = [self._asks[number] for number in sorted(nodes)]

@@ -10,30 +10,20 @@ from collections.abc import Callable, Hashable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from typing import NamedTuple
 
-from alula.missions.nodes import RetryAfter, Until
 from alula.missions.skill_types import OUTCOME_PORT
 from alula.missions.skills import SkillNode
-from alula.prove.mission.ahead import AT_ONCE, IN_TURN, RUNS, Looking
-from alula.prove.mission.reading import ANOTHER, OUTCOME, scripts_of
-from alula.trees.node import Action, Node, pointer
-from alula.trees.nodes.decorators import (
-    Delay,
-    ForceFailure,
-    ForceSuccess,
-    Inverter,
-    KeepRunningUntilFailure,
-    Repeat,
-    RetryUntilSuccessful,
-    Timeout,
-)
+from alula.prove.mission.ahead import RUNS, Looking
+from alula.prove.mission.reading import ANOTHER, OUTCOME, SCRIPT_PORTS, scripts_of
+from alula.trees.node import Node, pointer
 from alula.trees.nodes.entries import UnsetBlackboard
 from alula.trees.nodes.leaves import ScriptNode
-from alula.trees.nodes.sequences import Fallback, SequenceWithMemory
 from alula.trees.nodes.subtree import SubTree
 from alula.trees.palette import Direction
 from alula.trees.script import ScriptError, parse
 from alula.trees.script.syntax import Assignment, Call, Chain, Comparison, Literal, Name, walk
 from alula.trees.script.syntax import Node as Part
+from alula.trees.status import FAILURE, SKIPPED, SUCCESS, Answer
+from alula.trees.ticking import AGAIN, Begin, Order, Ticking
 from alula.trees.tree import Tree
 
 Place = tuple[int, str]
@@ -140,43 +130,48 @@ class Liveness:
         return self._begun[key]
 
     def _body(self, node: Node, ends: Ends) -> Reads:
-        kind = type(node)
+        ticking = self._ticking(node)
         if not node.children:
             return self._leaf(node, ends)
         found = self._ports(node)
-        if kind in IN_TURN:
+        if ticking.order is Order.IN_TURN:
             begins = [reads for _, reads in self._in_turn(node, ends, 0, lambda _, child, after: self._begin(child, after))]
-            return found.union(*begins) if kind is SequenceWithMemory else found | begins[0]
-        if kind in AT_ONCE:
+            return found.union(*begins) if ticking.keeps_place else found | begins[0]
+        if ticking.order is Order.AT_ONCE:
             written: frozenset[Place] = frozenset()
             for child in node.children:
                 found |= _without(self._begin(child, _whichever(ends.any)), written)
                 written |= self._at_once(child)
             return found
-        found |= self._again(node, ends)
-        if kind in COUNTED and not _at_least_once(node.wiring.ports.get(COUNTED[kind], "")):
-            found |= ends.any  # perhaps no child is ticked at all
-        return found | ends.halted if kind is Delay else found
+        return found | self._before_child(node, ends, self._again(node, ends))
 
     def _in_turn(self, node: Node, ends: Ends, first: int, look: Callable[[int, Node, Ends], Reads]) -> list[tuple[int, Reads]]:
         """Return what is live before each child from one on."""
-        goes_on = ends.failure if isinstance(node, Fallback) else ends.success
+        ticking = self._ticking(node)
+        until_failure = ticking.goes_on is SUCCESS
+        following, stop = (ends.success, ends.failure) if until_failure else (ends.failure, ends.success)
+        skipped = following | ends.skipped
         found: list[tuple[int, Reads]] = []
-        following, skipped = goes_on, goes_on | ends.skipped
         for index in range(len(node.children) - 1, first - 1, -1):
-            stop = ends.success if isinstance(node, Fallback) else ends.failure
-            after = (
-                Ends(stop, following, skipped, ends.halted) if isinstance(node, Fallback) else Ends(following, stop, skipped, ends.halted)
-            )
-            following = look(index, node.children[index], after)
-            if getattr(node, "gives_way", False):
+            both = (following, stop) if until_failure else (stop, following)
+            following = look(index, node.children[index], Ends(*both, skipped, ends.halted))
+            if ticking.gives_way:
                 following |= ends.halted
             skipped = following
             found.insert(0, (index, following))
         return found
 
+    def _before_child(self, node: Node, ends: Ends, again: Reads) -> Reads:
+        """Return what is live where the turn of an only child comes, with what is live before the child."""
+        ticking = self._ticking(node)
+        if ticking.begins is Begin.PERHAPS:
+            return again | ends.any | self._asked(node, *SCRIPT_PORTS)
+        if ticking.rounds and not _at_least_once(node.wiring.ports.get(ticking.rounds, "")):
+            return again | ends.any  # perhaps the child is not ticked at all
+        return again | ends.halted if ticking.begins is Begin.LATER else again
+
     def _again(self, node: Node, ends: Ends) -> Reads:
-        """Return what is live before the child of a decorator, which may begin again and again."""
+        """Return what is live before an only child, which may begin again and again."""
         found = NOTHING
         while True:
             more = self._begin(node.children[0], self._of_child(node, ends, found)) | found
@@ -185,29 +180,15 @@ class Liveness:
             found = more
 
     def _of_child(self, node: Node, ends: Ends, again: Reads) -> Ends:
-        """Return what is live after the child of a decorator."""
-        success, failure, skipped, halted = ends
-        again |= halted | self._ports(node)
-        kind = type(node)
-        if kind is Inverter:
-            success, failure = failure, success
-        elif kind is ForceSuccess:
-            failure = success
-        elif kind is ForceFailure:
-            success = failure
-        elif kind is Timeout:
-            halted |= failure
-        elif kind is RetryAfter:
-            failure |= again | self._asked(node, "if")
-        elif kind is Until:
-            success |= again | self._asked(node, "if")
-        elif kind is Repeat:
-            success |= again
-        elif kind is RetryUntilSuccessful:
-            failure |= again
-        elif kind is KeepRunningUntilFailure:
-            success = again
-        return Ends(success, failure, skipped, halted)
+        """Return what is live after an only child."""
+        ticking = self._ticking(node)
+        own = {SUCCESS: ends.success, FAILURE: ends.failure, SKIPPED: ends.skipped}
+        again |= ends.halted | self._ports(node) | self._asked(node, *SCRIPT_PORTS)
+
+        def after(end: Answer) -> Reads:
+            return NOTHING.union(*(again if step is AGAIN else own[step] for step in ticking.follows(end)))
+
+        return Ends(after(SUCCESS), after(FAILURE), after(SKIPPED), ends.halted.union(*(own[end] for end in ticking.cuts_off)))
 
     def _leaf(self, node: Node, ends: Ends, *, begins: bool = True) -> Reads:
         if isinstance(node, ScriptNode):
@@ -217,7 +198,7 @@ class Liveness:
         written = self._written(node) if own else frozenset()
         halted = frozenset({self._outcome(node)}) if isinstance(node, SkillNode) else frozenset()
         found = reads | _without(ends.success | ends.failure, written)
-        found |= _without(ends.halted, halted) if own or isinstance(node, Action) else NOTHING
+        found |= _without(ends.halted, halted) if own or node.may_run is not False else NOTHING
         return _without(found, self._at_once(node)) if isinstance(node, SkillNode) and begins else found
 
     def _at_once(self, node: Node) -> frozenset[Place]:
@@ -227,16 +208,16 @@ class Liveness:
             return frozenset()
         if isinstance(node, SkillNode):
             return frozenset({leaf_place(self._leaf_of[id(node)])})
-        kind = type(node)
-        begins = kind in AT_ONCE or (kind in IN_TURN and kind is not SequenceWithMemory)
-        return self._at_once(node.children[0]) if begins or kind in ONE_CHILD - {Delay, *COUNTED} else frozenset()
+        ticking = self._ticking(node)
+        begins = bool(node.children) and ticking.begins_with_first() and not ticking.rounds
+        return self._at_once(node.children[0]) if begins else frozenset()
 
     # --- a node that runs ------------------------------------------------------------------------------------------------
 
     def _at(self, node: Node, ends: Ends, values: Values) -> Reads:
         """Return what is live at a node between two ticks."""
         number = self._number[id(node)]
-        mine, kind = values[number], type(node)
+        mine, ticking = values[number], self._ticking(node)
         if mine["status"] != RUNS:
             return self._begin(node, ends)
         ends = self._after(node, ends)
@@ -245,52 +226,55 @@ class Liveness:
         if not node.children:
             return self._leaf(node, ends, begins=False)
         found = self._ports(node)
-        if kind in IN_TURN:
-            place = mine["_index"]
+        if ticking.order is Order.IN_TURN:
+            place = mine[ticking.place]
             index = place if isinstance(place, int) else 0
 
             def look(at: int, child: Node, after: Ends) -> Reads:
                 return self._at(child, after, values) if at == index else self._begin(child, after)
 
-            ways = self._in_turn(node, ends, 0 if kind is SequenceWithMemory else index, look)
-            return found.union(*(reads for _, reads in ways)) if kind is SequenceWithMemory else found | ways[0][1]
-        if kind in AT_ONCE:
+            ways = self._in_turn(node, ends, 0 if ticking.keeps_place else index, look)
+            return found.union(*(reads for _, reads in ways)) if ticking.keeps_place else found | ways[0][1]
+        if ticking.order is Order.AT_ONCE:
             left = list(self._left(node, values))
             after = _whichever(_without(ends.any, frozenset().union(*(self._surely(child, values) for child in left))))
             return found.union(*(self._at(child, after, values) for child in left))
         again = self._again(node, ends)
         child = node.children[0]
         if values[self._number[id(child)]]["status"] != RUNS:
-            return found | again | ends.halted
+            return found | self._before_child(node, ends, again) | ends.halted
         return found | self._at(child, self._of_child(node, ends, again), values)
 
     def _left(self, node: Node, values: Values) -> Iterator[Node]:
         """Yield the children of a Parallel that have not ended."""
-        done = values[self._number[id(node)]]["_done"]
+        done = values[self._number[id(node)]][self._ticking(node).place]
         ended = done[1] if isinstance(done, tuple) else ()
         yield from (child for index, child in enumerate(node.children) if index not in ended)
 
     def _surely(self, node: Node, values: Values) -> frozenset[Place]:
         """Return what a node that runs writes before it ends, whether by itself or halted."""
-        mine, kind = values[self._number[id(node)]], type(node)
+        mine, ticking = values[self._number[id(node)]], self._ticking(node)
         if mine["status"] != RUNS or self._hidden(node):
             return frozenset()
         if isinstance(node, SkillNode):
             return frozenset({self._outcome(node)})
         if not node.children:
             return frozenset()
-        if kind in AT_ONCE:
+        if ticking.order is Order.AT_ONCE:
             return frozenset().union(*(self._surely(child, values) for child in self._left(node, values)))
-        index = mine["_index"] if kind in IN_TURN else 0
+        index = mine[ticking.place] if ticking.order is Order.IN_TURN else 0
         return self._surely(node.children[index], values) if isinstance(index, int) and index < len(node.children) else frozenset()
 
     # --- what a node reads and writes ------------------------------------------------------------------------------------
 
     def _hidden(self, node: Node) -> bool:
         """Tell whether what is below a node may go on otherwise than is known here."""
-        number = self._number[id(node)]
-        known = not node.children or type(node) in IN_TURN | AT_ONCE | ONE_CHILD
-        return not known or self._looking.may_be_skipped(number)
+        ticking = self._ticking(node)
+        known = not node.children or ticking.tells_passed or ticking.order is Order.SINGLE
+        return not known or self._looking.may_be_skipped(self._number[id(node)])
+
+    def _ticking(self, node: Node) -> Ticking:
+        return self._looking.ticking[self._number[id(node)]]
 
     def _after(self, node: Node, ends: Ends) -> Ends:
         """Return what is live after a node, before its postconditions."""
@@ -380,11 +364,6 @@ def _at_least_once(count: str) -> bool:
     """Tell whether a port's text is a count with which the child is ticked; an entry may be any."""
     text = count.strip()
     return text == "-1" or (text.isdecimal() and int(text) > 0)
-
-
-COUNTED = {Repeat: Repeat.port, RetryUntilSuccessful: RetryUntilSuccessful.port, RetryAfter: RetryAfter.port}
-ONE_CHILD = frozenset({SubTree, Inverter, ForceSuccess, ForceFailure, Delay, Timeout, Until, KeepRunningUntilFailure, *COUNTED})
-"""Nodes whose child's ends are known to lead on to their own, or to the child again."""
 
 
 def leaf_place(leaf: int) -> Place:

@@ -12,6 +12,7 @@ from alula.prove.mission.reading import ANOTHER
 from alula.prove.mission.robot import Memory, Robot
 from alula.prove.mission.runnable import names_in, remembered, why_not
 from alula.prove.mission.unknown import Unknown, UnknownText, is_unknown, unknown
+from alula.trees.ends import ANY_END
 from alula.trees.errors import TickError
 from alula.trees.node import Condition, Control, Node, SyncAction, pointer, register
 from alula.trees.palette import CHILDREN, Category, Direction, NodeType, Port, name_in_files
@@ -93,9 +94,7 @@ def has_children(category: Category, count: tuple[int, int | None] | None) -> bo
 
 
 class Own(Node):
-    """A node of a robot's own; it may be skipped without a condition of its file."""
-
-    skips: ClassVar[bool] = True
+    """A node of a robot's own."""
 
 
 # --- leaves --------------------------------------------------------------------------------------------------------------
@@ -123,8 +122,13 @@ def _leaf(robot: Robot, real: type[Node], answers: tuple[str, ...] = ()) -> type
         self.become(IDLE)
 
     content = {"ports": real.ports, "update": update, "category": real.category, "child_count": real.child_count, "halt": halt}
-    content |= {"skips": SKIPPED.value in options, "__doc__": real.__doc__}
+    content |= {**_told_ends(options), "__doc__": real.__doc__}
     return type(real.__name__, (Own,), content)
+
+
+def _told_ends(options: Sequence[str]) -> dict[str, object]:
+    """Return what the class of a leaf that may answer these tells of its ends."""
+    return {"ends": frozenset(_ANSWERS[one] for one in options) - {RUNNING}, "may_end": vars(Node)["may_end"]}
 
 
 def _known_leaf(robot: Robot, real: type[Node]) -> type[Node]:
@@ -145,7 +149,7 @@ def _known_leaf(robot: Robot, real: type[Node]) -> type[Node]:
                 return _free(robot, self, options)
             raise TickError(f"{self.place()}: its code raises {type(error).__name__}: {error}") from error
 
-    content = {"get": get, "update": update, "skips": SKIPPED.value in options, "__doc__": real.__doc__}
+    content = {"get": get, "update": update, **_told_ends(options), "__doc__": real.__doc__}
     return type(real.__name__, (Own, real), content)
 
 
@@ -267,4 +271,9 @@ class Run(Own):
 
 
 def _run(real: type[Node]) -> type[Node]:
-    return type(real.__name__, (Run, real), {"remembers": remembered(real), "remembers_running": (), "__doc__": real.__doc__})
+    """Return a class that does what another one does, and tells of itself what that one surely tells."""
+    content: dict[str, object] = {"remembers": remembered(real), "remembers_running": (), "__doc__": real.__doc__}
+    content["ticking"] = real.known_ticking()
+    if not real.is_described():
+        content |= {"ends": ANY_END, "may_end": vars(Node)["may_end"]}
+    return type(real.__name__, (Run, real), content)

@@ -65,7 +65,8 @@ EXPRESSIONS = (
 )
 PARTS = (ast.arguments, ast.arg, ast.keyword, ast.comprehension, ast.expr_context, ast.operator, ast.boolop, ast.unaryop, ast.cmpop)
 SYNTAX = (*STATEMENTS, *EXPRESSIONS, *PARTS)
-DECLARED = frozenset({"ports", "category", "child_count", "remembers", "remembers_running", "registered_name"})
+DECLARED = frozenset(name for name, kind in Node.__annotations__.items() if kind.startswith("ClassVar")) | {"may_end", "never_ticked"}
+"""What a class tells of its nodes."""
 WORDS = "feedback_message"
 """What nodes say of themselves, which decides nothing."""
 CONSTANT = (type(None), bool, int, float, str, Status, Skipped)

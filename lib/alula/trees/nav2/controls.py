@@ -4,18 +4,19 @@ from __future__ import annotations
 
 from collections.abc import Iterator, Sequence
 
-from alula.trees.ends import ENDS, FAILS, SKIPS, SUCCEEDS, Ends, Given, stops_at, together
+from alula.trees.ends import ENDS, FAILS, NO_END, SKIPS, SUCCEEDS, Ends, Given, stops_at, together
 from alula.trees.errors import TickError
 from alula.trees.node import Control, Wiring
 from alula.trees.palette import inout_port, input_port
 from alula.trees.status import FAILURE, RUNNING, SKIPPED, SUCCESS, Answer
+from alula.trees.ticking import Order, Ticking
 from alula.trees.values import BOOL, INT, STRING
 
 
 class PipelineSequence(Control):
     """Ticks its children in order, and those before the one that runs again in each tick, until the last one succeeds."""
 
-    goes_on = SUCCESS
+    ticking = Ticking(Order.EACH_TICK, SUCCESS)
     may_run = False
     remembers = ("_reached",)
 
@@ -70,6 +71,11 @@ class RecoveryNode(Control):
 
     remembers = ("_recovers", "_retries")
 
+    @classmethod
+    def may_end(cls, given: Given, children: Sequence[Ends]) -> Ends:  # noqa: ARG003
+        """End as the first child, or fail."""
+        return children[0] | FAILS
+
     def __init__(self, wiring: Wiring) -> None:
         super().__init__(wiring)
         self._recovers = False
@@ -122,7 +128,13 @@ class RoundRobin(Control):
 
     ports = (input_port("wrap_around", BOOL, "false", "whether the first child is tried again after the last one"),)
 
+    ticking = Ticking(Order.FROM_ANY, FAILURE)
     remembers = ("_turn", "_failed")
+
+    @classmethod
+    def may_end(cls, given: Given, children: Sequence[Ends]) -> Ends:  # noqa: ARG003
+        """Be skipped where all are, else succeed or fail."""
+        return ENDS | (SKIPS if all(child & SKIPS for child in children) else NO_END)
 
     def __init__(self, wiring: Wiring) -> None:
         super().__init__(wiring)
@@ -156,7 +168,7 @@ class RoundRobin(Control):
 class NonblockingSequence(Control):
     """Ticks all children in each tick, also those after one that runs, until all succeed at once."""
 
-    goes_on = SUCCESS
+    ticking = Ticking(Order.EACH_TICK, SUCCESS)
     may_run = False
     ends = ENDS
 
@@ -186,6 +198,8 @@ class PersistentSequence(Control):
     """A sequence that goes on where it was, also after a halt: the index of its child is on the blackboard."""
 
     ports = (inout_port("current_child_idx", INT, None, "index of the current child"),)
+    ticking = Ticking(Order.FROM_ANY, SUCCESS)
+    ends = ENDS
 
     def update(self) -> Answer:
         """Tick from the current child on."""
@@ -212,6 +226,11 @@ class PauseResumeController(Control):
         input_port("resume_service_name", STRING, None, "service that ends it", optional=True),
     )
     child_count = (1, 4)
+
+    @classmethod
+    def may_end(cls, given: Given, children: Sequence[Ends]) -> Ends:  # noqa: ARG003
+        """End as the first child; where that is skipped it succeeds."""
+        return (children[0] & ENDS) | (SUCCEEDS if children[0] & SKIPS else NO_END)
 
     def update(self) -> Answer:
         """Tick the first child."""

@@ -7,6 +7,7 @@ import math
 from collections.abc import Sequence
 from typing import ClassVar, TypeAlias
 
+from alula.trees.ends import FAILS, SUCCEEDS, Ends, Given
 from alula.trees.errors import TickError
 from alula.trees.node import Decorator, Node, Wiring
 from alula.trees.palette import Port, input_port, output_port
@@ -20,6 +21,11 @@ Point: TypeAlias = Sequence[float]
 
 class _Gate(Decorator):
     """Ticks its child when it opens, and from then on until the child has ended; in between it runs."""
+
+    @classmethod
+    def may_end(cls, given: Given, children: Sequence[Ends]) -> Ends:  # noqa: ARG003
+        """End as the child."""
+        return children[0]
 
     def update(self) -> Answer:
         """Open or not, and tick."""
@@ -185,6 +191,11 @@ class SingleTrigger(Decorator):
 
     remembers = ("_over",)
 
+    @classmethod
+    def may_end(cls, given: Given, children: Sequence[Ends]) -> Ends:  # noqa: ARG003
+        """End as the child, or fail."""
+        return children[0] | FAILS
+
     def __init__(self, wiring: Wiring) -> None:
         super().__init__(wiring)
         self._over = False
@@ -211,6 +222,11 @@ class GoalUpdater(Decorator):
         output_port("output_goals", doc="the newest goals"),
     )
 
+    @classmethod
+    def may_end(cls, given: Given, children: Sequence[Ends]) -> Ends:  # noqa: ARG003
+        """End as the child."""
+        return children[0]
+
     def update(self) -> Answer:
         """Hand the goal on, and tick the child."""
         for which in ("goal", "goals"):
@@ -233,6 +249,11 @@ class PathLongerOnApproach(Decorator):
     )
 
     remembers = ("_before",)
+
+    @classmethod
+    def may_end(cls, given: Given, children: Sequence[Ends]) -> Ends:  # noqa: ARG003
+        """End as the child, or succeed."""
+        return children[0] | SUCCEEDS
 
     def __init__(self, wiring: Wiring) -> None:
         super().__init__(wiring)

@@ -2,13 +2,14 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Sequence
+from collections.abc import Sequence
 
 from alula.trees.ends import FAILS, NO_END, Ends, Given, together
 from alula.trees.errors import TickError
 from alula.trees.node import Control, Wiring
 from alula.trees.palette import input_port
 from alula.trees.status import FAILURE, IDLE, RUNNING, SKIPPED, SUCCESS, Answer
+from alula.trees.ticking import Order, Ticking
 from alula.trees.values import BOOL, STRING
 
 EPSILON = 2.0**-23
@@ -28,17 +29,11 @@ class _Chooses(Control):
         failed = otherwise[0] if otherwise else FAILS
         return (then if SUCCESS in asked else NO_END) | (failed if FAILURE in asked else NO_END)
 
-    @classmethod
-    def never_ticked(cls, given: Given, children: Sequence[Ends]) -> Iterator[tuple[int, int]]:  # noqa: ARG003
-        """Yield the branch that the condition never chooses."""
-        for number, end in ((1, SUCCESS), (2, FAILURE)):
-            if number < len(children) and end not in children[0]:
-                yield number, 0
-
 
 class IfThenElse(_Chooses):
     """Ticks the first child until it has ended; then the second if it succeeded, else the third, and answers as that one."""
 
+    ticking = Ticking(Order.CHOSEN)
     remembers = ("_chosen",)
 
     def __init__(self, wiring: Wiring) -> None:
@@ -72,6 +67,8 @@ class IfThenElse(_Chooses):
 class WhileDoElse(_Chooses):
     """Asks the first child in each tick: the second runs while it succeeds, the third while it fails."""
 
+    ticking = Ticking(Order.CHOSEN_EACH_TICK)
+
     def update(self) -> Answer:
         """Ask, and tick one of the others."""
         self.become(RUNNING)
@@ -96,6 +93,7 @@ class Switch(Control):
     """Ticks the child of the case that equals the variable, else the last child; asks again in each tick."""
 
     may_run = False
+    ticking = Ticking(Order.PICKED)
     remembers = ("_running",)
 
     @classmethod
@@ -172,6 +170,7 @@ class TryCatch(Control):
 
     child_count = (2, None)
     may_run = True
+    ticking = Ticking(Order.TRIED)
     ports = (input_port("catch_on_halt", BOOL, "false", "have the last child tick once when it is halted, too"),)
 
     remembers = ("_index", "_skipped", "_cleans_up")

@@ -3,25 +3,21 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from typing import ClassVar
 
-from alula.trees.ends import FAILS, SKIPS, Ends, Given, answer_in, whole_number
+from alula.trees.ends import FAILS, SKIPS, SUCCEEDS, Ends, Given, answer_in, whole_number
 from alula.trees.node import NANOSECONDS_PER_MS, Decorator, Script, Wiring
 from alula.trees.palette import input_port
-from alula.trees.status import FAILURE, IDLE, RUNNING, SKIPPED, SUCCESS, Answer
+from alula.trees.status import FAILURE, IDLE, RUNNING, SKIPPED, SUCCESS, Answer, Status
+from alula.trees.ticking import AGAIN, Begin, Order, Steps, Ticking
 from alula.trees.values import BOOL, INT, STATUS, STRING, UINT
+
+ONCE_MORE: Steps = frozenset({AGAIN})
 
 
 class _Changed(Decorator):
     """Answers something else than its child."""
 
     may_run = False
-    instead: ClassVar[dict[Answer, Answer]] = {}
-
-    @classmethod
-    def may_end(cls, given: Given, children: Sequence[Ends]) -> Ends:  # noqa: ARG003
-        """Change the child's."""
-        return frozenset(cls.instead.get(end, end) for end in children[0])
 
     def update(self) -> Answer:
         """Tick the child."""
@@ -29,38 +25,49 @@ class _Changed(Decorator):
         answer = self.child.execute()
         if answer is SUCCESS or answer is FAILURE:
             self.reset_children()
-            return self.instead[answer]
+            return self._instead(answer)
         return answer
+
+    def _instead(self, answer: Status) -> Status:
+        """Return what it answers when the child has ended."""
+        raise NotImplementedError
 
 
 class Inverter(_Changed):
     """Fails when its child succeeds, and the other way round."""
 
-    instead: ClassVar[dict[Answer, Answer]] = {SUCCESS: FAILURE, FAILURE: SUCCESS}
+    ticking = Ticking(Order.SINGLE, after={SUCCESS: FAILS, FAILURE: SUCCEEDS})
+
+    def _instead(self, answer: Status) -> Status:
+        return SUCCESS if answer is FAILURE else FAILURE
 
 
 class ForceSuccess(_Changed):
     """Succeeds when its child has ended."""
 
-    instead: ClassVar[dict[Answer, Answer]] = {SUCCESS: SUCCESS, FAILURE: SUCCESS}
+    ticking = Ticking(Order.SINGLE, after={FAILURE: SUCCEEDS})
+
+    def _instead(self, answer: Status) -> Status:  # noqa: ARG002
+        return SUCCESS
 
 
 class ForceFailure(_Changed):
     """Fails when its child has ended."""
 
-    instead: ClassVar[dict[Answer, Answer]] = {SUCCESS: FAILURE, FAILURE: FAILURE}
+    ticking = Ticking(Order.SINGLE, after={SUCCESS: FAILS}, takes_failure=True)
+
+    def _instead(self, answer: Status) -> Status:  # noqa: ARG002
+        return FAILURE
 
 
 class KeepRunningUntilFailure(_Changed):
     """Runs its child again and again, and fails with it."""
 
     may_run = True
-    instead: ClassVar[dict[Answer, Answer]] = {SUCCESS: RUNNING, FAILURE: FAILURE}
+    ticking = Ticking(Order.SINGLE, after={SUCCESS: ONCE_MORE, SKIPPED: ONCE_MORE}, takes_failure=True)
 
-    @classmethod
-    def may_end(cls, given: Given, children: Sequence[Ends]) -> Ends:  # noqa: ARG003
-        """Fail."""
-        return children[0] & FAILS
+    def _instead(self, answer: Status) -> Status:
+        return RUNNING if answer is SUCCESS else FAILURE
 
     def update(self) -> Answer:
         """Tick the child; one that is skipped is asked again in the next tick."""
@@ -72,9 +79,6 @@ class _Again(Decorator):
     """Ticks its child again after one of its answers, so often at most; the count survives skipping."""
 
     may_run = False
-    again: ClassVar[Answer]
-    port: ClassVar[str]
-
     remembers = ("_count",)
 
     def __init__(self, wiring: Wiring) -> None:
@@ -84,14 +88,15 @@ class _Again(Decorator):
     @classmethod
     def may_end(cls, given: Given, children: Sequence[Ends]) -> Ends:
         """End as the child; but for ever never so that it would go on, and so without the child where the number may be 0."""
-        number, again = whole_number(given, cls.port), frozenset({cls.again})
+        number, again = whole_number(given, cls.ticking.rounds), frozenset({cls.ticking.goes_on})
         if number == -1:
             return children[0] - again
         return children[0] | (again if number is None or number <= 0 else frozenset())
 
     def update(self) -> Answer:
         """Tick the child as long as it ends and is to begin again."""
-        most = self.number(self.port)
+        port, again = self.ticking.rounds, self.ticking.goes_on
+        most = self.number(port)
         self.become(RUNNING)
         while self._count < most or most == -1:
             fresh = self.child.status is IDLE
@@ -101,15 +106,15 @@ class _Again(Decorator):
             self.reset_children()
             if answer is SKIPPED:
                 return SKIPPED
-            if answer is not self.again:
+            if answer is not again:
                 self._count = 0
                 return answer
             self._count += 1
-            most = self.number(self.port) if self.again is FAILURE else most
+            most = self.number(port) if again is FAILURE else most
             if fresh and (self._count < most or most == -1):
                 return self.give_way()
         self._count = 0
-        return self.again
+        return again
 
     def halt(self) -> None:
         """Count anew the next time."""
@@ -120,16 +125,14 @@ class _Again(Decorator):
 class Repeat(_Again):
     """Runs its child so many times as long as it succeeds; -1: for ever."""
 
-    again = SUCCESS
-    port = "num_cycles"
+    ticking = Ticking(Order.SINGLE, SUCCESS, after={SUCCESS: ONCE_MORE | SUCCEEDS}, rounds="num_cycles")
     ports = (input_port("num_cycles", INT, doc="how often; -1: for ever"),)
 
 
 class RetryUntilSuccessful(_Again):
     """Runs its child so many times until it succeeds; -1: for ever."""
 
-    again = FAILURE
-    port = "num_attempts"
+    ticking = Ticking(Order.SINGLE, FAILURE, after={FAILURE: ONCE_MORE | FAILS}, rounds="num_attempts")
     ports = (input_port("num_attempts", INT, doc="how often; -1: for ever"),)
 
 
@@ -139,6 +142,7 @@ class RunOnce(Decorator):
     ports = (input_port("then_skip", BOOL, "true", "skip afterwards; else answer as the first time"),)
 
     may_run = False
+    ticking = Ticking(Order.SINGLE, begins=Begin.PERHAPS)
     remembers = ("_answer",)
 
     @classmethod
@@ -168,6 +172,7 @@ class Precondition(Decorator):
     ports = (input_port("if", STRING, doc="the script"), input_port("else", STATUS, "FAILURE", "what it answers when the script says no"))
 
     may_run = None
+    ticking = Ticking(Order.SINGLE, begins=Begin.PERHAPS)
     remembers = ("_begun",)
 
     @classmethod
@@ -212,12 +217,8 @@ class Delay(Decorator):
 
     ports = (input_port("delay_msec", UINT, doc="after how long", unit="ms"),)
 
+    ticking = Ticking(Order.SINGLE, begins=Begin.LATER)
     remembers = ("_until_ns",)
-
-    @classmethod
-    def may_end(cls, given: Given, children: Sequence[Ends]) -> Ends:  # noqa: ARG003
-        """End as the child."""
-        return children[0]
 
     def __init__(self, wiring: Wiring) -> None:
         super().__init__(wiring)
@@ -248,12 +249,13 @@ class Timeout(Decorator):
     ports = (input_port("msec", UINT, doc="for how long at most", unit="ms"),)
 
     may_run = False
+    ticking = Ticking(Order.SINGLE, cuts_off=FAILS)
     remembers = ("_until_ns",)
 
     @classmethod
     def may_end(cls, given: Given, children: Sequence[Ends]) -> Ends:
         """End as the child, or fail after the time."""
-        return children[0] if whole_number(given, "msec") == 0 else children[0] | FAILS
+        return children[0] if whole_number(given, "msec") == 0 else super().may_end(given, children)
 
     def __init__(self, wiring: Wiring) -> None:
         super().__init__(wiring)

@@ -11,6 +11,7 @@ from alula.trees.errors import TickError
 from alula.trees.node import Decorator, SyncAction, Wiring, pointer
 from alula.trees.palette import inout_port, input_port
 from alula.trees.status import FAILURE, RUNNING, SKIPPED, SUCCESS, Answer
+from alula.trees.ticking import Begin, Order, Ticking
 from alula.trees.values import ANY, STRING, shown
 
 
@@ -87,6 +88,8 @@ class _IfUpdated(Decorator):
 
     remembers = ("_seen", "_running")
 
+    ticking = Ticking(Order.SINGLE, begins=Begin.PERHAPS)
+
     @classmethod
     def may_end(cls, given: Given, children: Sequence[Ends]) -> Ends:  # noqa: ARG003
         """End as the child, or as it does without it."""
@@ -125,4 +128,5 @@ class WaitValueUpdate(_IfUpdated):
     """Waits until an entry is written, then ticks its child."""
 
     may_run = True
+    ticking = Ticking(Order.SINGLE, begins=Begin.LATER)
     otherwise = RUNNING

@@ -5,11 +5,12 @@ from __future__ import annotations
 from collections.abc import Sequence
 from dataclasses import replace
 
-from alula.trees.ends import FAILS, Ends, Given, answer_in
+from alula.trees.ends import ANY_END, FAILS, Ends, Given, answer_in
 from alula.trees.errors import TickError
 from alula.trees.node import Decorator, Wiring, pointer
 from alula.trees.palette import inout_port, input_port, output_port
 from alula.trees.status import FAILURE, IDLE, RUNNING, SKIPPED, SUCCESS, Answer, Skipped, Status
+from alula.trees.ticking import AGAIN, Begin, Order, Ticking
 from alula.trees.values import BOOL, DOUBLE, INT, STATUS, STRING, PortType, list_of
 
 
@@ -20,6 +21,7 @@ class Loop(Decorator):
     """
 
     may_run = True
+    ticking = Ticking(Order.SINGLE, after=dict.fromkeys((SUCCESS, SKIPPED), frozenset({AGAIN, *ANY_END})), begins=Begin.PERHAPS)
     remembers = ("_running", "_items")
 
     @classmethod

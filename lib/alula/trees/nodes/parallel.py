@@ -9,6 +9,7 @@ from alula.trees.errors import TickError
 from alula.trees.node import Control, Wiring
 from alula.trees.palette import input_port
 from alula.trees.status import FAILURE, RUNNING, SKIPPED, SUCCESS, Answer
+from alula.trees.ticking import Order, Ticking
 from alula.trees.values import INT
 
 
@@ -47,6 +48,7 @@ def threshold_of(number: int, children: int) -> int:
 class Parallel(_AtOnce):
     """Ticks all children until enough have succeeded or failed; halts the others then."""
 
+    ticking = Ticking(Order.AT_ONCE, place="_done", succeeds_after="success_count", fails_after="failure_count")
     ports = (
         input_port("success_count", INT, "-1", "how many have to succeed; -1: all"),
         input_port("failure_count", INT, "1", "how many have to fail for it to fail"),
@@ -97,6 +99,7 @@ class Parallel(_AtOnce):
 class ParallelAll(_AtOnce):
     """Ticks all children until each has ended; fails when too many failed."""
 
+    ticking = Ticking(Order.AT_ONCE, place="_done", fails_after="max_failures")
     ports = (input_port("max_failures", INT, "1", "how many have to fail for it to fail; -1: all"),)
 
     @classmethod

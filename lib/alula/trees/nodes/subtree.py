@@ -5,12 +5,15 @@ from __future__ import annotations
 from alula.trees.node import Decorator
 from alula.trees.palette import Category
 from alula.trees.status import FAILURE, IDLE, RUNNING, SUCCESS, Answer
+from alula.trees.ticking import Order, Ticking
 
 
 class SubTree(Decorator):
     """Another tree of the files."""
 
     category = Category.SUBTREE
+    may_run = False
+    ticking = Ticking(Order.SINGLE)
 
     def update(self) -> Answer:
         """Tick it."""

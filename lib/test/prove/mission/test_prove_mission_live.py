@@ -61,6 +61,11 @@ ROUND = (
     'RetryUntilSuccessful num_attempts="2"',
     'Timeout msec="300"',
     'Delay delay_msec="200"',
+    "KeepRunningUntilFailure",
+    'Precondition if="b == \'x\'" else="FAILURE"',
+    'WaitValueUpdate entry="{a}"',
+    'LoopString queue="x;y" value="{b}"',
+    "RunOnce",
     'Sequence _onSuccess="a := \'x\'" _onFailure="b := a"',
 )
 INNER = """
