@@ -11,7 +11,7 @@ echo "machine"
 if command -v apt-get >/dev/null && command -v dpkg-query >/dev/null; then
   . /etc/os-release; good "Debian-like system" "${PRETTY_NAME:-}"
 else
-  bad "Debian-like system" "there is no apt-get" "use Debian 12 or 13, or a container (docs/containers.md)"
+  bad "Debian-like system" "there is no apt-get" "use Debian 12 or 13, or a container (docs/how-to/containers.md)"
 fi
 [ "$(uname -m)" = x86_64 ] && good "processor" "x86_64, $(nproc) cores" || bad "processor" "$(uname -m)" "the ROS 2 wheels exist for x86_64 only"
 good "free disk" "$(df -Pm "$ALULA_ROOT" | awk 'NR==2{print $4}') MB; an installation takes about 3000 MB"

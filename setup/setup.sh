@@ -26,7 +26,7 @@ disk_needed_mb=5000
 
 check_machine() {
   command -v apt-get >/dev/null && command -v dpkg-query >/dev/null ||
-    fail "this is not a Debian-like system: there is no apt-get" "use Debian 12 or 13, or a container (docs/containers.md)"
+    fail "this is not a Debian-like system: there is no apt-get" "use Debian 12 or 13, or a container (docs/how-to/containers.md)"
   [ "$(uname -m)" = x86_64 ] || fail "the ROS 2 wheels exist for x86_64 only, this is $(uname -m)" "use an x86_64 machine"
   local free_mb; free_mb=$(df -Pm "$ALULA_STATE" | awk 'NR==2{print $4}')
   [ -x "$ALULA_STATE/venv2/bin/python" ] || [ "$free_mb" -ge $disk_needed_mb ] ||

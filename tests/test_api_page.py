@@ -1,4 +1,4 @@
-"""docs/api.md is what the docstrings say, and has every public name."""
+"""docs/reference/api.md is what the docstrings say, and has every public name."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""What the documents name exists: links, anchors, files, folders, modules and what they define. Pages on history name what was."""
+"""The manual: what its pages name exists (links, files, modules, commands), each says for whom it is, and the site of them builds."""
 
 from __future__ import annotations
 
@@ -8,8 +8,11 @@ import subprocess
 from collections.abc import Iterator
 from functools import cache
 from pathlib import Path
+from typing import Any
 
 import pytest
+
+from alula_testing.waits import until
 
 ALULA_ROOT = Path(__file__).resolve().parents[1]
 ROOMS = sorted(path.name for path in ALULA_ROOT.iterdir() if path.is_dir() and path.name[0] != "." and path.name != "runs")
@@ -52,6 +55,76 @@ def headings(text: str) -> set[str]:
 def links(page: Path) -> Iterator[str]:
     """Yield what a page links to in the checkout."""
     return (target for target in re.findall(r"\]\(([^)\s]+)\)", page.read_text()) if not re.match(r"\w+:", target))
+
+
+SIZES = {"README.md": 5_000, "docs/start": 6_000}
+"""How many bytes a page may have: who has a task reads the whole of it."""
+
+
+@pytest.mark.parametrize("name", NAMES)
+def test_a_page_says_for_whom_it_is(name: str) -> None:
+    """In the first sentence below its title, so that a reader knows whether to go on."""
+    title, audience = (ALULA_ROOT / name).read_text(encoding="utf-8").split("\n\n", 2)[:2]
+    assert re.fullmatch(r"# .+", title)
+    assert audience.startswith("For ")
+
+
+@pytest.mark.parametrize("name", [name for name in NAMES if name.startswith(tuple(SIZES))])
+def test_a_page_of_one_task_is_short(name: str) -> None:
+    limit = next(size for place, size in SIZES.items() if name.startswith(place))
+    assert (ALULA_ROOT / name).stat().st_size <= limit
+
+
+@pytest.fixture(scope="module")
+def site(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    """Build the site as CONTRIBUTING says; a page that the navigation lacks, a dead link or anchor is an error."""
+    folder = tmp_path_factory.mktemp("site")
+    command = [ALULA_ROOT / "setup/in_ros2", "mkdocs", "build", "--strict", "--site-dir", folder]
+    done = subprocess.run(command, cwd=ALULA_ROOT, capture_output=True, text=True, check=False)
+    assert done.returncode == 0, done.stderr
+    return folder
+
+
+def test_the_site_has_every_page(site: Path) -> None:
+    """But for the README, which is the front of the checkout, as index.md is of the site; a README of a folder is its index."""
+    made = {str(path.relative_to(site).with_suffix("")) for path in site.rglob("*.html")}
+    wanted = {name.removeprefix("docs/").removesuffix(".md") for name in NAMES if name != "README.md"}
+    assert not {re.sub(r"README$", "index", name) for name in wanted} - made
+
+
+def test_the_site_works_without_a_network(site: Path) -> None:
+    """No page fetches from another host, and the search's index is a script, which a browser reads from a disk."""
+    fetched = re.compile(r"""<(?:script|img|iframe|source)[^>]*\ssrc=["']?(?:https?:)?//|<link[^>]*rel=["']?stylesheet[^>]*//""")
+    assert not [str(path.relative_to(site)) for path in site.rglob("*.html") if fetched.search(path.read_text(encoding="utf-8"))]
+    index = (site / "search/search_index.js").read_text(encoding="utf-8")
+    for words in ("Which world the managers run in", "over-approximation", "ALU521"):
+        assert words in index
+
+
+def test_the_site_is_searched_from_a_disk(site: Path, browser: Any) -> None:
+    """As a browser opens it without any server: the search answers, and nothing goes wrong."""
+    browser.get(f"{(site / 'concepts/terminology.html').as_uri()}?q=counterexample")
+    until(lambda: browser.find_elements("css selector", ".md-search-result__item"), "a result of the search")
+    assert not [entry["message"] for entry in browser.get_log("browser") if entry["level"] == "SEVERE"]
+
+
+def test_links_of_the_site_lead_to_its_pages(site: Path) -> None:
+    """Also those from and to pages outside of docs/, which the hook has rewritten."""
+    dead = []
+    for path in site.rglob("*.html"):
+        for target in re.findall(r"""<(?:a|img)[^>]*\s(?:href|src)=["']?([^"'\s>]+)""", path.read_text(encoding="utf-8")):
+            place = target.partition("#")[0]
+            if place and not re.match(r"\w+:", place) and path.name != "404.html" and not (path.parent / place).exists():
+                dead.append(f"{path.relative_to(site)}: {target}")
+    assert not dead
+
+
+def test_the_terminology_explains_each_word_once() -> None:
+    page = (ALULA_ROOT / "docs/concepts/terminology.md").read_text(encoding="utf-8")
+    terms = [term.strip() for row in re.findall(r"^\| ([^|]+) \|", page, re.MULTILINE) for term in row.split(",")]
+    terms = [term for term in terms if term != "term"]
+    assert len(terms) >= 60
+    assert sorted(terms) == sorted(set(terms))
 
 
 def test_each_page_is_found_from_the_readme() -> None:

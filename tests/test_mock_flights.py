@@ -27,7 +27,7 @@ def example(document: str, marker: str) -> str:
 
 def test_the_behaviour_of_the_page_on_mocks_is_flown_as_it_says(tmp_path: Path) -> None:
     behaviour = tmp_path / "gust.yaml"
-    behaviour.write_text(example("docs/mocks.md", "`gust.yaml`:"), encoding="utf-8")
+    behaviour.write_text(example("docs/reference/mocks.md", "`gust.yaml`:"), encoding="utf-8")
     flight = start_flight(tmp_path / "run", "--mock", "--monitor", "--behaviour", str(behaviour))
     assert flight.end() == 0, flight.words()
     summary = flight.summary
@@ -70,7 +70,7 @@ def test_a_behaviour_that_can_not_be_read_leaves_nothing_behind(tmp_path: Path) 
 
 
 def test_the_python_example_of_the_page_on_mocks_runs(tmp_path: Path) -> None:
-    code = "import navigation_managers.model as navigation\n" + example("docs/mocks.md", "## From a test\n")
+    code = "import navigation_managers.model as navigation\n" + example("docs/reference/mocks.md", "## From a test\n")
     code += '\nassert (handle.outcome, handle.message) == ("NOT_VALIDATED", "propellers are off")'
     done = subprocess.run([sys.executable, "-c", code], cwd=tmp_path, capture_output=True, text=True, timeout=60, check=False)
     assert done.returncode == 0, done.stderr

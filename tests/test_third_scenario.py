@@ -1,4 +1,4 @@
-"""A scenario added as docs/scenarios.md says: its files, taken from the page, in a copy of the checkout that is made of links."""
+"""A scenario added as docs/how-to/scenarios.md says: its files, taken from the page, in a copy of the checkout that is made of links."""
 
 from __future__ import annotations
 
@@ -12,7 +12,7 @@ from textwrap import dedent
 import pytest
 
 ALULA_ROOT = Path(__file__).resolve().parents[1]
-PAGE = (ALULA_ROOT / "docs" / "scenarios.md").read_text(encoding="utf-8")
+PAGE = (ALULA_ROOT / "docs/how-to/scenarios.md").read_text(encoding="utf-8")
 LIMIT_S = 250.0
 OWN = ("setup", "scenarios", "missions", "ros1_ws")
 """What is no link: what is added to, and the folder above it; and the scripts that find the checkout by where they are."""

@@ -20,7 +20,7 @@ from alula_testing.cover import read_only
 from alula_testing.flights import Flight, start_flight
 
 ALULA_ROOT = Path(__file__).resolve().parents[1]
-SECTION = (ALULA_ROOT / "docs" / "tutorial.md").read_text(encoding="utf-8")
+SECTION = (ALULA_ROOT / "docs/start/own-robot.md").read_text(encoding="utf-8")
 COMMANDS = re.findall(r"^ {4}(alula .*)$", SECTION, re.MULTILINE)
 BLOCKS = dict(re.findall(r"^```(\w+)\n(.*?)^```$", SECTION, re.MULTILINE | re.DOTALL))
 MODEL, HOOKS, MISSION = "skillsets/rover.skill", "ros2_ws/src/rover_robot/rover_robot/hooks.py", "missions/patrol.xml"

@@ -1,4 +1,4 @@
-"""What the parts of a robot are made of, which its ``robot.yaml`` names under ``parts`` (docs/robots.md), and what its simulator reads.
+"""What a robot's parts are made of (``parts`` of its ``robot.yaml``: docs/reference/robots.md), and what its simulator reads.
 
 ``missions``: a `MissionPart`, nodes of its own. ``inputs``: a function from the file of a world to `Inputs`, which raises InputError.
 ``run``: a `RunPart`, options of its live runs and what the death of a node means. ``report``: a `ReportPart`, made of a `ReportedRun`.

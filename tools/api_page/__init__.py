@@ -1,1 +1,1 @@
-"""Writes docs/api.md, the reference of the public names, from their docstrings."""
+"""Writes docs/reference/api.md, the reference of the public names, from their docstrings."""

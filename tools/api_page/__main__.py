@@ -1,4 +1,4 @@
-"""Writes the reference of the public API: `python -m api_page [FILE]`, by default docs/api.md of this checkout.
+"""Writes the reference of the public API: `python -m api_page [FILE]`, by default docs/reference/api.md of this checkout.
 
 The modules are read as text, so that neither ROS world is needed. A name is looked up where its public module imports it from.
 """
@@ -14,7 +14,7 @@ from dataclasses import dataclass
 from pathlib import Path
 
 ALULA_ROOT = Path(__file__).resolve().parents[2]
-PAGE = ALULA_ROOT / "docs/api.md"
+PAGE = ALULA_ROOT / "docs/reference/api.md"
 WIDTH = 118
 FOLDERS = {
     "alula": "lib",
@@ -26,9 +26,9 @@ MODULES = ("alula", "alula.trees", "alula.parts", "skillset_ros2", "skillset_ros
 HEAD = """\
 # The public API
 
-For who writes programs, hooks, nodes or parts of a robot in Python. These names stay; what is to go warns for one minor
-version first ([CONTRIBUTING](../CONTRIBUTING.md#the-public-api)). Every other module is private. What generated code
-offers is in [client](client.md) and in the [reference](reference.md).
+For authors of programs, hooks, nodes or parts of a robot in Python. These names stay; what is to go warns for one minor
+version first ([CONTRIBUTING](../../CONTRIBUTING.md#the-public-api)). Every other module is private. What generated code
+offers is in [client](../how-to/client.md) and in [names](names.md).
 
 <!-- Written by `python -m api_page`, from the docstrings. -->
 """

@@ -1,6 +1,6 @@
-"""Writes the findings of docs/mission-checks.md: what stands below the line that begins with MARK.
+"""Writes the findings of docs/reference/mission-checks.md: what stands below the line that begins with MARK.
 
-python -m finding_pages.mission_checks docs
+python -m finding_pages.mission_checks docs/reference
 """
 
 from __future__ import annotations
@@ -61,7 +61,7 @@ def page(text: str) -> str:
     above, _, _ = text.partition(MARK)
     known = examples(MISSIONS)
     sections = (line for code, meaning in MISSION_CODES.items() for line in _section(code, meaning, known[code]))
-    head = f"{MARK} `python -m finding_pages.mission_checks docs`, from the rules and their examples. -->"
+    head = f"{MARK} `python -m finding_pages.mission_checks docs/reference`, from the rules and their examples. -->"
     return "\n".join([f"{above}{head}\n", *sections])
 
 

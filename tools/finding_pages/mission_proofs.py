@@ -1,6 +1,6 @@
-"""Writes the findings of docs/mission-proofs.md: what stands below the line that begins with MARK.
+"""Writes the findings of docs/reference/mission-proofs.md: what stands below the line that begins with MARK.
 
-python -m finding_pages.mission_proofs docs
+python -m finding_pages.mission_proofs docs/reference
 """
 
 from __future__ import annotations
@@ -69,7 +69,8 @@ def page(text: str) -> str:
     above, _, _ = text.partition(MARK)
     known = examples(RUNS)
     sections = (line for code, meaning in RUN_CODES.items() for line in _section(code, meaning, known[code]))
-    return "\n".join([f"{above}{MARK} `python -m finding_pages.mission_proofs docs`, from the rules and their examples. -->\n", *sections])
+    mark = f"{MARK} `python -m finding_pages.mission_proofs docs/reference`, from the rules and their examples. -->\n"
+    return "\n".join([above + mark, *sections])
 
 
 def found_in(text: str) -> list[Diagnostic]:

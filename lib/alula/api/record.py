@@ -15,7 +15,7 @@ from alula.runtime.core.records import ExecutionRecord, executions_of
 class Record:
     """The record of a run's decisions, ``skills.mcap``: its entries, in the order in which the mission came to know of them.
 
-    An entry has a ``topic``, a ``stamp_s`` (seconds of mission clock) and a ``value`` as JSON has it; docs/records.md lists the topics.
+    An entry has a ``topic``, a ``stamp_s`` (seconds of mission clock) and a ``value`` as JSON has it; the page on records lists the topics.
     Foxglove opens the file, too.
 
     Args:

@@ -1,4 +1,4 @@
-"""The help of all commands, on the terminal and as a page (docs/commands.md); ``python -m alula.cli.help docs`` writes the page."""
+"""The help of all commands, on the terminal and as a page; ``python -m alula.cli.help docs/reference`` writes the page there."""
 
 from __future__ import annotations
 
@@ -17,7 +17,7 @@ _WIDTH = 12
 _HEAD = """# Commands
 
 For everybody who uses Alula: what `./alula` of a checkout can do. `alula` of a pip installation is the same command
-line, and says of what needs ROS that it does. This page is written by `setup/in_ros2 python -m alula.cli.help docs`,
+line, and says of what needs ROS that it does. `setup/in_ros2 python -m alula.cli.help docs/reference` writes this page
 from the table that the commands read their words with.
 
 The robot is the folder with `robot.yaml` from the current one upwards, or `--robot DIR`, anywhere on the command line.

@@ -1,4 +1,4 @@
-"""What a robot says of its pages and reports: ``page`` in its ``robot.yaml`` (docs/robots.md)."""
+"""What a robot says of its pages and reports: ``page`` in its ``robot.yaml`` (docs/reference/robots.md)."""
 
 from __future__ import annotations
 

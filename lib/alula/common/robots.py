@@ -30,7 +30,7 @@ VARIABLE = "ALULA_ROBOT"
 BEHAVIOUR, FAULTS = "mock.yaml", "faults.yaml"
 """Files beside the models: what mocks do, and what faults bring about."""
 PARTS = ("inputs", "missions", "hooks", "report", "run", "sensors", "areas")
-"""What a robot may add to the general commands, as ``module`` or ``module:name``; ``docs/robots.md`` says what each has to be."""
+"""What a robot may add to the general commands, as ``module`` or ``module:name``; ``docs/reference/robots.md`` says what each has to be."""
 WORLD_KEYS = ("packages", "python", "debian", "underlays")
 KEYS = (
     "name",

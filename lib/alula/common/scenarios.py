@@ -1,4 +1,4 @@
-"""The scenarios of a robot: ``scenarios/NAME.yaml`` says of each everything that it is made of (docs/scenarios.md)."""
+"""The scenarios of a robot: ``scenarios/NAME.yaml`` says of each everything that it is made of (docs/how-to/scenarios.md)."""
 
 from __future__ import annotations
 

@@ -133,7 +133,7 @@ PROOF_CODES: Mapping[str, str] = {code: meaning for code, meaning in CODES.items
 MISSION_CODES: Mapping[str, str] = {
     code: meaning for code, meaning in CODES.items() if code.startswith("ALU6") or code in {"ALU004", "ALU007", "ALU008", "ALU009"}
 }
-"""Those of missions, told in docs/mission-checks.md."""
+"""Those of missions, told in docs/reference/mission-checks.md."""
 
 RUN_CODES: Mapping[str, str] = {code: meaning for code, meaning in CODES.items() if code.startswith("ALU7")}
-"""Those of all runs of a mission, told in docs/mission-proofs.md."""
+"""Those of all runs of a mission, told in docs/reference/mission-proofs.md."""

@@ -26,7 +26,7 @@ class Place:
 class Problem:
     """One thing that is wrong in a file, and what to do about it; the cure may be empty.
 
-    ``code`` is the number under which docs/mission-checks.md tells of it, ``length`` that of the text that it is about, in characters;
+    ``code`` is its number in docs/reference/mission-checks.md, ``length`` that of the text that it is about, in characters;
     a warning keeps no tree from being ticked.
     """
 

@@ -17,7 +17,7 @@ from finding_pages.examples import MISSIONS, examples
 from finding_pages.mission_checks import NAME, ROBOT, found_in, page, whole
 
 EXAMPLES = examples(MISSIONS)
-PAGE = next(p / "docs" / NAME for p in Path(__file__).resolve().parents if (p / "docs" / NAME).is_file())
+PAGE = next(p / "docs/reference" / NAME for p in Path(__file__).resolve().parents if (p / "docs/reference" / NAME).is_file())
 MUTATIONS = 1000
 
 SOUND = """<?xml version="1.0"?>
@@ -96,7 +96,7 @@ def test_broken_and_mended_mission(code):
 
 
 def test_the_page_is_written_of_rules_and_examples():
-    """Mend with `python -m finding_pages.mission_checks docs`."""
+    """Mend with `python -m finding_pages.mission_checks docs/reference`."""
     assert PAGE.read_text() == page(PAGE.read_text())
 
 

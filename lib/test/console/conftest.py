@@ -1,20 +1,16 @@
-"""What the console's tests share: the folder of a run, and a browser."""
+"""What the console's tests share: the folder of a run."""
 
 from __future__ import annotations
 
 import json
 import os
-import shutil
-from collections.abc import Callable, Iterator
+from collections.abc import Callable
 from pathlib import Path
-from typing import Any
 
 import pytest
 from console_records import Story, failing_story, write_map, write_record
-from console_serving import WAIT_S
 
 os.environ.setdefault("ALULA_ROOT", str(Path(__file__).resolve().parents[3]))
-CHROMIUM, DRIVER = shutil.which("chromium"), shutil.which("chromedriver")
 
 
 @pytest.fixture
@@ -41,22 +37,3 @@ def make_run(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Callable[..., P
         return folder
 
     return make
-
-
-@pytest.fixture(scope="session")
-def browser() -> Iterator[Any]:
-    """A browser for all tests of a page: Debian's chromium, driven by Selenium."""
-    if CHROMIUM is None or DRIVER is None:
-        pytest.skip("no browser: apt install chromium chromium-driver")
-    from selenium import webdriver
-    from selenium.webdriver.chrome.service import Service
-
-    options = webdriver.ChromeOptions()
-    options.binary_location = CHROMIUM
-    for word in ("--headless=new", "--no-sandbox", "--disable-dev-shm-usage"):
-        options.add_argument(word)
-    options.set_capability("goog:loggingPrefs", {"browser": "ALL"})
-    driver = webdriver.Chrome(options=options, service=Service(DRIVER))
-    driver.set_script_timeout(WAIT_S)
-    yield driver
-    driver.quit()

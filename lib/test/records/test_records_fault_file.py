@@ -45,7 +45,7 @@ def test_states_and_ends_are_read_with_patterns(tmp_path):
 
 
 def test_the_example_of_the_page_is_right(tmp_path):
-    page = (ALULA_ROOT / "docs/records.md").read_text(encoding="utf-8")
+    page = (ALULA_ROOT / "docs/reference/records.md").read_text(encoding="utf-8")
     example = "    faults:\n" + page.partition("\n    faults:\n")[2].partition("\n\n")[0]
     assert read(tmp_path, dedent(example)).keys() == {"lidar", "radio", "uav_guidance"}
 

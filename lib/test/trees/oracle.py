@@ -74,14 +74,14 @@ class Theirs:
 
 
 class SkipUnlessUpdated(entries.SkipUnlessUpdated):
-    """As of version 4.8: halted, it leaves its child running (docs/trees.md)."""
+    """As of version 4.8: halted, it leaves its child running (docs/concepts/trees.md)."""
 
     def halt(self) -> None:
         self._running = False
 
 
 class WaitValueUpdate(entries.WaitValueUpdate):
-    """As of version 4.8: halted, it leaves its child running (docs/trees.md)."""
+    """As of version 4.8: halted, it leaves its child running (docs/concepts/trees.md)."""
 
     def halt(self) -> None:
         self._running = False

@@ -1,4 +1,4 @@
-"""Nodes on a clock that the test moves; a robot's own nodes; and what differs from BehaviorTree.CPP on purpose (docs/trees.md)."""
+"""Nodes on a clock that the test moves; a robot's own nodes; and what differs from BehaviorTree.CPP on purpose (docs/concepts/trees.md)."""
 
 from __future__ import annotations
 

@@ -1,6 +1,6 @@
 """Random trees are ticked exactly as BehaviorTree.CPP itself ticks them (behaviortreepy: version 4.8.2).
 
-What differs on purpose is in docs/trees.md and in test_trees_nodes.py.
+What differs on purpose is in docs/concepts/trees.md and in test_trees_nodes.py.
 """
 
 from __future__ import annotations

@@ -83,7 +83,7 @@ def test_of_a_port_that_only_a_model_tells_of_nobody_knows_whether_it_is_read_fi
 
 
 def test_a_copy_of_an_entry_that_was_written_as_text_is_made():
-    """BehaviorTree.CPP 4.8 fails in the first tick, and raises in the next (docs/trees.md)."""
+    """BehaviorTree.CPP 4.8 fails in the first tick, and raises in the next (docs/concepts/trees.md)."""
     copy = '<Sequence><SetBlackboard value="7" output_key="a"/><SetBlackboard value="{a}" output_key="b"/></Sequence>'
     tree = make_tree(read_text(ROOT.format(copy)), standard_palette(), lambda: 0)
     assert [tree.tick() for _ in range(2)] == [SUCCESS, SUCCESS]
@@ -91,7 +91,7 @@ def test_a_copy_of_an_entry_that_was_written_as_text_is_made():
 
 
 def test_an_output_that_is_a_plain_text_is_refused():
-    """BehaviorTree.CPP writes nothing then: an entry without its braces is a slip (docs/trees.md)."""
+    """BehaviorTree.CPP writes nothing then: an entry without its braces is a slip (docs/concepts/trees.md)."""
     with pytest.raises(FileError, match="names an entry"):
         make_tree(read_text(ROOT.format('<LoopInt queue="1" value="x"><AlwaysSuccess/></LoopInt>')), standard_palette(), lambda: 0)
 

@@ -1,6 +1,6 @@
 """Scripts run as BehaviorTree.CPP itself runs them (behaviortreepy: BT.CPP 4.8.2): equal values, types and errors.
 
-Where 4.8 and 4.9 differ, 4.9 is followed and the place is noted (docs/scripts.md): such scripts are held against a list.
+Where 4.8 and 4.9 differ, 4.9 is followed and the place is noted (docs/reference/scripts.md): such scripts are held against a list.
 """
 
 from __future__ import annotations

@@ -49,7 +49,7 @@ from finding_pages.mission_checks import whole
 from finding_pages.mission_proofs import NAME, ROBOT, found_in, page
 
 ROOT = Path(__file__).resolve().parents[4]
-DOCS = ROOT / "docs"
+DOCS = ROOT / "docs/reference"
 EXAMPLES = examples(RUNS)
 SHOWN = [code for code, example in EXAMPLES.items() if example.broken]
 TWO = """
@@ -154,7 +154,7 @@ def test_an_example_has_its_finding_and_its_cure_has_none(code: str) -> None:
 
 
 def test_the_page_is_written_from_the_examples() -> None:
-    """Mend with `python -m finding_pages.mission_proofs docs`."""
+    """Mend with `python -m finding_pages.mission_proofs docs/reference`."""
     text = (DOCS / NAME).read_text(encoding="utf-8")
     assert page(text) == text
 

@@ -1,4 +1,4 @@
-"""docs/changing-a-mission.md as it stands: the changes are made, checked and flown over mocks."""
+"""docs/how-to/changing-a-mission.md as it stands: the changes are made, checked and flown over mocks."""
 
 from __future__ import annotations
 
@@ -11,7 +11,7 @@ import pytest
 from alula import Diagnostic, Mission, Severity, check_files, open_run
 
 ALULA_ROOT = Path(__file__).resolve().parents[4]
-PAGE = (ALULA_ROOT / "docs/changing-a-mission.md").read_text(encoding="utf-8")
+PAGE = (ALULA_ROOT / "docs/how-to/changing-a-mission.md").read_text(encoding="utf-8")
 CHANGES = re.findall(r"^```diff\n(.*?)^```$", PAGE, re.MULTILINE | re.DOTALL)
 
 

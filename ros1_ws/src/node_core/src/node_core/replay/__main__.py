@@ -51,7 +51,7 @@ def perceive(part: SensorPart, source: Path, target: Path, given: Conditions) ->
         judged = {topic for topics in part.reports.values() for topic in topics}
         if not topics & judged:
             raise ReplayPartError(
-                f"{source}: holds no measurements ({', '.join(sorted(judged))}); see docs/replays.md for how to record them"
+                f"{source}: holds no measurements ({', '.join(sorted(judged))}); see docs/how-to/replays.md for how to record them"
             )
         with rosbag.Bag(str(target), "w") as out:
             Perceiving(part, bag, out, given, Path(folder)).run()

@@ -1,0 +1,1 @@
+"""The manual as a site: what MkDocs asks for pages outside of docs/."""
