@@ -35,8 +35,12 @@ def ros2(ros1, action_ros2):
 
 
 def send(ros1, name, key, **fields):
+    """Send a goal, and return what was sent; transitions that the client has told before, of a fast server, are not passed over."""
+    begin = len(ros1.lines)
     ros1.do("goal", name=name, key=key, **fields)
-    return ros1.expect("sent", key=key)
+    sent = lambda: [one for one in map(json.loads, ros1.lines[begin:]) if (one["event"], one.get("key")) == ("sent", key)]  # noqa: E731
+    until(sent, f"{key} is sent")
+    return sent()[0]
 
 
 def ending(ros1, key):
