@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+import threading
 from collections.abc import Callable, Mapping
 from typing import Any
 
@@ -34,6 +35,7 @@ class Client:
         self.skillset = skillset
         self._middleware = middleware
         self._feeds: dict[str, Feed] = {}
+        self._feeding = threading.Lock()
         self._news = ClientNews(middleware, skillset)
         self._connection = self._news.connection
 
@@ -122,15 +124,16 @@ class Client:
         return self._news.on_skills.add(callback)
 
     def data_feed(self, name: str, every_s: float = 0.0) -> Feed:
-        """Return the values of a data; it is subscribed to when it is first asked for, from then on at most once in ``every_s``.
+        """Return the values of a data; it is subscribed to when it is first asked for, by any thread, and told at most once in ``every_s``.
 
         Raises:
             ValueError: there is no such data.
         """
         data = self._find_data(name)
-        if name not in self._feeds:
-            self._feeds[name] = Feed(self._middleware, data, self.read_data, every_s)
-        return self._feeds[name]
+        with self._feeding:
+            if name not in self._feeds:
+                self._feeds[name] = Feed(self._middleware, data, self.read_data, every_s)
+            return self._feeds[name]
 
     def input_types(self, skill: str) -> dict[str, str]:
         """Return a skill's inputs with their types, as ``{"height": "float64"}``; raise ValueError."""

@@ -81,7 +81,11 @@ Listener = Callable[[Sequence[EngineEvent]], None]
 
 
 def event_record(event: EngineEvent) -> dict[str, object]:
-    """Return an event as ``json`` can write it: ``stamp_s`` in seconds, inputs as an object, outputs of an end too."""
+    """Return an event as ``json`` can write it: ``stamp_s`` in seconds, inputs as an object, outputs of an end too.
+
+    Seconds, as all that people and tools plot in a record. They are read back to the nanosecond for the first 24 days (2 ** 21 s) of a
+    clock, as those of simulations are, and to 0.2 us for a clock that counts from 1970; ``sequence`` keeps the order of what is closer.
+    """
     record: dict[str, object] = {"stamp_s": event.stamp_s, "sequence": event.sequence, "skillset": event.skillset}
     if isinstance(event, ExecutionEvent):
         record |= {"kind": EXECUTION, "skill": event.skill, "id": event.id, "state": event.state.value}
