@@ -22,13 +22,14 @@ from rclpy.executors import SingleThreadedExecutor
 from rclpy.impl.implementation_singleton import rclpy_implementation
 from rclpy.node import Node
 from rclpy.task import Future, Task
+from rclpy.waitable import Waitable
 
 RCLPY = "7.1.6"
 """The version whose handlers are known here, as pinned."""
 KINDS = ("timer", "subscription", "guard_condition", "client", "service")
 """As a wait set calls them."""
-DESTROYED_S, AGAIN_S = 1.0, 0.001
-"""So long (wall clock) a thread may take to destroy an action server; when the wait is tried again meanwhile."""
+FAILING_S, AGAIN_S = 1.0, 0.001
+"""So long (wall clock) the wait may fail before that is raised; when it is tried again meanwhile."""
 Take = Callable[[Any], Any]
 
 
@@ -41,6 +42,10 @@ class RclpyExecutor(SingleThreadedExecutor):  # type: ignore[misc]  # rclpy has 
         with self._tasks_lock:
             return all(_over(task) or task.executing() for task, _, _ in self._tasks)
 
+    def can_execute(self, entity: Any) -> bool:
+        """Tell whether to wait for an entity: not for an action that a thread has destroyed and will take off its node's list."""
+        return super().can_execute(entity) and not (isinstance(entity, Waitable) and _destroyed(entity))
+
     def wait_for_ready_callbacks(self, *args: Any, **kwargs: Any) -> Any:
         """Return what is to be run next, its entity and node. No callback runs in here, so what is raised is of the wait itself."""
         end_s = math.inf
@@ -48,8 +53,8 @@ class RclpyExecutor(SingleThreadedExecutor):  # type: ignore[misc]  # rclpy has 
             try:
                 return super().wait_for_ready_callbacks(*args, **kwargs)
             except (InvalidHandle, rclpy_implementation.RCLError):
-                # Another thread has destroyed something, which it takes off its node's list next. What was ready is found so again.
-                end_s = min(end_s, time.monotonic() + DESTROYED_S)
+                # Another thread has destroyed something between the look at it and the wait. What was ready is found so again.
+                end_s = min(end_s, time.monotonic() + FAILING_S)
                 if time.monotonic() > end_s:
                     raise
                 time.sleep(AGAIN_S)
@@ -108,6 +113,14 @@ class SparingExecutor(RclpyExecutor):
         with self._tasks_lock:
             self._tasks.append((task, entity, node))
         return task
+
+
+def _destroyed(entity: Waitable) -> bool:
+    try:
+        with entity:
+            return False
+    except InvalidHandle:
+        return True
 
 
 def _over(task: Task) -> bool:

@@ -12,8 +12,10 @@ rclpy = pytest.importorskip("rclpy")
 import skillset_ros2_executor_rig as rig  # noqa: E402
 from navigation_interfaces.action import Hover  # noqa: E402
 from rclpy.action import ActionServer  # noqa: E402
-from rclpy.callback_groups import MutuallyExclusiveCallbackGroup  # noqa: E402
+from rclpy.callback_groups import MutuallyExclusiveCallbackGroup, ReentrantCallbackGroup  # noqa: E402
+from rclpy.exceptions import InvalidHandle  # noqa: E402
 from rclpy.task import Future  # noqa: E402
+from rclpy.waitable import NumberOfEntities, Waitable  # noqa: E402
 from skillset_ros2_executor_rig import DEEP, SOON_S, First, Victim, connected, make_node, quiet, turn, turned  # noqa: E402
 from std_msgs.msg import String  # noqa: E402
 from std_srvs.srv import Trigger  # noqa: E402
@@ -99,22 +101,53 @@ def test_what_comes_and_goes_in_another_thread_disturbs_nothing(node, spun):
     assert spun.raised == []
 
 
+class Broken(Waitable):
+    """Can't be waited for until it is mended."""
+
+    mended = False
+
+    def add_to_wait_set(self, _wait_set):
+        if not self.mended:
+            raise InvalidHandle("broken")
+
+    def is_ready(self, _wait_set):
+        return False
+
+    def get_num_entities(self):
+        return NumberOfEntities()
+
+
 def test_a_wait_that_fails_for_good_raises_and_one_that_fails_for_a_moment_does_not(node, executor, monkeypatch):
     """Also long after the executor went to sleep: what counts is since when the wait has failed."""
     heard: list[str] = []
     guard = node.create_guard_condition(lambda: heard.append("rung"))
-    server = ActionServer(node, Hover, "hover", lambda _: Hover.Result())
-    monkeypatch.setattr(executor_module, "DESTROYED_S", 0.05)
-    late = threading.Timer(0.2, lambda: (server._handle.destroy_when_not_in_use(), guard.trigger()))
+    monkeypatch.setattr(executor_module, "FAILING_S", 0.05)
+    broken = Broken(ReentrantCallbackGroup())
+    late = threading.Timer(0.2, lambda: (node.add_waitable(broken), guard.trigger()))
     late.start()
-    away = threading.Timer(0.21, lambda: node.remove_waitable(server))
+    away = threading.Timer(0.21, lambda: setattr(broken, "mended", True))
     away.start()
     turned(executor, lambda: heard == ["rung"], "the guard rings")
     away.join()
-    node.add_waitable(server)
-    with pytest.raises(executor_module.rclpy_implementation.RCLError, match="action server pointer is invalid"):
+    broken.mended = False
+    with pytest.raises(InvalidHandle, match="broken"):
         turn(executor)
-    node.remove_waitable(server)
+    node.remove_waitable(broken)
+
+
+@pytest.mark.parametrize("made", [ActionClient, rclpy.action.ActionClient, lambda *of: ActionServer(*of, lambda _: Hover.Result())])
+def test_an_action_that_another_thread_takes_its_time_to_destroy_keeps_nobody_waiting(made, node, executor, monkeypatch):
+    """Such a thread may be stopped, for as long as the machine likes, between the two things that it does."""
+    heard: list[str] = []
+    guard = node.create_guard_condition(lambda: heard.append("rung"))
+    monkeypatch.setattr(executor_module, "FAILING_S", -1.0)
+    action = made(node, Hover, "hover")
+    handle = action._handle if isinstance(action, ActionServer) else action._client_handle
+    handle.destroy_when_not_in_use()
+    for count in range(1, 4):
+        guard.trigger()
+        turned(executor, lambda count=count: heard == ["rung"] * count, "the guard rings")
+    node.remove_waitable(action)
 
 
 def test_nothing_of_a_destroyed_node_is_dealt_with(context, node, partner, executor):
