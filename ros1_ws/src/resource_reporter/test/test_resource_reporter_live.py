@@ -33,6 +33,8 @@ reporter.when_settled(lambda: {}["of the reporter's thread"])
 print("a job waits", flush=True)
 rospy.spin()
 """
+ENOUGH_S = 0.1
+"""So long another thread gets to add a job, where nothing keeps it."""
 ARROWS = {("UNKNOWN", "OK"), ("UNKNOWN", "BROKEN"), ("OK", "BROKEN"), ("BROKEN", "OK")}
 
 
@@ -183,6 +185,36 @@ def test_what_waits_for_the_skillset_is_done_when_it_has_answered(skillset, repo
     assert done == ["OK"]
     reporter.when_settled(lambda: done.append("at once"))
     assert done == ["OK", "at once"]
+
+
+class Forgetful(list):
+    """Jobs; when they are done and to be forgotten, another one comes."""
+
+    def __init__(self, comes) -> None:
+        super().__init__()
+        self._comes = threading.Thread(target=comes)
+
+    def clear(self) -> None:
+        self._comes.start()
+        self._comes.join(ENOUGH_S)
+        super().clear()
+
+    def come(self) -> None:
+        self._comes.join(HANGS_S)
+
+
+def test_what_comes_at_the_end_is_done_after_what_has_waited(skillset, reporter):
+    reporter.report("zed_status", "OK")  # nothing serves the transition: it is not settled
+    until(reporter._subscriber.get_num_connections, "it hears the skillset")
+    done: list[str] = []
+    jobs = reporter._when_settled = Forgetful(lambda: reporter.when_settled(lambda: done.append("late")))
+    reporter.when_settled(lambda: done.append("first"))
+    reporter.when_settled(lambda: done.append("second"))
+    assert done == []
+    reporter.close()
+    jobs.come()
+    reporter.when_settled(lambda: done.append("closed"))
+    assert done == ["first", "second", "late", "closed"]
 
 
 def test_nothing_waits_for_a_skillset_that_is_not_there(reporter):

@@ -33,7 +33,7 @@ class ResourceReporter:
         self._skillset = skillset
         self._ledger = Ledger()
         self._changed = threading.Condition()
-        self._ended = False
+        self._ended = self._over = False
         self._when_settled: list[Callable[[], None]] = []
         self._unsettled_since_s: float | None = None
         self._told_unknown: set[str] = set()
@@ -56,10 +56,10 @@ class ResourceReporter:
         """Do a job once the skillset knows of all states reported so far: at once if it does, else in the reporter's thread.
 
         It knows what it shows, has accepted or has refused. A job waits for 10 s (wall clock) at most, and not at all where nothing shows
-        the skillset's states. Jobs are done in the order given.
+        the skillset's states, or the reporter is closed. Jobs are done in the order given.
         """
         with self._changed:
-            if self._when_settled or not self._settled():
+            if not self._over and (self._when_settled or not self._settled()):
                 self._when_settled.append(job)
                 self._changed.notify()
                 return
@@ -95,6 +95,7 @@ class ResourceReporter:
             self._make(call)
         with self._changed:
             self._do_settled()
+            self._over = True
 
     def _settled(self) -> bool:
         if self._ledger.settled or not self._subscriber.get_num_connections():
