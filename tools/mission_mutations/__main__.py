@@ -68,7 +68,7 @@ def mutants(root: Path, missions: Sequence[str]) -> Iterator[Mutant]:
             parts = [Path(document.path) for document in read_files(path).documents]
             text = "".join(path.read_text(encoding="utf-8") for path in parts)
             used = {one.name: [skill.name for skill in one.skills if f"<{one.name}.{skill.name}" in text] for one in robot.skillsets}
-            yield from mutants_of(path, parts, robot.skillsets, used)
+            yield from mutants_of(path, parts, robot.skillsets, used, robot.part)
 
 
 def flown(root: Path, file: Path, mutant: Mutant) -> Campaigned:

@@ -7,6 +7,7 @@ from collections.abc import Iterator, Sequence
 from dataclasses import replace
 from itertools import islice
 from pathlib import Path
+from typing import Protocol
 
 from alula.missions.part import MissionPart
 from alula.model.model import Skillset
@@ -22,10 +23,15 @@ def differing(one: Seen, other: Seen, most: int) -> Iterator[MissionRun]:
     """Yield runs of the first up to something that the other does not do there; those of few ticks first.
 
     The other is followed by what it asks for with the same managers. It may take a run all the same: a flight shows it. Then come runs up
-    to what the other need not do there: it asks something more, and does otherwise by one of the answers.
+    to what the other need not do there: it asks something more, and does otherwise by one of the answers, or waits by it.
     """
     followed = _followed(one.regions, one.graph, other.graph)
-    for runs in (_runs(one.regions, one.graph, other.graph, followed), _runs_by_answers(one, other.graph, followed)):
+    several = (
+        _runs(one.regions, one.graph, other.graph, followed),
+        _runs_by_answers(one, other.graph.edges, followed),
+        _runs_by_answers(one, _Waiting(other), followed),
+    )
+    for runs in several:
         yield from (run_of(one.regions.system, *run) for run in islice(runs, most))
 
 
@@ -85,10 +91,26 @@ def _runs(one: Regions, graph: Graph, other: Graph, followed: Sequence[frozenset
                 yield _until_it_asks(one.system, *one.run_on(number, *edge.way, most=1))
 
 
-def _runs_by_answers(one: Seen, other: Graph, followed: Sequence[frozenset[int]]) -> Iterator[tuple[list[Event], State]]:
+class _Waiting:
+    """The ticks of a mission that leave all as it is."""
+
+    def __init__(self, seen: Seen) -> None:
+        self._seen = seen
+
+    def __getitem__(self, number: int) -> Sequence[Edge]:
+        return self._seen.waiting(number)
+
+
+class _Edges(Protocol):
+    """Ticks out of each region."""
+
+    def __getitem__(self, number: int, /) -> Sequence[Edge]: ...
+
+
+def _runs_by_answers(one: Seen, other: _Edges, followed: Sequence[frozenset[int]]) -> Iterator[tuple[list[Event], State]]:
     for number, known in enumerate(followed):
         for edge in one.graph.edges[number]:
-            for theirs in (theirs for at in known for theirs in other.edges[at] if edge.unlike(theirs)):
+            for theirs in (theirs for at in known for theirs in other[at] if edge.unlike(theirs)):
                 yield _with_choices_of(one, number, edge, theirs)
 
 

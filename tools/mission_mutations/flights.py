@@ -15,6 +15,7 @@ from alula.campaign.rows import came_back
 from alula.missions.director import Outcome
 from alula.missions.mission_file import plan_of_file
 from alula.missions.mocked import MockedMission
+from alula.missions.part import MissionPart
 from alula.missions.plan import InputError, MissionPlan
 from alula.model.model import Skillset
 from alula.runtime.core.events import ExecutionEvent, TransitionEvent
@@ -88,12 +89,12 @@ class Flights:
             if mutant.file:
                 (missions / mutant.file).write_text(mutant.text, encoding="utf-8")
             skillsets = [in_place(one, mutant.skillset) for one in self._scenario.skillsets]
-            said = self._said(missions / f"{self._mission}.xml", skillsets)
+            said = self._said(missions / f"{self._mission}.xml", skillsets, mutant.part_of(self._robot.part))
         return Campaigned(self._mission, mutant.kind, mutant.what, *said, round(time.process_time() - begun, 2))
 
-    def _said(self, path: Path, skillsets: Sequence[Skillset]) -> tuple[str, str, int, int]:
+    def _said(self, path: Path, skillsets: Sequence[Skillset], part: MissionPart) -> tuple[str, str, int, int]:
         try:
-            plan = plan_of_file(path, self._mission, skillsets, self._scenario.inputs, self._robot.part)
+            plan = plan_of_file(path, self._mission, skillsets, self._scenario.inputs, part)
         except InputError as error:
             return REFUSED, str(error), 0, 0
         otherwise: tuple[str, int] | None = None

@@ -21,7 +21,7 @@ from alula.prove.limits import Deadline, OutOfTimeError
 from alula.prove.mission.accepted import acceptances, divided
 from alula.prove.mission.answers import Answers
 from alula.prove.mission.conditions import Faults
-from alula.prove.mission.findings import findings, waits
+from alula.prove.mission.findings import OWN, findings, taken_as, waits
 from alula.prove.mission.holding import SINGLE, held
 from alula.prove.mission.oracle import UndecidedError
 from alula.prove.mission.play import Played, play
@@ -107,6 +107,7 @@ class Looked:
 
     path: Path
     skillsets: tuple[Skillset, ...]
+    part: MissionPart
     regions: Regions
     answers: Answers
     seen: Seen
@@ -130,10 +131,14 @@ class Judge:
         self._robot = robot
         self._mission = mission
         self._shown = Shown()
-        self.original = self._look(robot.folder / f"{mission}.xml", robot.skillsets)
+        path = robot.folder / f"{mission}.xml"
+        try:
+            self.original = self._look(path, robot.skillsets, robot.part)
+        except UndecidedError as error:  # as `check` does where a class of the robot's own can't be run
+            self.original = self._look(path, robot.skillsets, robot.part, str(error))
         self._stages_of_original = self._stages(self.original)
         self._known: list[set[tuple[str, str]]] = []
-        self._known_of_file = {_key(one) for one in self._of_file(self.original.path, robot.skillsets)}
+        self._known_of_file = {_key(one) for one in self._of_file(self.original.path, robot.skillsets, robot.part)}
         self._proofs: dict[str, set[tuple[str, str]]] = {}
 
     def judge(self, mutant: Mutant) -> Verdict:
@@ -149,15 +154,24 @@ class Judge:
         return Verdict(self._mission, mutant.kind, mutant.what, *said, round(time.process_time() - begun, 2))
 
     def _said(self, mutant: Mutant, path: Path, skillsets: tuple[Skillset, ...]) -> Said:
-        refused = self._new(self._of_file(path, skillsets) if mutant.skillset is None else check(mutant.skillset), self._known_of_file)
+        part = mutant.part_of(self._robot.part)
+        refused = self._new(
+            self._of_file(path, skillsets, part) if mutant.skillset is None else check(mutant.skillset), self._known_of_file
+        )
         if refused:
             return FOUND, "check", _told(refused[0]), None
         try:
-            looked = self._look(path, skillsets)
+            looked = self._look(path, skillsets, part, self.original.system.own.why)
         except (UndecidedError, InputError) as error:
-            return FOUND, "ALU711", str(error), None
+            return FOUND, "ALU711" if mutant.altered is None else OWN, str(error), None
         except OutOfTimeError:
             return MISSED, "time", "the time was over", None
+        if mutant.altered is not None and not looked.system.own.any_run:
+            return MISSED, "any class", "the search takes any class in its place, so it can't tell two of them apart", None
+        return self._compared(mutant, looked)
+
+    def _compared(self, mutant: Mutant, looked: Looked) -> Said:
+        """Return what becomes of a mutant all of whose runs were looked at."""
         stages = enumerate(self._stages(looked))
         if new := self._new_of(*next(stages)):
             return self._found(new, looked)
@@ -189,7 +203,7 @@ class Judge:
         flown: list[tuple[Diagnostic, bool | None]] = []
         for one in new:
             run = one.run if isinstance(one, MissionFinding) else None
-            flown.append((one, None if run is None else not play(looked.path, run, self._robot.part).left))
+            flown.append((one, None if run is None else not play(looked.path, run, looked.part).left))
             if flown[-1][1]:
                 break
         shown, how = next((known for known in flown if known[1]), next((known for known in flown if known[1] is not None), flown[0]))
@@ -220,23 +234,23 @@ class Judge:
         return ""
 
     def _flown(self, run: MissionRun, of: Looked, by: Looked) -> Played | None:
-        return flown(run, of.system, by.path, by.system, by.skillsets, self._robot.part)
+        return flown(run, of.system, by.path, by.system, by.skillsets, by.part)
 
     # --- what `check` says -------------------------------------------------------------------------------------------
 
-    def _look(self, path: Path, skillsets: tuple[Skillset, ...]) -> Looked:
+    def _look(self, path: Path, skillsets: tuple[Skillset, ...], part: MissionPart, why_any_order: str = "") -> Looked:
         deadline = Deadline.after(GIVEN_S)
-        system = System.read(path, skillsets, self._robot.part, LOOKED_AT, deadline)
+        system = System.read(path, skillsets, part, LOOKED_AT, deadline, why_any_order=why_any_order)
         regions = Regions(system, deadline)
         regions.explore()
-        return Looked(path, system.skillsets, regions, Answers(regions), self._shown.of(regions, path))
+        return Looked(path, system.skillsets, part, regions, Answers(regions), self._shown.of(regions, path))
 
     def _stages(self, looked: Looked) -> Iterator[list[Diagnostic]]:
         """Yield what `check` finds about all runs, the quick parts first."""
         deadline, faults = Deadline.after(GIVEN_S), self._robot.faults
         properties, wrong = wanted(looked.system.nodes, looked.system.skillsets, self._robot.faults)
         known = acceptances(looked.system.nodes)
-        found = [*findings(looked.regions, looked.answers), *wrong]
+        found = [*taken_as(looked.system), *findings(looked.regions, looked.answers), *wrong]
         yield divided(found, known, "", complete=True)[0]
         yield [one for each in properties if each.kind in SINGLE and (one := held(looked.regions, each, faults, deadline).finding)]
         waiting = Waits(looked.regions)
@@ -246,8 +260,8 @@ class Judge:
         several = [each for each in properties if each.kind not in SINGLE]
         yield [one for each in several if (one := held(looked.regions, each, faults, deadline, always_ends=ends).finding)]
 
-    def _of_file(self, path: Path, skillsets: Sequence[Skillset]) -> list[Diagnostic]:
-        return findings_of(str(path), path.read_bytes(), skillsets, (), self._robot.part, self._robot.messages)
+    def _of_file(self, path: Path, skillsets: Sequence[Skillset], part: MissionPart) -> list[Diagnostic]:
+        return findings_of(str(path), path.read_bytes(), skillsets, (), part, self._robot.messages)
 
     def _proved(self, skillset: Skillset) -> list[Diagnostic]:
         """Return what the proofs of a model alone find, that they do not find of the model as it is."""

@@ -7,8 +7,11 @@ from collections.abc import Collection, Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 
+from alula.missions.part import NO_PART, MissionPart
 from alula.model.model import Skillset
-from mission_mutations import models, trees
+from alula.prove.mission.own import has_children
+from alula.trees.palette import name_in_files
+from mission_mutations import classes, models, trees
 
 KINDS = (
     trees.FALLBACK_REMOVED,
@@ -19,12 +22,14 @@ KINDS = (
     models.EFFECT_FORGOTTEN,
     trees.RESULT_UNHANDLED,
     trees.CONDITION_NEGATED,
+    trees.OWN_DROPPED,
+    classes.CLASS_ALTERED,
 )
 
 
 @dataclass(frozen=True)
 class Mutant:
-    """A mission with one alteration: in ``file``, whose text is ``text``, or in ``skillset``."""
+    """A mission with one alteration: in ``file``, whose text is ``text``, in ``skillset``, or in a class (``altered``)."""
 
     mission: str
     kind: str
@@ -32,18 +37,33 @@ class Mutant:
     file: str = ""
     text: str = ""
     skillset: Skillset | None = None
+    altered: classes.Altered | None = None
+
+    def part_of(self, part: MissionPart) -> MissionPart:
+        """Return a robot's part with the altered class in it."""
+        return part if self.altered is None else self.altered.within(part)
 
 
 def mutants_of(
-    mission: Path, files: Sequence[Path], skillsets: Sequence[Skillset], used: Mapping[str, Collection[str]]
+    mission: Path,
+    files: Sequence[Path],
+    skillsets: Sequence[Skillset],
+    used: Mapping[str, Collection[str]],
+    part: MissionPart = NO_PART,
 ) -> Iterator[Mutant]:
-    """Yield all of a mission: in its files, and in the skills of each skillset that it uses."""
-    for file in files:
-        for kind, what, text in trees.altered(file.read_text(encoding="utf-8")):
+    """Yield all of a mission: in its files, in the skills of each skillset that it uses, and in the robot's own nodes with children."""
+    texts = {file: file.read_text(encoding="utf-8") for file in files}
+    own = {name_in_files(one): one for one in part.nodes if has_children(one.category, one.child_count)}
+    for file, before in texts.items():
+        for kind, what, text in trees.altered(before, own):
             yield Mutant(mission.stem, kind, f"{file.name}, {what}", file.name, text)
     for skillset in skillsets:
         for kind, what, mutant in models.altered(skillset, used.get(skillset.name, ())):
             yield Mutant(mission.stem, kind, what, skillset=mutant)
+    for name, node in own.items():
+        if any(f"<{name}" in text for text in texts.values()):
+            for what, altered in classes.altered(node):
+                yield Mutant(mission.stem, classes.CLASS_ALTERED, f"{name}: {what}", altered=altered)
 
 
 def chosen(all_of_them: Sequence[Mutant], count: int, seed: int) -> list[Mutant]:

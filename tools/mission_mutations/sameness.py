@@ -139,6 +139,7 @@ class Seen:
         self._moves: dict[tuple[int, int], int] = {}
         self._closures: dict[int, int] = {}
         self._happens: dict[int, Mapping[int, Move]] = {}
+        self._waiting: dict[int, tuple[Edge, ...]] = {}
 
     @cached_property
     def graph(self) -> Graph:
@@ -151,6 +152,16 @@ class Seen:
             )
             edges.append(tuple(self._edge(region, target, ticked.act, way) for target, ticked in region.next for way in ticked.ways))
         return Graph(tuple(edges), tuple(moves))
+
+    def waiting(self, number: int) -> tuple[Edge, ...]:
+        """Return the ticks in a region that leave all as it is, for all that the managers can be: they are no edges of the graph."""
+        if number not in self._waiting:
+            region = self.regions.regions[number]
+            over = self._system.ticker.memories[region.memory].end is not None
+            ways = [] if over else list(self.regions.split(region.memory, TICK, region.sets))
+            still = [way for way in ways if way[0].memory == region.memory and not (way[0].started or way[0].interrupted)]
+            self._waiting[number] = tuple(self._edge(region, number, TICK, way) for way in still)
+        return self._waiting[number]
 
     def _edge(self, region: Region, target: int, act: str, way: tuple[Outcome, Sets]) -> Edge:
         outcome, sets = way

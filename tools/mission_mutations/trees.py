@@ -5,7 +5,7 @@ from __future__ import annotations
 import copy
 import re
 import xml.etree.ElementTree as ET
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Collection, Iterator
 
 FALLBACK_REMOVED = "a fallback removed"
 CHILDREN_SWAPPED = "children swapped"
@@ -13,6 +13,7 @@ POLICY_CHANGED = "a policy changed"
 RETRY_DROPPED = "a retry dropped"
 RESULT_UNHANDLED = "a result unhandled"
 CONDITION_NEGATED = "a condition negated"
+OWN_DROPPED = "a node of the robot's own dropped"
 
 CONTROLS = frozenset({"Sequence", "Fallback", "Parallel", "ParallelAll", "ReactiveSequence", "ReactiveFallback", "SequenceWithMemory"})
 OTHER_POLICY = {
@@ -38,13 +39,13 @@ Place = tuple[str, str, Change]
 """The kind of an alteration, what it does, and the change."""
 
 
-def altered(text: str) -> Iterator[tuple[str, str, str]]:
-    """Yield each altered file: kind, what was done to which node, and the file's text."""
+def altered(text: str, own: Collection[str] = ()) -> Iterator[tuple[str, str, str]]:
+    """Yield each altered file: kind, what was done to which node, and the file's text. ``own``: the robot's types with children."""
     root = ET.fromstring(text)  # noqa: S314 - the robot's own files
     numbers = {id(node): number for number, node in enumerate(root.iter())}
     for tree in root.iter("BehaviorTree"):
         for node in (inside for inside in tree.iter() if inside is not tree):
-            for kind, what, change in _places(node):
+            for kind, what, change in _places(node, own):
                 copied = copy.deepcopy(root)
                 mine = list(copied.iter())[numbers[id(node)]]
                 parent = next(one for one in copied.iter() if any(child is mine for child in one))
@@ -52,11 +53,13 @@ def altered(text: str) -> Iterator[tuple[str, str, str]]:
                 yield kind, f"{tree.get('ID')}: '{node.get('name', node.tag)}': {what}", ET.tostring(copied, encoding="unicode")
 
 
-def _places(node: ET.Element) -> Iterator[Place]:
+def _places(node: ET.Element, own: Collection[str]) -> Iterator[Place]:
     yield from _fallbacks(node)
     yield from _policies(node)
     yield from _results(node)
-    if node.tag in CONTROLS:
+    for at in range(len(node) if node.tag in own else 0):
+        yield OWN_DROPPED, f"its child {at + 1} stands in its place", _by_child(at)
+    if node.tag in CONTROLS or node.tag in own:
         for at in range(len(node) - 1):
             yield CHILDREN_SWAPPED, f"children {at + 1} and {at + 2} are swapped", _swap(at)
     if node.tag in AGAIN and len(node) == 1:

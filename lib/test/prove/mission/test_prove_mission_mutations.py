@@ -8,6 +8,7 @@ from dataclasses import replace
 from functools import partial
 from pathlib import Path
 
+import own_nodes
 import pytest
 
 from alula.campaign.plan import load_campaign
@@ -31,10 +32,12 @@ from finding_pages.mission_checks import whole
 from finding_pages.mission_proofs import ROBOT
 from mission_mutations import __main__ as study
 from mission_mutations import models, trees
+from mission_mutations.classes import CLASS_ALTERED
 from mission_mutations.flights import NOTHING, OTHERWISE, REFUSED, WRONG, Flights
 from mission_mutations.judging import ACCOUNT, ANOTHER_RUN, ANSWERS, EQUAL, FOUND, MISSED, Judge, Robot, Verdict
 from mission_mutations.mutants import KINDS, Mutant, chosen, mutants_of
 from mission_mutations.study import Study
+from mission_mutations.trees import OWN_DROPPED
 
 ROOT = find_robot(Path(__file__)).root
 (DRONE,) = check_texts([ModelFile("robot.rl", ROBOT)])[0].skillsets
@@ -242,10 +245,10 @@ def test_waits_of_one_length_that_begin_at_once_are_over_at_once(before: str, eq
     assert (courses(tmp_path, whole(before)) == courses(tmp_path, both)) is equal
 
 
-def observed(folder: Path, text: str, skillset: Skillset) -> set[object]:
+def observed(folder: Path, text: str, skillset: Skillset, part: MissionPart) -> set[object]:
     """Return all that can be seen of a mission's situations, one looked at after another."""
     (folder / "seen.xml").write_text(text)
-    system = System.read(folder / "seen.xml", (skillset,), NO_PART, LOOKED_AT)
+    system = System.read(folder / "seen.xml", (skillset,), part, LOOKED_AT)
     first = system.initial()
     known, todo = {first}, [first]
     while todo:
@@ -261,29 +264,68 @@ def _seen(system: System, state: State) -> object:
     return system.managers(state, "drone").states, tuple(running), system.outcome(state)
 
 
+OWN = {
+    "guard": """<Fallback>
+      <robot.Guard><Fallback><drone.lift/><drone.hover/></Fallback></robot.Guard>
+      <ForceFailure><drone.land/></ForceFailure>
+    </Fallback>""",
+    "rate limit": """<Fallback>
+      <Timeout msec="2000"><robot.Limit><Fallback><drone.hover/><drone.lift/></Fallback></robot.Limit></Timeout>
+      <drone.land/>
+    </Fallback>""",
+    "recovery": """<Fallback>
+      <robot.Recovery tries="1"><drone.hover/><drone.lift/></robot.Recovery>
+      <drone.land/>
+    </Fallback>""",
+    "round robin": """<Fallback>
+      <RetryUntilSuccessful num_attempts="3"><robot.ByTurns><drone.lift/><drone.hover/></robot.ByTurns></RetryUntilSuccessful>
+      <drone.land/>
+    </Fallback>""",
+    "anything": """<Fallback>
+      <robot.Moody><drone.hover/></robot.Moody>
+      <drone.land/>
+    </Fallback>""",
+}
+"""Missions with nodes of a robot's own, of the kinds that robots have."""
+
+
 def all_mutants(folder: Path) -> Iterator[Mutant]:
     used = {"drone": [skill.name for skill in DRONE.skills]}
-    yield from mutants_of(folder / "example.xml", [folder / "example.xml"], [DRONE], used)
+    yield from mutants_of(folder / "example.xml", [folder / "example.xml"], [DRONE], used, own_nodes.PART)
 
 
-@pytest.mark.parametrize("text", [GOOD, TWO_WAYS])
+@pytest.mark.parametrize("kind", OWN)
+def test_no_fault_within_a_node_of_the_robots_own_is_missed(kind: str, tmp_path: Path) -> None:
+    """Neither one below it, nor one of its class."""
+    (tmp_path / "example.xml").write_text(whole(OWN[kind]))
+    judge = Judge(Robot(tmp_path, (DRONE,), own_nodes.PART, {}), "example")
+    verdicts = [judge.judge(one) for one in all_mutants(tmp_path) if one.skillset is None]
+    assert (OWN_DROPPED in {one.kind for one in verdicts if one.verdict == FOUND}) is (kind != "guard")  # that does what its child does
+    assert (CLASS_ALTERED in {one.kind for one in verdicts if one.verdict == FOUND}) is (kind != "anything")  # that stands for any class
+    assert [one for one in verdicts if one.verdict not in {FOUND, EQUAL}] == []
+
+
+@pytest.mark.parametrize("text", [GOOD, TWO_WAYS, *(OWN[kind] for kind in ("guard", "rate limit", "recovery"))])
 def test_an_equal_mutant_shows_the_same_situations(text: str, tmp_path: Path) -> None:
     """Held against a search of one situation after another, which knows no regions."""
-    judge = judge_of(tmp_path, text)
-    original = observed(tmp_path, whole(text), DRONE)
+    (tmp_path / "example.xml").write_text(whole(text))
+    judge = Judge(Robot(tmp_path, (DRONE,), own_nodes.PART, {}), "example")
+    original = observed(tmp_path, whole(text), DRONE, own_nodes.PART)
     verdicts = []
-    for mutant in all_mutants(tmp_path):
+    models_too = text not in OWN.values()
+    for mutant in (one for one in all_mutants(tmp_path) if models_too or one.skillset is None):
         one = judge.judge(mutant)
         verdicts.append(one.verdict)
         if one.verdict == EQUAL:
-            assert observed(tmp_path, mutant.text or whole(text), mutant.skillset or DRONE) == original, one
-    assert verdicts.count(EQUAL) > 3
-    assert verdicts.count(FOUND) > 10
+            part = mutant.part_of(own_nodes.PART)
+            assert observed(tmp_path, mutant.text or whole(text), mutant.skillset or DRONE, part) == original, one
+    assert verdicts.count(EQUAL) > (3 if models_too else 0)
+    assert verdicts.count(FOUND) > (10 if models_too else 3)
 
 
 def test_each_kind_alters_what_it_says(tmp_path: Path) -> None:
     (tmp_path / "example.xml").write_text(
-        whole(GOOD.replace("<drone.lift/>", '<ForceSuccess><drone.lift _onFailure="a := 1"/></ForceSuccess>', 1))
+        whole(GOOD.replace("<drone.lift/>", '<robot.Guard><ForceSuccess><drone.lift _onFailure="a := 1"/></ForceSuccess></robot.Guard>', 1))
     )
     kinds = {one.kind for one in all_mutants(tmp_path)}
     assert kinds == set(KINDS)
@@ -300,8 +342,9 @@ def test_a_model_is_altered_at_one_place() -> None:
 
 def test_choice_is_by_the_seed_and_even() -> None:
     everything = [Mutant("m", kind, str(number)) for kind in KINDS for number in range(30)]
-    some = chosen(everything, 16, seed=4)
-    assert some == chosen(everything, 16, seed=4) != chosen(everything, 16, seed=5)
+    several = 2 * len(KINDS)
+    some = chosen(everything, several, seed=4)
+    assert some == chosen(everything, several, seed=4) != chosen(everything, several, seed=5)
     assert all([one.kind for one in some].count(kind) == 2 for kind in KINDS)
     assert len(chosen(everything, 1000, seed=1)) == len(set(everything))
 
@@ -351,8 +394,9 @@ def test_no_two_mutants_of_the_drone_are_told_alike_among_those_that_are_studied
 @pytest.mark.long
 @pytest.mark.timeout(0)  # 50 s of processor time: as long as the machine needs
 def test_of_the_drones_a_seeded_mutant_of_each_kind_is_not_missed() -> None:
-    some = chosen(list(study.mutants(ROOT, ["inspection"])), len(KINDS), seed=0)
-    assert {one.kind for one in some} == set(KINDS)
+    kinds = set(KINDS) - {OWN_DROPPED, CLASS_ALTERED}  # the drone has no nodes of its own with children
+    some = chosen(list(study.mutants(ROOT, ["inspection"])), len(kinds), seed=0)
+    assert {one.kind for one in some} == kinds
     verdicts = [study.judged(ROOT, one) for one in some]
     study.judge_of.cache_clear()  # it has all runs of a mission
     assert all(one.verdict in {FOUND, EQUAL} for one in verdicts), verdicts
