@@ -85,6 +85,20 @@ def test_the_height_is_noisy_and_drifts():
     assert np.abs(noisy[:, 2].reshape(-1, 500).mean(axis=1)).max() < 0.2, "over 10 s it is nothing"
 
 
+def test_the_height_runs_away_in_the_air_up_or_down_and_the_climb_says_so():
+    estimates = [flown(Imperfections(height_drift_m_s=0.02), seed=seed) for seed in range(8)]
+    off_m = np.array([errors[-1, 2] for _, errors in estimates])
+    assert np.abs(off_m) == pytest.approx(0.8, abs=0.03)
+    assert set(np.sign(off_m)) == {-1.0, 1.0}
+    still, broken = Estimator(3, Imperfections(height_drift_m_s=0.02)), Estimator(3)
+    body = RigidBody(Airframe(), (0.0, 0.0, 0.0))
+    on_ground = [still.step(body, TICK_S).position[2] for _ in range(2000)]
+    assert np.abs(on_ground).max() < 0.02, "not on the ground"
+    body.on_ground, broken.barometer.broken = False, True
+    in_air = [broken.step(body, TICK_S).position[2] for _ in range(2000)]
+    assert abs(in_air[-1]) == pytest.approx(0.6, abs=0.03), "40 s at 0.015 m/s"
+
+
 def test_standing_still_is_no_way():
     _, errors = flown(Imperfections(position_drift=0.05), speed_m_s=0.1, way_m=4.0)
     assert np.linalg.norm(errors[-1]) < 0.03

@@ -7,7 +7,7 @@ from typing import Protocol
 
 from uav_simulator.autopilot.core import Autopilot
 from uav_simulator.autopilot.endpoint import Endpoint
-from uav_simulator.autopilot.estimator import PERFECT
+from uav_simulator.autopilot.estimator import PERFECT, Barometer
 from uav_simulator.autopilot.types import LandedState
 from uav_simulator.frames import Vec3
 from uav_simulator.imperfections import Imperfections
@@ -23,6 +23,10 @@ class Flown(Protocol):
     @property
     def body(self) -> RigidBody:
         """The rigid body in the simulated world."""
+
+    @property
+    def barometer(self) -> Barometer | None:
+        """What the autopilot measures its height by; None: the autopilot is not the simulator's, and nothing can be done to it."""
 
     @property
     def landed_state(self) -> LandedState:
@@ -63,6 +67,11 @@ class SimulatedAutopilotVehicle:
     def body(self) -> RigidBody:
         """The vehicle's rigid body."""
         return self.vehicle.body
+
+    @property
+    def barometer(self) -> Barometer:
+        """The simulated autopilot's."""
+        return self.autopilot.barometer
 
     @property
     def landed_state(self) -> LandedState:

@@ -30,6 +30,8 @@ class Imperfections:
     """Standard deviation of the autopilot's height, within half a second: the barometer's noise."""
     height_drift_m: float = 0.0
     """Standard deviation of the autopilot's height, slowly (60 s): the weather."""
+    height_drift_m_s: float = 0.0
+    """The autopilot's height runs away in the air, up or down depending on the seed: a barometer that warms up or is blown at."""
     position_jump_m: float = 0.0
     """The autopilot's position jumps by so much, each time in another direction, ..."""
     jump_every_s: float = 20.0
@@ -60,6 +62,7 @@ PRESETS = {
         tilt_walk_deg=0.03,
         height_noise_m=0.005,
         height_drift_m=0.01,
+        height_drift_m_s=0.004,
         position_jump_m=0.1,
         jump_every_s=30.0,
         pixel_noise=3.0,

@@ -16,7 +16,7 @@ from uav_simulator.autopilot.types import LandedState
 from uav_simulator.contacts import ContactMonitor
 from uav_simulator.flown import Flown
 from uav_simulator.imperfections import Imperfections
-from uav_simulator.sensors.faults import SensorBoard
+from uav_simulator.sensors.faults import SensorBoard, SensorMode
 from uav_simulator.sensors.imu import Imu
 from uav_simulator.sensors.lidar import Lidar
 from uav_simulator.sensors.pose_track import Pose, PoseTrack
@@ -63,7 +63,7 @@ class Simulation:
         self.stereo = StereoPair(self.world, seed, noise=imperfections.pixel_noise, exposure=imperfections.exposure)
         self.lidar = Lidar(self.world, seed, noise_m=imperfections.range_noise_m)
         self.imu = Imu(seed, gyro_bias_rad_s=imperfections.gyro_bias_rad_s, accel_bias_m_s2=imperfections.accel_bias_m_s2)
-        self.sensors = SensorBoard(faults)
+        self.sensors = SensorBoard(faults, absent="" if flown.barometer else "barometer")
         self.track = PoseTrack()
         self._contacts = ContactMonitor(self.world, flown.body.airframe.radius_m)
         self.lift_off_s: float | None = None
@@ -94,6 +94,8 @@ class Simulation:
             self._distance_m += math.dist(before, body.position)
         self._contacts.step(body, landed_state)
         self.sensors.apply_due(self.now_s, self.lift_off_s)
+        if self.flown.barometer is not None:
+            self.flown.barometer.broken = self.sensors.mode("barometer") is SensorMode.DRIFTING
         self.track.add(self.pose)
         return True
 

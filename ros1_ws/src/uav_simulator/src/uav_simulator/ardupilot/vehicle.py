@@ -95,6 +95,11 @@ class ArduPilotVehicle:
                 self._note_height()
                 return True
 
+    @property
+    def barometer(self) -> None:
+        """Return None: it is not the simulator's."""
+        return None
+
     def late_s(self, now_s: float) -> float:  # noqa: ARG002
         """ArduPilot waits for each answer."""
         return 0.0

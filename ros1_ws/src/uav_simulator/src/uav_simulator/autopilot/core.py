@@ -62,6 +62,7 @@ class Autopilot:
         self._boot_before_s = boot_before_s
         self.params = Parameters(params)
         self._estimator = Estimator(seed, imperfections)
+        self.barometer = self._estimator.barometer
         self.estimate = self._estimator.step(vehicle.body, 0.0)
         self._position_loop = PositionLoop(airframe, Gains())
         self._touch_down = TouchDown(airframe.hover_thrust_n)

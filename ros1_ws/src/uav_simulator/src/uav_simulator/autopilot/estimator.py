@@ -18,6 +18,7 @@ PERFECT = Imperfections()
 HOVER_M_S = 0.2  # slower is no travel
 BEARING_RAD_SQRT_M = 0.05  # how fast the drift changes its direction
 YAW_WALK_S = 100.0  # there and back
+BROKEN_M_S = 0.015  # ArduCopter flown with this drift of its barometer sank by 1.18 m in 97 s
 
 
 @dataclass(frozen=True)
@@ -101,16 +102,25 @@ class Leaning:
 
 
 class Barometer:
-    """An error of height: noise, and a slow drift."""
+    """An error of height: noise, a slow drift that stays within bounds, and one that goes on as long as the vehicle is in the air.
+
+    ``broken``: the height runs away by `BROKEN_M_S` more, the same way.
+    """
 
     def __init__(self, imperfections: Imperfections, seed: int) -> None:
+        self.broken = False
         noise_m, drift_m = imperfections.height_noise_m, imperfections.height_drift_m
         self._noise = SlowNoise(sigma=noise_m, tau_s=0.5, limit=3.0 * noise_m, seed=f"ekf height noise {seed}")
         self._drift = SlowNoise(sigma=drift_m, tau_s=60.0, limit=3.0 * drift_m, seed=f"ekf height drift {seed}")
+        self._sign = random.Random(f"ekf height rate {seed}").choice((-1.0, 1.0))  # noqa: S311 - repeatable on purpose
+        self._rate_m_s = imperfections.height_drift_m_s
+        self._gone_m = 0.0
 
-    def step(self, dt_s: float) -> float:
-        """Advance by ``dt_s``; return the error of the height, metres."""
-        return self._noise.step(dt_s)[2] + self._drift.step(dt_s)[2]
+    def step(self, dt_s: float, *, flying: bool) -> tuple[float, float]:
+        """Advance by ``dt_s``; return the error of the height, metres, and of the climb, m/s: a filter takes the drift for a climb."""
+        rate_m_s = self._sign * (self._rate_m_s + BROKEN_M_S * self.broken) if flying else 0.0
+        self._gone_m += rate_m_s * dt_s
+        return self._noise.step(dt_s)[2] + self._drift.step(dt_s)[2] + self._gone_m, rate_m_s
 
 
 class Estimator:
@@ -118,7 +128,7 @@ class Estimator:
 
     def __init__(self, seed: int, imperfections: Imperfections = PERFECT) -> None:
         self._drift, self._leaning = Drift(imperfections, seed), Leaning(imperfections, seed)
-        self._barometer = Barometer(imperfections, seed)
+        self.barometer = Barometer(imperfections, seed)
         self._position = SlowNoise(sigma=0.007, tau_s=20.0, limit=0.017, seed=f"ekf position {seed}")
         self._velocity = SlowNoise(sigma=0.01, tau_s=2.0, limit=0.03, seed=f"ekf velocity {seed}")
         self._yaw = SlowNoise(sigma=math.radians(0.3), tau_s=30.0, limit=math.radians(1.0), seed=f"ekf yaw {seed}")
@@ -127,14 +137,14 @@ class Estimator:
         """Return the estimate of a body's state."""
         dp, dv = self._position.step(dt_s), self._velocity.step(dt_s)
         self._drift.step(body, dt_s)
-        up_m = self._barometer.step(dt_s)
+        up_m, climb_m_s = self.barometer.step(dt_s, flying=not body.on_ground)
         yaw, drift = self._yaw.step(dt_s)[0] + self._drift.yaw_rad, self._drift.offset
         if body.on_ground:
             dv = (0.0, 0.0, 0.0)  # zero-velocity updates hold the filter while the vehicle stands
         p, v = body.position, body.velocity
         return Estimate(
             position=(p[0] + dp[0] + drift[0], p[1] + dp[1] + drift[1], p[2] + dp[2] + drift[2] + up_m),
-            velocity=(v[0] + dv[0], v[1] + dv[1], v[2] + dv[2]),
+            velocity=(v[0] + dv[0], v[1] + dv[1], v[2] + dv[2] + climb_m_s),
             attitude=multiply(multiply(from_yaw(yaw), body.attitude), self._leaning.step(dt_s)),
             rates=body.rates,
             yaw_error_rad=yaw,

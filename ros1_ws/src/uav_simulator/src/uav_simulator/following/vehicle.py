@@ -62,6 +62,11 @@ class FollowedVehicle:
         newest_s = self._track.newest_s
         return newest_s is not None and newest_s >= now_s
 
+    @property
+    def barometer(self) -> None:
+        """Return None: it is not the simulator's."""
+        return None
+
     def late_s(self, now_s: float) -> float:
         """Return how much newer the autopilot's last word is."""
         newest_s = self._track.newest_s

@@ -32,6 +32,7 @@ class SensorMode(Enum):
     BIASED = "biased"  # ranges 0.5 m too long; rates and forces off by a constant
     LATE = "late"  # arrives half a second after its stamp
     FUTURE = "future"  # stamps ten seconds ahead
+    DRIFTING = "drifting"  # the height that is measured runs away
 
 
 _ALWAYS = (SensorMode.DEAD, SensorMode.FROZEN, SensorMode.FLICKERING, SensorMode.BLACK, SensorMode.LATE, SensorMode.FUTURE)
@@ -49,8 +50,9 @@ FAULTS: dict[str, tuple[str, ...]] = {
     "lidar": tuple(mode.value for mode in (*_ALWAYS, SensorMode.THINNED, SensorMode.SECTOR, SensorMode.BIASED)),
     "camera": tuple(mode.value for mode in _ALWAYS if mode is not SensorMode.FLICKERING),
     "imu": tuple(mode.value for mode in (*_ALWAYS, SensorMode.BIASED)),
+    "barometer": (SensorMode.DRIFTING.value,),
 }
-"""The sensors, each with the ways in which it can fail; the first one counts where none is named."""
+"""The sensors, each with the ways in which it can fail; the first one counts where none is named. The barometer is the autopilot's."""
 
 
 @dataclass(frozen=True)
@@ -72,8 +74,11 @@ class _Change:
 class SensorBoard:
     """The sensors' modes. Set from a service's thread, read from the simulation's."""
 
-    def __init__(self, faults: Sequence[FaultRequest]) -> None:
-        """``faults`` of the sensors, as `alula.common.faults` reads them with FAULTS."""
+    def __init__(self, faults: Sequence[FaultRequest], *, absent: str = "") -> None:
+        """``faults`` of the sensors, as `alula.common.faults` reads them with FAULTS; ``absent``: one that can't be broken here."""
+        self._absent = absent
+        for fault in faults:
+            self._check(fault.what)
         self._lock = threading.Lock()
         self._modes = dict.fromkeys(FAULTS, SensorMode.OK)
         self._pending = [change for fault in faults for change in _changes(fault)]
@@ -100,12 +105,17 @@ class SensorBoard:
         """Break or mend a sensor at a moment of the simulated clock; raises ConfigError for a wrong name."""
         if sensor not in FAULTS:
             raise ConfigError(f"unknown sensor {sensor!r}; known are {choices(sensor, FAULTS)}")
+        self._check(sensor)
         known = (SensorMode.OK.value, *FAULTS[sensor])
         if mode not in known:
             raise ConfigError(f"{sensor} has no mode {mode!r}; it has {choices(mode, known)}")
         with self._lock:
             self._modes[sensor] = SensorMode(mode)
             self._records.append(FaultRecord(sensor, SensorMode(mode), t_s))
+
+    def _check(self, sensor: str) -> None:
+        if sensor == self._absent:
+            raise ConfigError(f"no fault of the {sensor}: it is the autopilot's, which is not simulated; set ArduPilot's SIM_BARO_DRIFT")
 
     def apply_due(self, now_s: float, lift_off_s: float | None) -> bool:
         """Let the scheduled changes happen that are due; return whether one did."""
