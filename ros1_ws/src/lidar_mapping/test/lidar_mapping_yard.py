@@ -14,7 +14,11 @@ SWEEP_NS = 100_000_000
 NOISE_M = 0.01
 
 
-def yard(count, seed=0, *, corridor=False):
+GROUNDS = {"flat": lambda _x: 0.0, "slope": lambda x: 0.08 * x, "roof": lambda x: 1.0 * (x > 0.0)}
+"""Its height by x."""
+
+
+def yard(count, seed=0, *, corridor=False, ground="flat"):
     """Points (N, 3) on the ground, four walls of 20 x 14 m and some crates; as a corridor only ground and two long bare walls."""
     rng = np.random.default_rng(seed)
     if corridor:
@@ -30,7 +34,7 @@ def yard(count, seed=0, *, corridor=False):
     for (axis, at, a, b), share in zip(planes, areas / areas.sum(), strict=True):
         n = max(20, int(share * count))
         u, v, w = rng.uniform(*a, n), rng.uniform(*b, n), np.full(n, at)
-        parts.append(np.stack({"x": (w, u, v), "y": (u, w, v), "z": (u, v, w)}[axis], axis=1))
+        parts.append(np.stack({"x": (w, u, v), "y": (u, w, v), "z": (u, v, w + GROUNDS[ground](u))}[axis], axis=1))
     return np.vstack(parts)
 
 
@@ -40,8 +44,8 @@ class Path:
     Its LiDAR sees what lies within ``across_deg`` of the plane across its heading.
     """
 
-    def __init__(self, position, yaw=lambda _t: 0.0, *, corridor=False, reach_m=12.0, across_deg=90.0) -> None:
-        self.position, self.yaw = position, yaw
+    def __init__(self, position, yaw=lambda _t: 0.0, *, corridor=False, reach_m=12.0, across_deg=90.0, ground="flat") -> None:
+        self.position, self.yaw, self._ground = position, yaw, ground
         self._corridor, self._reach_m, self._across = corridor, reach_m, np.sin(np.radians(across_deg))
 
     def pose(self, t):
@@ -64,7 +68,7 @@ class Path:
     def sweep(self, start_s, seed, count=7000):
         """A sweep of 0.1 s; each point is measured from the pose of its own moment."""
         rng = np.random.default_rng(seed)
-        points = yard(count, seed, corridor=self._corridor)
+        points = yard(count, seed, corridor=self._corridor, ground=self._ground)
         times = rng.uniform(0.0, 0.1, len(points))
         knots = [self.pose(start_s + k) for k in np.linspace(0.0, 0.1, 11)]
         seen = np.empty_like(points)

@@ -137,6 +137,38 @@ def test_what_is_wrong_with_the_autopilots_height_does_not_bend_the_map(height) 
     assert np.abs(pitch_deg).max() < 0.3
 
 
+def hover_and_go(t):
+    """Stay for 6 s, then fly along the yard at 1 m/s."""
+    return straight(max(0.0, t - 6.0))
+
+
+def off_height(path, slam, seconds, raised) -> np.ndarray:
+    """Follow a path with a height of the autopilot that is off by ``raised(t)``; return by how much the SLAM's is off with each sweep."""
+    rng, off = np.random.default_rng(7), []
+    for k in range(round(seconds * 10)):
+        end_s = (k + 1) / 10
+        slam.add(path.sweep(k / 10, seed=k, count=2500), path.readings(k / 10, end_s, rng), path.autopilot(end_s, raised=raised), np.eye(4))
+        off.append(slam.pose()[0][2, 3] - path.position(end_s)[2])
+    return np.array(off)
+
+
+@pytest.mark.parametrize("rate_m_s", [0.015, -0.015, 0.03])
+def test_a_height_of_the_autopilot_that_runs_away_does_not_take_the_map_along(rate_m_s) -> None:
+    slam = Slam(SlamSettings())
+    off_m = off_height(Path(hover_and_go, across_deg=17.0), slam, 23.0, lambda t: rate_m_s * t)
+    assert np.abs(off_m).max() < 0.06, "0.3 m and more where its rate is no part of the estimate"
+    assert slam.height_drift_m == pytest.approx(rate_m_s * 23.0, abs=0.06)
+    assert slam.T_map_odom[2, 3] == pytest.approx(-rate_m_s * 23.0, abs=0.06)
+
+
+@pytest.mark.parametrize("ground", ["slope", "roof"])
+def test_neither_a_slope_nor_the_edge_of_a_roof_is_taken_for_a_drift_of_the_height(ground) -> None:
+    slam = Slam(SlamSettings())
+    off_m = off_height(Path(straight, across_deg=17.0, ground=ground), slam, 16.0, lambda _t: 0.0)
+    assert np.abs(off_m).max() < 0.05
+    assert abs(slam.height_drift_m) < 0.05
+
+
 def test_the_autopilots_drift_is_learned_where_surfaces_hold_the_scan() -> None:
     slam = Slam(SlamSettings())
     fly(Path(leg), slam, 12.0, count=2500, drift=0.05)

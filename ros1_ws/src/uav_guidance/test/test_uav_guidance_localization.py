@@ -189,22 +189,29 @@ def test_the_first_correction_and_a_far_one_are_taken_at_once_and_told():
     assert localization.correction.yaw_rad == pytest.approx(0.3)
 
 
-def raised(localization, height_m, now_s, *, flying=True):
-    """Tell a map that is so much higher than the autopilot says; return what is made of it after 10 s."""
-    for count in range(201):
-        told(localization, about_vertical(0.0, Vec3(0.0, 0.0, height_m)), now_s + count * STEP_S)
-        localization.step(ZERO, now_s + count * STEP_S, flying=flying)
+def raised(localization, rate_m_s, now_s, *, from_m=0.0, seconds=60.0, flying=True):
+    """Tell a map that rises above the autopilot's height at a rate; return what is made of it at the end, metres."""
+    for count in range(round(seconds / STEP_S) + 1):
+        passed_s = count * STEP_S
+        told(localization, about_vertical(0.0, Vec3(0.0, 0.0, from_m + rate_m_s * passed_s)), now_s + passed_s)
+        localization.step(ZERO, now_s + passed_s, flying=flying)
     return localization.correction.shift_m.z
 
 
-def test_a_map_that_slowly_leaves_the_measured_height_is_followed_within_bounds():
-    localization = begun()
-    most_m = GuidanceSettings().map_height_m
-    assert raised(localization, 0.5 * most_m, 1.0) == pytest.approx(0.5 * most_m)
-    for count in range(1, 30):  # on and on, at last by metres
-        assert raised(localization, 0.5 * most_m + 0.1 * count, 20.0 * count) <= most_m + 1e-9
-    assert raised(localization, -3.0, 1000.0) == pytest.approx(most_m - 3.0 - 0.5 * most_m - 2.9), "another origin is followed"
-    assert raised(localization, -3.0, 2000.0, flying=False) == -3.0, "on the ground the map's height counts"
+@pytest.mark.parametrize("rate_m_s", [0.015, -0.015, 0.028])
+def test_a_height_that_drifts_as_a_barometer_does_is_followed_however_far(rate_m_s):
+    assert raised(begun(), rate_m_s, 1.0, seconds=200.0) == pytest.approx(200.0 * rate_m_s, abs=0.01)
+
+
+def test_a_map_that_leaves_the_measured_height_faster_than_a_barometer_drifts_is_followed_within_bounds():
+    settings, localization = GuidanceSettings(), begun()
+    assert raised(localization, 0.0, 1.0, from_m=0.5 * settings.map_height_m, seconds=10.0) == pytest.approx(0.5 * settings.map_height_m)
+    for count in range(6):  # on and on, at last by 30 m
+        most_m = settings.map_height_m + settings.map_height_m_s * (60.0 * (count + 1) + 10.0)
+        assert raised(localization, 0.1, 20.0 + 60.0 * count, from_m=0.1 + 6.0 * count) <= most_m + 0.01
+    before_m = localization.correction.shift_m.z
+    assert raised(localization, 0.0, 1000.0, from_m=6.1, seconds=0.0) == pytest.approx(before_m - 30.0, abs=0.05), "another origin"
+    assert raised(localization, 0.0, 2000.0, from_m=-3.0, seconds=10.0, flying=False) == -3.0, "on the ground the map's height counts"
 
 
 def test_switched_off_it_returns_to_the_autopilots_position_evenly():

@@ -43,6 +43,7 @@ BASE_LINK = "base_link"
 READING_WAIT_S = 0.3  # wall clock; the readings of a sweep may arrive after it, over a connection of their own
 MAP_WAIT_S = 1.0  # wall clock; a guidance that runs tells of its map at 20 Hz
 TF_PERIOD_S = 0.1
+HEIGHT_DRIFT_M = 0.2  # from which on it is told: more than a height is noisy, and than a tilt of the map explains before the next turn
 STATE, MAP = Output("~state", MappingState, queue_size=5, latch=True), Output("~map", PointCloud2, latch=True)
 POSE, TF = Output("~pose", PoseWithCovarianceStamped, queue_size=5), Output("/tf", TFMessage, queue_size=5, shared=True)
 OUTPUTS = (STATE, MAP, POSE, TF)
@@ -193,9 +194,16 @@ class LidarMapping:
 
     def _report(self) -> None:
         """Tell the skillset whether pose and map are to be trusted."""
-        problem = self._slam.problem
+        problem, drifted_m = self._slam.problem, self._slam.height_drift_m
         if problem:
             self._host.warn("lost", f"the map is lost: {problem}")
+        elif abs(drifted_m) > HEIGHT_DRIFT_M:
+            where = "higher" if drifted_m > 0.0 else "lower"
+            self._host.warn(
+                "height",
+                f"the barometer drifts: the autopilot takes the vehicle to be {abs(drifted_m):.2f} m {where} than it is in the map",
+                every_s=10.0,
+            )
         self._host.report("mapping.slam_status", "LOST" if problem else "OK", problem)
 
     def _publish_state(self, stamp_ns: int, registration: Registration | None) -> None:

@@ -1,7 +1,7 @@
 """The pose graph of the keyframes: odometry, loops, and what the autopilot says of place, height and the vertical (gtsam).
 
-The odometry alone keeps the tilt with which the map began, and bends: 0.3 degrees are 0.1 m of height after 20 m. The autopilot's height
-comes from a barometer, which drifts with time and not with the way, so its differences along the way say what is level.
+The odometry alone keeps the tilt with which the map began: 0.3 degrees are 0.1 m of height after 20 m. The autopilot's height comes from
+a barometer, which drifts with time and not with the way (`BarometerZero`), so its differences along the way say what is level.
 
 The graph also says how well the last keyframe is known in the map. The odometry lays each scan onto keyframes that it has placed itself,
 so its own covariance is that of the pose relative to them, and says nothing of the error that they hand on from one to the next.
@@ -9,15 +9,15 @@ so its own covariance is that of the pose relative to them, and says nothing of 
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from typing import TYPE_CHECKING
 
 import gtsam
 import numpy as np
 
+from lidar_mapping.barometer import BarometerZero, HeightSettings
 from lidar_mapping.inertial import POSITION, InertialFilter, InertialNoise, InertialState, cross_matrix
 from lidar_mapping.registration import RegistrationSettings, register
-from perception_core import NS
 
 if TYPE_CHECKING:
     from numpy.typing import NDArray
@@ -27,7 +27,6 @@ if TYPE_CHECKING:
     Floats = NDArray[np.float64]
 
 
-STEP_SIGMAS = 3.0  # of the walk, from which on the autopilot's height has rather jumped
 _UP = gtsam.Unit3(np.array([0.0, 0.0, 1.0]))
 
 
@@ -36,11 +35,11 @@ class GraphSettings:
     """When a place is taken for a known one, and what is believed of what; metres, radians.
 
     A keyframe is held against one that lies at least ``path_m`` of flight back and within ``reach_m``. The drift of the odometry is
-    ``drift`` of the way and ``turn_rad`` a keyframe. The autopilot's position is believed to ``autopilot_m``: loosely, for its error is the
-    same for minutes, so that many keyframes know no more of it than one. Its height is noisy by ``height_m``, and its zero walks by
-    ``height_walk_m`` a root second; on a known map it is known to ``known_m``. The map begins level to ``tilt_rad``, and the autopilot's
-    vertical at one keyframe is believed to ``upright_rad``, loosely, as its position. With every ``every``th keyframe loops are looked for
-    and all is optimised; keyframes are moved where one is off by ``moved_m``.
+    ``drift`` of the way and ``turn_rad`` a keyframe; upwards, where the ground holds the scan, it is ``up_m`` a keyframe. The autopilot's
+    position is believed to ``autopilot_m``: loosely, for its error is the same for minutes, so that many keyframes know no more of it than
+    one. What is known of its height stands in ``height``. The map begins level to ``tilt_rad``, and the autopilot's vertical is believed to
+    ``upright_rad`` at one keyframe, loosely, as its position. With every ``every``th keyframe loops are looked for and all is optimised;
+    keyframes are moved where one is off by ``moved_m``.
     """
 
     path_m: float = 25.0
@@ -49,17 +48,16 @@ class GraphSettings:
     drift: float = 0.01
     least_m: float = 0.005
     turn_rad: float = 0.001
+    up_m: float = 0.003
     loop_m: float = 0.03
     loop_rad: float = 0.005
     loop_fitness: float = 0.7
     autopilot_m: float = 30.0
-    height_m: float = 0.03
-    height_walk_m: float = 0.005
     tilt_rad: float = 0.01
     upright_rad: float = 0.1
-    known_m: float = 0.3
     moved_m: float = 0.02
     submap: int = 6
+    height: HeightSettings = field(default_factory=HeightSettings)
 
 
 class PoseGraph:
@@ -69,21 +67,27 @@ class PoseGraph:
         self._settings, self._registration = settings, registration
         self._factors = gtsam.NonlinearFactorGraph()
         self._path_m: list[float] = []
-        self._zeros_m: dict[int, float] = {}
-        """By keyframe: what is to be added to a height in the map for that of the autopilot."""
-        self._zero_ns = 0
+        self.barometer = BarometerZero(settings.height, self._factors)
         self.loops = 0
         self.covariance: Floats = np.zeros((6, 6))
         """Of the last keyframe's pose: rotation vector and position, map frame (6, 6)."""
 
-    def add(self, keyframes: Keyframes, T_odom_base: Floats | None) -> bool:  # noqa: N803 -- T_target_source
-        """Take the last keyframe and where the autopilot was then; return whether keyframes' poses were moved."""
+    def stay(self, keyframes: Keyframes, stamp_ns: int) -> None:
+        """Take the height that the barometer has heard, where the vehicle stays near the last keyframe."""
+        if self.barometer.due(stamp_ns, keyframes.all[-1]):
+            self.barometer.tie(stamp_ns, len(keyframes.all) - 1, float(keyframes.all[-1].pose[2, 3]))
+
+    def add(self, keyframes: Keyframes, T_odom_base: Floats | None, up_m: float = 0.0) -> bool:  # noqa: N803 -- T_target_source
+        """Take the last keyframe and where the autopilot was then; return whether keyframes' poses were moved.
+
+        ``up_m`` is how well the height of that keyframe is known relative to those around: a standard deviation.
+        """
         index = len(keyframes.all) - 1
         frame = keyframes.all[index]
         if index == 0:
             self._begin(frame)
         else:
-            self._lead_on(keyframes)
+            self._lead_on(keyframes, up_m)
         if T_odom_base is not None:
             self._listen_to(T_odom_base, frame, index)
         if index % self._settings.every:
@@ -100,36 +104,27 @@ class PoseGraph:
         self._factors.add(gtsam.PriorFactorPose3(0, gtsam.Pose3(frame.pose), start))
         self._path_m.append(0.0)
 
-    def _lead_on(self, keyframes: Keyframes) -> None:
+    def _lead_on(self, keyframes: Keyframes, up_m: float) -> None:
         """Take what the odometry says of the way from the keyframe before."""
         settings, index = self._settings, len(keyframes.all) - 1
         before, pose = keyframes.all[index - 1].pose, keyframes.all[index].pose
         step = np.linalg.inv(before) @ pose
         length_m = float(np.linalg.norm(step[:3, 3]))
-        odometry = _noise(settings.turn_rad, settings.least_m + settings.drift * length_m)
+        shift_m = settings.least_m + settings.drift * length_m
+        odometry = gtsam.noiseModel.Diagonal.Sigmas(
+            np.array([*[settings.turn_rad] * 3, shift_m, shift_m, min(shift_m, float(np.hypot(settings.up_m, up_m)))])
+        )
         self._factors.add(gtsam.BetweenFactorPose3(index - 1, index, gtsam.Pose3(step), odometry))
         self._path_m.append(self._path_m[-1] + length_m)
         self._go_on(pose[:3, 3] - before[:3, 3], odometry)
 
     def _listen_to(self, T_odom_base: Floats, frame: Keyframe, index: int) -> None:  # noqa: N803
-        """Take the autopilot's place, vertical and height; the zero of its height is what it was at the first keyframe, and walks."""
+        """Take the autopilot's place, vertical and height."""
         settings, isotropic = self._settings, gtsam.noiseModel.Isotropic.Sigma
-        place, height_m = np.asarray(T_odom_base[:3, 3], dtype=np.float64), float(T_odom_base[2, 3])
-        self._factors.add(gtsam.GPSFactor(index, place, isotropic(3, settings.autopilot_m)))
+        self._factors.add(gtsam.GPSFactor(index, np.asarray(T_odom_base[:3, 3], dtype=np.float64), isotropic(3, settings.autopilot_m)))
         up = gtsam.Unit3(np.asarray(T_odom_base[2, :3], dtype=np.float64))
         self._factors.add(gtsam.AttitudeFactorPose3(index, _UP, isotropic(2, settings.upright_rad), up))
-        if self._zeros_m:
-            last, passed_s = max(self._zeros_m), max(abs(frame.stamp_ns - self._zero_ns) / NS, 0.1)
-            walk = isotropic(1, settings.height_walk_m * np.sqrt(passed_s))
-            stepping = gtsam.noiseModel.Robust.Create(gtsam.noiseModel.mEstimator.Cauchy.Create(STEP_SIGMAS), walk)
-            self._factors.add(gtsam.BetweenFactorDouble(_zero(last), _zero(index), 0.0, stepping))
-            self._zeros_m[index] = self._zeros_m[last]
-        else:
-            self._zeros_m[index] = height_m - float(frame.pose[2, 3])
-            known = isotropic(1, settings.known_m if index else 1e-3)
-            self._factors.add(gtsam.PriorFactorDouble(_zero(index), self._zeros_m[index], known))
-        self._zero_ns = frame.stamp_ns
-        self._factors.add(gtsam.BarometricFactor(index, _zero(index), _pressure_kpa(height_m), isotropic(1, settings.height_m)))
+        self.barometer.tie(frame.stamp_ns, index, float(frame.pose[2, 3]))
 
     def _go_on(self, moved_m: Floats, odometry: gtsam.noiseModel.Diagonal) -> None:
         """Carry the covariance on by one keyframe: an error of attitude displaces what lies farther on."""
@@ -171,11 +166,10 @@ class PoseGraph:
         values = gtsam.Values()
         for i, frame in enumerate(keyframes.all):
             values.insert(i, gtsam.Pose3(frame.pose))
-        for i, zero_m in self._zeros_m.items():
-            values.insert(_zero(i), zero_m)
+        self.barometer.insert_into(values)
         best = gtsam.LevenbergMarquardtOptimizer(self._factors, values).optimize()
         poses = [best.atPose3(i).matrix() for i in range(len(keyframes.all))]
-        self._zeros_m = {i: best.atDouble(_zero(i)) for i in self._zeros_m}
+        self.barometer.take_from(best)
         turn = np.kron(np.eye(2), poses[-1][:3, :3])  # gtsam tells of the body's axes
         self.covariance = turn @ gtsam.Marginals(self._factors, best).marginalCovariance(len(poses) - 1) @ turn.T
         off_m = max(float(np.linalg.norm(pose[:3, 3] - frame.pose[:3, 3])) for pose, frame in zip(poses, keyframes.all, strict=True))
@@ -184,15 +178,6 @@ class PoseGraph:
         for pose, frame in zip(poses, keyframes.all, strict=True):
             frame.pose = pose
         return True
-
-
-def _zero(keyframe: int) -> int:
-    return int(gtsam.symbol("h", keyframe))
-
-
-def _pressure_kpa(height_m: float) -> float:
-    """Return the pressure for which gtsam's factor takes a height: it is made for a barometer's readings."""
-    return float(gtsam.BarometricFactor().baroOut(height_m))
 
 
 def _noise(turn_rad: float, shift_m: float) -> gtsam.noiseModel.Diagonal:

@@ -29,6 +29,7 @@ if TYPE_CHECKING:
 GRAVITY = np.array([0.0, 0.0, -9.81])
 ATTITUDE, VELOCITY, POSITION, GYRO_BIAS, ACCEL_BIAS, AUTOPILOT, DRIFT = (slice(3 * i, 3 * i + 3) for i in range(7))
 HEADING = 2  # of the attitude, while the vehicle is level
+UP = 8  # of the position
 TERMS = 21
 HISTORY = 2000
 """States kept since the last sweep: of a few seconds, for the autopilot may have been silent."""

@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from lidar_mapping.graph import GraphSettings, PoseGraph
-from lidar_mapping.inertial import POSITION, InertialState, rotation_vector
+from lidar_mapping.inertial import POSITION, UP, InertialState, rotation_vector
 from lidar_mapping.keyframes import Keyframes
 from lidar_mapping.odometry import VELOCITY_BASE_NS, AutopilotMotion, LidarInertialOdometry, OdometrySettings, Step
 from lidar_mapping.readings import KEPT, SET_BACK_NS
@@ -114,6 +114,11 @@ class Slam:
         return ""
 
     @property
+    def height_drift_m(self) -> float:
+        """How much higher than the map the autopilot takes the vehicle to be since the start, but for jumps: its barometer's drift."""
+        return self._graph.barometer.drifted_m
+
+    @property
     def uncertainty_m(self) -> float:
         """The standard deviation of the position relative to the keyframes around, in its worst direction."""
         if self._odometry is None:
@@ -180,9 +185,13 @@ class Slam:
         if step.registration.believed:
             self._lost_since_ns = None
             self.map.insert(step.points)
+            self._graph.barometer.hear(self._odometry.filter.stamp_ns, float(T_odom_base[2, 3]), float(self._odometry.state.position[2]))
             if step.keyframe is not None:
                 self._settle(T_odom_base)
+            else:
+                self._graph.stay(self.keyframes, self._odometry.filter.stamp_ns)
         else:
+            self._graph.barometer.forget()
             self.count.rejected += 1
             self._lost_since_ns = self._lost_since_ns or self._odometry.filter.stamp_ns
         self.T_map_odom = self._odometry.state.matrix @ np.linalg.inv(T_odom_base)
@@ -191,8 +200,9 @@ class Slam:
         """Let the graph settle and look for loops; what it corrects is carried on to the map and the vehicle."""
         assert self._odometry is not None  # noqa: S101 -- called by add only
         before = self.keyframes.all[-1].pose
-        if not self._graph.add(self.keyframes, T_odom_base):
+        if not self._graph.add(self.keyframes, T_odom_base, float(np.sqrt(self._odometry.filter.covariance[UP, UP]))):
             return
+        self._graph.barometer.forget()
         self._odometry.move(self.keyframes.all[-1].pose @ np.linalg.inv(before))
         self.map = VoxelMap(voxel_m=self._settings.voxel_m, max_voxels=self._settings.max_voxels)
         for frame in self.keyframes.all:

@@ -82,7 +82,7 @@ class Localization:
         self._begun = False
         self._stepped_s: float | None = None
         self._above_m = self._level_m = 0.0
-        """The map's height above the autopilot's, as told last, and what of it is no slow change."""
+        """The map's height above the autopilot's, as told last, and what of it has been followed for good."""
 
     def tune(self, settings: GuidanceSettings) -> None:
         """Go on with other settings."""
@@ -119,12 +119,13 @@ class Localization:
         It jumps to the first transform, which a guidance started again in flight hears, and to one that is farther off than
         ``map_jump_m`` or ``map_jump_rad``: then a loop was closed, or the autopilot counts from another origin. To follow that slowly
         would keep the vehicle off its places for long, and move one that holds its place. The caller begins again from where the vehicle
-        is, so that no setpoint jumps. In flight a height that changes slowly is followed up to ``map_height_m``: the autopilot's, a
-        barometer's, does not grow wrong with the way, and a map that is not level must not lead the vehicle to the ground.
+        is, so that no setpoint jumps. In flight a change of height is followed up to ``map_height_m``, and one that goes on at
+        ``map_height_m_s``: a barometer drifts by centimetres a second, however long. A map that is worse than that, for it is not level,
+        must not lead the vehicle to the ground.
         """
         passed_s = 0.0 if self._stepped_s is None else min(max(now_s - self._stepped_s, 0.0), LONGEST_STEP_S)
         self._stepped_s = now_s
-        wanted = self._wanted(place_odom_m, flying=flying)
+        wanted = self._wanted(place_odom_m, passed_s, flying=flying)
         if wanted is None:
             return False
         here = self.correction.to_map(place_odom_m)
@@ -144,7 +145,7 @@ class Localization:
             log.warning("the vehicle's place in map jumps by %.2f m and %.1f degrees", shift.norm, math.degrees(abs(turn)))
         return flying
 
-    def _wanted(self, place_odom_m: Vec3, *, flying: bool) -> Correction | None:
+    def _wanted(self, place_odom_m: Vec3, passed_s: float, *, flying: bool) -> Correction | None:
         if not self._settings.follow_map:
             return NO_CORRECTION
         if self._newest is None:
@@ -156,6 +157,8 @@ class Localization:
             self._level_m = above_m
         elif abs(above_m - before_m) > self._settings.map_jump_m:
             self._level_m += above_m - before_m
+        drift_m = self._settings.map_height_m_s * passed_s
+        self._level_m += min(max(above_m - self._level_m, -drift_m), drift_m)
         most_m = self._settings.map_height_m
         bounded_m = min(max(above_m, self._level_m - most_m), self._level_m + most_m)
         return Correction(told.yaw_rad, Vec3(told.shift_m.x, told.shift_m.y, bounded_m))
