@@ -34,6 +34,9 @@ def topics(robot: Robot) -> list[BridgedTopic]:
         # The functional layer compares what it reported with what the resource manager holds.
         name = f"/{skillset.name}/resource_states"
         found.append(BridgedTopic(name, "ros2_to_ros1", "skillset_interfaces/ResourceStates", latched=True, depth=1))
+        if any(resource.silence_s is not None for resource in skillset.resources):
+            name = f"/{skillset.name}/reported"
+            found.append(BridgedTopic(name, "ros1_to_ros2", "skillset_interfaces/ResourceStates", latched=True, depth=10))
         # Who watches over the robot on its own computer listens for them. Not latched: the last one of dead managers is no heartbeat.
         found.append(BridgedTopic(f"/{skillset.name}/alive", "ros2_to_ros1", "std_msgs/Header", latched=False, depth=1))
     return list({topic.name: topic for topic in reversed(found)}.values())[::-1]

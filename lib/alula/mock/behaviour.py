@@ -94,7 +94,7 @@ class MockFault:
     """Something that a user can have fail: noticed ``delay`` seconds after it happened; its time counts from the ``anchor``.
 
     ``changes`` are what the robot does about it by itself, after it was noticed: a failsafe that lands, for instance. ``ends``: the skills
-    whose running executions it ends, and with which result.
+    whose running executions it ends, and with which result. ``reason``: of its states, in words; empty: that it is this fault.
     """
 
     states: Mapping[Place, str]
@@ -103,6 +103,7 @@ class MockFault:
     changes: tuple[MockChange, ...] = ()
     ends: Mapping[Place, str] = field(default_factory=dict)
     source: str = ""
+    reason: str = ""
 
 
 @dataclass(frozen=True)

@@ -37,7 +37,20 @@ def load_behaviour(paths: Sequence[str | Path], skillsets: Sequence[Skillset]) -
         if "memory" in parts:
             memory |= {name: part.value for name, part in parts["memory"].entries("memory").items()}
     reader = _Reader({skillset.name: skillset for skillset in skillsets}, memory)
-    return functools.reduce(lambda below, parts: reader.read(parts[1]).over(below), sections, Behaviour(memory=memory))
+    silent = Behaviour(memory=memory, faults=_silences(skillsets))
+    return functools.reduce(lambda below, parts: reader.read(parts[1]).over(below), sections, silent)
+
+
+def _silences(skillsets: Sequence[Skillset]) -> dict[str, MockFault]:
+    """Return the faults ``RESOURCE:silent``: nothing is heard of the resources of this name that have a silence."""
+    found: dict[str, MockFault] = {}
+    for skillset in skillsets:
+        for one in skillset.resources:
+            if one.silence_s is not None:
+                name = f"{one.name}:silent"
+                states = {**(found[name].states if name in found else {}), (skillset.name, one.name): one.initial}
+                found[name] = MockFault(states, delay=one.silence_s, reason=f"not heard of for {one.silence_s:g} s")
+    return found
 
 
 class _Reader:

@@ -132,7 +132,7 @@ class MockRobot(MockState):
     def _hold(self, name: str, fault: MockFault) -> None:
         self._before.setdefault(name, {place: self.host.state(*place) for place in fault.states})
         self._held |= fault.states
-        reason = f"mock fault {name}"
+        reason = fault.reason or f"mock fault {name}"
         self.take(fault.states, reason)
         for skill in self._skills:
             if skill.place in fault.ends:

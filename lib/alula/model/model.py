@@ -56,6 +56,9 @@ class Resource:
     """A state machine. ``states`` keeps the order of the source.
 
     ``all_transitions`` tells that every arrow that is not extern was asked for by ``transition all``; they are in ``transitions``.
+
+    ``silence_s``: when its reporter has not been heard of for so many seconds, the managers take the resource back to its initial state,
+    which then means unknown. Those extern arrows are in ``transitions`` as well, the last of them. None: it is never taken back.
     """
 
     name: str
@@ -63,6 +66,7 @@ class Resource:
     initial: str
     transitions: tuple[Transition, ...]
     all_transitions: bool = False
+    silence_s: float | None = None
     span: Span = field(default=NOWHERE, compare=False)
 
     def has_arrow(self, source: str, target: str, *, extern: bool) -> bool:

@@ -16,7 +16,17 @@ from alula.runtime.core.events import EngineEvent, ExecutionEvent, TransitionEve
 from alula.runtime.core.records import ExecutionRecord, ResourceStatus, SkillRecord
 from alula.runtime.core.replies import PauseReply, TransitionReply
 from alula.runtime.core.why import Why
-from alula.runtime.middleware import EVENTS, RESOURCE_STATES, SKILL_STATES, PublishedEvent, ResourceStates, SkillStates, Topic, WhyReply
+from alula.runtime.middleware import (
+    EVENTS,
+    REPORTED,
+    RESOURCE_STATES,
+    SKILL_STATES,
+    PublishedEvent,
+    ResourceStates,
+    SkillStates,
+    Topic,
+    WhyReply,
+)
 from alula.runtime.plain import to_plain
 from alula.runtime.views import DataReading, Sample
 
@@ -169,6 +179,7 @@ class Codecs:
         self._topics: Mapping[str, TopicCodec] = {
             EVENTS.name: TopicCodec(messages.Event, self._event_message, published_event),
             RESOURCE_STATES.name: TopicCodec(messages.ResourceStates, self._states_message, states_of),
+            REPORTED.name: TopicCodec(messages.ResourceStates, self._states_message, states_of),
             SKILL_STATES.name: TopicCodec(messages.SkillStates, self._skills_message, self._skills_of),
         }
         self.services: Mapping[str, ServiceCodec] = self._service_codecs(services)

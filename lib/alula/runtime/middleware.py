@@ -62,6 +62,8 @@ class Topic:
 
 EVENTS = Topic("events", depth=1000)
 RESOURCE_STATES = Topic("resource_states")
+REPORTED = Topic("reported", depth=10)
+"""What reporters of the functional layer say, twice a second: their heartbeat. Values are ``ResourceStates``."""
 SKILL_STATES = Topic("skill_states")
 
 

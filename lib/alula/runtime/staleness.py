@@ -1,11 +1,65 @@
-"""When a value of the functional layer is too old to be believed."""
+"""When what the functional layer tells is too old to be believed: values of data, and states of resources."""
 
 from __future__ import annotations
+
+import threading
+from collections.abc import Callable
+from typing import TYPE_CHECKING
+
+if TYPE_CHECKING:
+    from alula.runtime.middleware import Middleware
 
 STALE_PERIODS = 3.0
 """A value is stale when it is older than so many of the periods that the model promises."""
 
 
+def limit_ns(period_s: float | None) -> int | None:
+    """Return the age at which a value is stale; None: one without a promised period never is."""
+    return None if period_s is None else round(STALE_PERIODS * period_s * 1e9)
+
+
 def is_stale(age_ns: int, period_s: float | None) -> bool:
-    """Tell whether a value of this age is stale; one without a promised period never is."""
-    return period_s is not None and age_ns > STALE_PERIODS * period_s * 1e9
+    """Tell whether a value of this age is stale."""
+    limit = limit_ns(period_s)
+    return limit is not None and age_ns > limit
+
+
+class StalenessWatch:
+    """Tells once when a source that was heard of is not heard of any more; it is watched again from when it is.
+
+    There is one timer a source at a time, for the moment at which the last that was heard would be stale.
+
+    Args:
+        middleware: its clock and timers.
+        on_stale: called with the source's name, on the middleware's loop.
+    """
+
+    def __init__(self, middleware: Middleware, on_stale: Callable[[str], None]) -> None:
+        self._middleware = middleware
+        self._on_stale = on_stale
+        self._heard_ns: dict[str, int] = {}
+        self._watched: set[str] = set()
+        self._lock = threading.Lock()
+
+    def heard(self, name: str, stamp_ns: int, limit_ns: int) -> None:
+        """Note that a source was heard of at ``stamp_ns``; it is stale when it is not again within ``limit_ns``; from any thread."""
+        with self._lock:
+            self._heard_ns[name] = stamp_ns
+            first = name not in self._watched
+            self._watched.add(name)
+        if first:
+            self._look_at(name, stamp_ns, limit_ns)
+
+    def _look_at(self, name: str, stamp_ns: int, limit_ns: int) -> None:
+        def look() -> None:
+            with self._lock:
+                latest_ns = self._heard_ns[name]
+                stale = latest_ns <= stamp_ns
+                if stale:
+                    self._watched.discard(name)
+            if stale:
+                self._on_stale(name)
+            else:
+                self._look_at(name, latest_ns, limit_ns)
+
+        self._middleware.at(stamp_ns + limit_ns + 1, look)

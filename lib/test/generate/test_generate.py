@@ -114,6 +114,16 @@ def test_events_can_be_triggered_from_the_other_world(tmp_path):
     ]
 
 
+def test_heartbeats_of_reporters_cross_where_a_resource_can_be_silent(tmp_path):
+    folder = tmp_path / "eye"
+    folder.mkdir()
+    (folder / "eye.skill").write_text("skillset eye { resource r { initial A silence 2 s extern A -> B } }")
+    topics = yaml.safe_load(robot_files(load_robot(folder))["eye_bridge.yaml"])["topics"]
+    assert [(one["type"], one["direction"]) for one in topics if one["name"] == "/eye/reported"] == [
+        ("skillset_interfaces/ResourceStates", "ros1_to_ros2")
+    ]
+
+
 def test_a_robot_of_nothing(tmp_path):
     folder = tmp_path / "stone"
     folder.mkdir()

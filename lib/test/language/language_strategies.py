@@ -10,7 +10,7 @@ from alula.language.paper import skill as paper
 from alula.language.rl import skill as rl
 from alula.language.syntax.cursor import OPERATOR_WORDS
 from alula.language.syntax.document import MEMBERS
-from alula.language.syntax.resources import every_arrow, occurring
+from alula.language.syntax.resources import every_arrow, occurring, with_silence
 from alula.model.expressions import TRUE, And, Comparison, Constant, DataIs, Implies, Not, Or, ResourceIs, SkillRuns
 from alula.model.model import (
     NO_EFFECT,
@@ -36,7 +36,7 @@ from alula.model.model import (
 
 WORDS = OPERATOR_WORDS | set(paper.BLOCKS) | set(rl.BLOCKS) | set(MEMBERS) | {"skillset", "all", "period"}
 TRAPS = ["initial", "violation", "apply", "post", "extern", "state", "guard", "postcondition", "interrupting", "running", "never"]
-TRAPS += ["leads", "to", "assuming", "for", "recovers", "at", "deadline", "message", "m", "s", "transition", "always"]
+TRAPS += ["leads", "to", "assuming", "for", "recovers", "at", "deadline", "silence", "message", "m", "s", "transition", "always"]
 
 names = st.one_of(
     st.sampled_from(["a", "b", "axes_authority", "OK", *TRAPS]),
@@ -96,9 +96,13 @@ def resources(draw):
     states = occurring(initial, arrows)
     if draw(st.booleans()):
         states = tuple(draw(st.permutations([*states, *draw(st.lists(names, max_size=2))])))
-    if draw(st.booleans()):
-        return Resource(name, states, initial, arrows, all_transitions=False)
-    return Resource(name, states, initial, (*arrows, *(a for a in every_arrow(states) if a not in arrows)), all_transitions=True)
+    every = draw(st.booleans())
+    if every:
+        arrows = (*arrows, *(a for a in every_arrow(states) if a not in arrows))
+    silence_s = draw(st.none() | floats)
+    if silence_s is not None:
+        arrows = with_silence(arrows, states, initial)
+    return Resource(name, states, initial, arrows, all_transitions=every, silence_s=silence_s)
 
 
 def results(used):

@@ -10,6 +10,7 @@ from alula.language.errors import LanguageError, Severity
 from alula.language.load import check_file, load_robot
 from alula.language.paper import parse
 
+EYE = "initial UNKNOWN extern UNKNOWN -> OPEN extern UNKNOWN -> SHUT extern OPEN -> SHUT extern SHUT -> OPEN"
 AXES = "resource axes { initial FREE FREE -> USED USED -> FREE }\n"
 
 
@@ -141,6 +142,21 @@ SEMANTICS = [
     ("ALU221", "data d: float64 " + asks("invariant { i: data = (d > 9) ^recovers at 8 }"), "not above its threshold", ""),
     ("ALU221", "data d: float64 " + asks("invariant { i: data = (d < 9 m) ^recovers at 0.1 km }"), "not below its threshold", ""),
     ("ALU219", "data d: float64 " + asks("invariant { i: data = (d < 9 m) recovers at (1 ^ft) }"), "unknown unit `ft`", ""),
+    ("ALU226", f"resource ^eye {{ silence = 0.5 {EYE} }}", "the silence of `eye` is 0.5 s", "take 1 s or more"),
+    ("ALU226", "resource ^r { initial A silence 2 s A -> B }", "nobody reports it", "extern A -> STATE"),
+    ("ALU226", f"resource ^eye {{ silence 2 s {EYE} extern OPEN -> HURT }}", "`HURT` could not be reported", "`extern UNKNOWN -> HURT`"),
+    (
+        "ALU306",
+        f"resource eye {{ silence 2 s {EYE} }} " + asks("precondition { ^p: resource = (eye != SHUT) }"),
+        "precondition `p` holds",
+        "",
+    ),
+    (
+        "ALU306",
+        f"resource eye {{ silence 2 s {EYE} }} " + asks("invariant { ^i: resource = (not eye == SHUT and eye != OPEN) }"),
+        "holds while nothing is heard of `eye`, which is `UNKNOWN` then",
+        "`eye == UNKNOWN` or `!= UNKNOWN`",
+    ),
     ("ALU222", "property p: never ^takeof running " + asks("").replace("skill f", "skill takeoff"), "no skill `takeof`", "`takeoff`?"),
     ("ALU214", "data d: bool skill f { precondition { p: data = (^d > true) } result { R } }", "doesn't compare a truth value", ""),
     ("ALU214", 'data d: string skill f { precondition { p: data = (^d < "a") } result { R } }', "doesn't compare a text", ""),

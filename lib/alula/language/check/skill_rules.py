@@ -21,7 +21,7 @@ from alula.language.check.references import (
     warning,
 )
 from alula.language.errors import Diagnostic
-from alula.model.expressions import Comparison, DataIs, atoms
+from alula.model.expressions import And, Comparison, DataIs, Expression, Implies, Not, Or, ResourceIs, atoms
 from alula.model.model import NO_EFFECT, Effect, Hold, Invariant, Skill, Skillset
 from alula.model.ros_types import camel
 from alula.model.units import UNIT_IN_SI
@@ -67,6 +67,37 @@ def _conditions(skillset: Skillset, skill: Skill) -> Iterator[Diagnostic]:
     yield from condition_findings(skillset, skill.interrupt.postcondition, "the interruption's postcondition", data_allowed=False)
     for result in skill.results:
         yield from condition_findings(skillset, result.postcondition, f"the postcondition of `{result.name}`", data_allowed=False)
+
+
+def _unheard(skillset: Skillset, skill: Skill) -> Iterator[Diagnostic]:
+    """Warn of conditions that hold after a silence, as unknown is none of the states that they exclude, and don't say so."""
+    initial = {resource.name: resource.initial for resource in skillset.resources if resource.silence_s is not None}
+    for kind, named in (("precondition", skill.preconditions), ("invariant", skill.invariants)):
+        for one in named:
+            said = {(atom.resource, atom.state) for atom in atoms(one.condition) if isinstance(atom, ResourceIs)}
+            for name in dict.fromkeys(_excluded(one.condition, holds=True)):
+                if name in initial and (name, initial[name]) not in said:
+                    message = f"{kind} `{one.name}` holds while nothing is heard of `{name}`, which is `{initial[name]}` then"
+                    hint = f"ask for the states that are good, or say `{name} == {initial[name]}` or `!= {initial[name]}` as well"
+                    yield warning("ALU306", message, one.span, hint=hint)
+
+
+def _excluded(condition: Expression, *, holds: bool) -> Iterator[str]:
+    """Yield the resources of which a condition that ``holds`` (or, within a negation, does not) excludes a state."""
+    match condition:
+        case ResourceIs(resource=resource, negated=negated):
+            if negated == holds:
+                yield resource
+        case Not(operand=operand):
+            yield from _excluded(operand, holds=not holds)
+        case And(operands=operands) | Or(operands=operands):
+            for operand in operands:
+                yield from _excluded(operand, holds=holds)
+        case Implies(premise=premise, conclusion=conclusion):
+            yield from _excluded(premise, holds=not holds)
+            yield from _excluded(conclusion, holds=holds)
+        case _:
+            pass
 
 
 def _holds(skillset: Skillset, skill: Skill) -> Iterator[Diagnostic]:
@@ -132,6 +163,7 @@ SKILL_RULES: Sequence[Callable[[Skillset, Skill], Iterable[Diagnostic]]] = (
     _skill_names,
     _interface_names,
     _conditions,
+    _unheard,
     _holds,
     _effects,
     _ends,

@@ -29,6 +29,9 @@ from alula.model import ros_types
 from alula.model.model import Resource, Skillset
 from alula.model.span import Span
 
+SHORTEST_SILENCE_S = 1.0
+"""Two periods of a reporter's heartbeat."""
+
 
 def _skillset_names(skillset: Skillset) -> Iterator[Diagnostic]:
     yield from duplicates("resource", skillset.resources)
@@ -55,6 +58,7 @@ def _resources(skillset: Skillset) -> Iterator[Diagnostic]:
         yield from _states(resource)
         yield from _initial(resource)
         yield from _reach(resource)
+        yield from _silence(resource)
 
 
 def _states(resource: Resource) -> Iterator[Diagnostic]:
@@ -97,6 +101,24 @@ def _reach(resource: Resource) -> Iterator[Diagnostic]:
         if state not in reached:
             message = f"state `{state}` of `{resource.name}` can't be reached from `{resource.initial}`"
             yield warning("ALU302", message, resource.span)
+
+
+def _silence(resource: Resource) -> Iterator[Diagnostic]:
+    """Yield why a silence can't be noticed, or what could not be reported after it."""
+    silence_s, initial = resource.silence_s, resource.initial
+    if silence_s is None or initial not in resource.states:
+        return
+    if not silence_s >= SHORTEST_SILENCE_S:
+        hint = f"reporters are heard of every 0.5 s: take {SHORTEST_SILENCE_S:g} s or more"
+        yield error("ALU226", f"the silence of `{resource.name}` is {silence_s:g} s", resource.span, hint=hint)
+    reported = dict.fromkeys(arrow.target for arrow in resource.transitions if arrow.extern and arrow.target != initial)
+    if not reported:
+        message = f"`{resource.name}` has a silence, and nobody reports it: no extern arrow leads away from `{initial}`"
+        yield error("ALU226", message, resource.span, hint=f"add `extern {initial} -> STATE`, or leave `silence` out")
+    for state in reported:
+        if not resource.has_arrow(initial, state, extern=True):
+            message = f"after a silence `{resource.name}` is `{initial}`, and `{state}` could not be reported from there"
+            yield error("ALU226", message, resource.span, hint=f"add `extern {initial} -> {state}`")
 
 
 def _types(skillset: Skillset) -> Iterator[Diagnostic]:

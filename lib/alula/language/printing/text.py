@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Callable, Iterable, Iterator
 from dataclasses import dataclass
 
-from alula.language.syntax.resources import every_arrow, occurring
+from alula.language.syntax.resources import every_arrow, is_of_silence, occurring
 from alula.model.condition_text import bare_text
 from alula.model.expressions import TRUE, Expression
 from alula.model.model import NO_EFFECT, Data, Effect, Event, Hold, Parameter, Property, PropertyKind, Resource, Skill, Skillset
@@ -95,7 +95,8 @@ def _data(data: Data) -> str:
 
 def _resource(resource: Resource, *, in_block: bool) -> Iterator[str]:
     yield f"resource {resource.name} {{"
-    listed = resource.transitions
+    silence = resource.silence_s is not None
+    listed = tuple(arrow for arrow in resource.transitions if not (silence and is_of_silence(arrow, resource.initial)))
     if resource.all_transitions:
         # Only the arrows that `transition all` would not give at that place need saying.
         every = every_arrow(resource.states)
@@ -105,6 +106,8 @@ def _resource(resource: Resource, *, in_block: bool) -> Iterator[str]:
         yield f"  state {{ {' '.join(resource.states)} }}"
     if resource.initial:
         yield f"  initial {resource.initial}"
+    if silence:
+        yield f"  silence = {resource.silence_s!r}"
     arrows = [f"{'extern ' if arrow.extern else ''}{arrow.source} -> {arrow.target}" for arrow in listed]
     yield from block("transition", arrows) if in_block else (f"  {arrow}" for arrow in arrows)
     if resource.all_transitions:

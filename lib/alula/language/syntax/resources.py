@@ -1,6 +1,7 @@
 """A resource, in either notation: `state`, `initial` and the arrows, in any order.
 
 The paper's: `initial S  A -> B  extern B -> C`. The Robot Language's: `state { A B C } initial A transition { A -> B } | all`.
+In both: `silence 2 s`.
 """
 
 from __future__ import annotations
@@ -9,6 +10,7 @@ from collections.abc import Callable
 
 from alula.language.lexer import Kind, Token
 from alula.language.syntax.cursor import Cursor
+from alula.language.syntax.quantities import setting
 from alula.model.model import Resource, Transition
 
 MAX_STATES = 250
@@ -17,7 +19,7 @@ MAX_STATES = 250
 MAX_ARROWS = 130_000
 """In a file: two such resources."""
 
-_WORDS = frozenset({"initial", "transition", "state", "extern"})
+_WORDS = frozenset({"initial", "transition", "state", "extern", "silence"})
 
 
 def read_resource(cursor: Cursor, outer: Callable[[], bool]) -> Resource:
@@ -42,6 +44,7 @@ class _ResourceReader:
         self.transitions: list[Transition] = []
         self.all = False
         self.extern_all = False
+        self.silence_s: float | None = None
 
     def member(self) -> None:
         """Read one line of the body."""
@@ -56,6 +59,8 @@ class _ResourceReader:
                 self._transition()
         elif cursor.at_word("initial"):
             self._initial()
+        elif cursor.at("silence") and (cursor.ahead().kind is Kind.NUMBER or cursor.ahead().text in {"=", ":"}):
+            self._silence()
         elif cursor.at_word("transition"):
             raise self._fail_transition()
         else:
@@ -78,7 +83,9 @@ class _ResourceReader:
             arrows += _missing(every_arrow(states, extern=True), arrows)
         if self.all:
             arrows += _missing(every_arrow(states), arrows)
-        return Resource(name.text, states, self.initial, arrows, self.all, span=self.cursor.span(name))
+        if self.silence_s is not None:
+            arrows = with_silence(arrows, states, self.initial)
+        return Resource(name.text, states, self.initial, arrows, self.all, self.silence_s, span=self.cursor.span(name))
 
     def _states(self) -> None:
         cursor = self.cursor
@@ -100,6 +107,12 @@ class _ResourceReader:
             self.cursor.source.report("ALU106", "`initial` is given twice in this resource", self.cursor.span(word))
         self.cursor.accept("=", ":")
         self.initial = self.cursor.name("a state").text
+
+    def _silence(self) -> None:
+        word = self.cursor.here
+        if self.silence_s is not None:
+            self.cursor.source.report("ALU106", "`silence` is given twice in this resource", self.cursor.span(word))
+        self.silence_s = setting(self.cursor, "silence")
 
     def _transition(self) -> None:
         """Read `A -> B`, `extern A -> B`, `all` or `extern all`."""
@@ -135,6 +148,17 @@ def occurring(initial: str, transitions: tuple[Transition, ...]) -> tuple[str, .
 def _missing(wanted: tuple[Transition, ...], given: tuple[Transition, ...]) -> tuple[Transition, ...]:
     known = set(given)
     return tuple(arrow for arrow in wanted if arrow not in known)
+
+
+def is_of_silence(arrow: Transition, initial: str) -> bool:
+    """Tell whether `silence` in a resource with this initial state stands for the arrow."""
+    return arrow.extern and arrow.target == initial
+
+
+def with_silence(transitions: tuple[Transition, ...], states: tuple[str, ...], initial: str) -> tuple[Transition, ...]:
+    """Return the arrows with those that `silence` stands for at the end: from each state back to the initial one."""
+    back = tuple(Transition(state, initial, extern=True) for state in states if state != initial and initial in states)
+    return (*(arrow for arrow in transitions if not is_of_silence(arrow, initial)), *back)
 
 
 def every_arrow(states: tuple[str, ...], *, extern: bool = False) -> tuple[Transition, ...]:

@@ -5,15 +5,14 @@ from __future__ import annotations
 import functools
 import importlib
 import json
-import threading
 from collections.abc import Callable, Mapping
 
-from alula.model.model import Data, Skillset
+from alula.model.model import Skillset
 from alula.model.ros_types import PRIMITIVES
 from alula.runtime.core.errors import SkillRuntimeError
 from alula.runtime.middleware import Middleware, Reply, Topic, data_topic
 from alula.runtime.plain import to_plain
-from alula.runtime.staleness import STALE_PERIODS, is_stale
+from alula.runtime.staleness import StalenessWatch, is_stale, limit_ns
 from alula.runtime.views import DataReading, Sample
 
 DataBindings = Mapping[str, tuple[str, str]]
@@ -34,8 +33,7 @@ class DataManager:
         self._update = update
         self._data = {data.name: data for data in skillset.data}
         self._received: dict[str, Sample] = {}
-        self._watched: set[str] = set()
-        self._lock = threading.Lock()
+        self._staleness = StalenessWatch(middleware, lambda name: update(name, None))
         self._bindings = bound = bindings or {}
         self._publishers = {data.name: middleware.advertise(data_topic(data, bound.get(data.name, ("", ""))[1])) for data in skillset.data}
 
@@ -52,13 +50,9 @@ class DataManager:
         if name not in self._data:
             raise KeyError(f"skillset {self._skillset} has no data {name}; it has {', '.join(self._data) or 'none'}")
         data, stamp_ns = self._data[name], self._middleware.now_ns()
-        with self._lock:
-            self._received[name] = Sample(value, stamp_ns)
-            watch = data.period_s is not None and name not in self._watched
-            if watch:
-                self._watched.add(name)
-        if watch:
-            self._look_at(data, stamp_ns)
+        self._received[name] = Sample(value, stamp_ns)
+        if (limit := limit_ns(data.period_s)) is not None:
+            self._staleness.heard(name, stamp_ns, limit)
         self._publishers[name].publish(Sample(value, stamp_ns))
         self._update(name, value)
 
@@ -72,22 +66,6 @@ class DataManager:
             return DataReading(data is not None, False, False, 0, "")
         stale = is_stale(self._middleware.now_ns() - sample.stamp_ns, data.period_s)
         return DataReading(True, True, stale, sample.stamp_ns, json.dumps(to_plain(sample.value)))
-
-    def _look_at(self, data: Data, stamp_ns: int) -> None:
-        """Look, when a value of this age will be stale, whether a fresher one has come; there is one timer a data at a time."""
-
-        def look() -> None:
-            with self._lock:
-                latest_ns = self._received[data.name].stamp_ns or 0
-                stale = latest_ns <= stamp_ns
-                if stale:
-                    self._watched.discard(data.name)
-            if stale:
-                self._update(data.name, None)
-            else:
-                self._look_at(data, latest_ns)
-
-        self._middleware.at(stamp_ns + round(STALE_PERIODS * (data.period_s or 0.0) * 1e9) + 1, look)
 
     def _answer(self, request: Mapping[str, object], reply: Reply) -> None:
         reply(self.read(str(request["name"])))

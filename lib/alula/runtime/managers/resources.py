@@ -12,11 +12,16 @@ from alula.runtime.core.events import EngineEvent, TransitionEvent
 from alula.runtime.core.records import ResourceStatus
 from alula.runtime.core.replies import TransitionReply
 from alula.runtime.core.sanitize import as_text
-from alula.runtime.middleware import RESOURCE_STATES, Middleware, Reply, ResourceStates
+from alula.runtime.middleware import REPORTED, RESOURCE_STATES, Middleware, Reply, ResourceStates
+from alula.runtime.staleness import StalenessWatch
 
 
 class ResourceManager:
-    """Publishes ``resource_states`` once a step and at each new reason, and serves ``transition`` and ``trigger``."""
+    """Publishes ``resource_states`` once a step and at each new reason, and serves ``transition`` and ``trigger``.
+
+    Resources with a ``silence`` are followed on ``reported``, the heartbeat of their reporters. One whose reporter falls silent is taken
+    back to its initial state; one whose reporter was never heard of is not.
+    """
 
     def __init__(self, middleware: Middleware, engine: SkillsetEngine, instance_id: str) -> None:
         self._middleware = middleware
@@ -27,12 +32,16 @@ class ResourceManager:
         self._latest = dict(engine.resources)
         self._after = 0
         self._lock = threading.Lock()
+        self._silences = {one.name: one for one in engine.skillset.resources if one.silence_s is not None}
+        self._staleness = StalenessWatch(middleware, self._on_silence)
         self._publish(middleware.now_ns())
 
     def serve(self) -> None:
         """Serve ``transition`` (extern transitions) and ``trigger`` (events of the model)."""
         self._middleware.serve("transition", self._transition)
         self._middleware.serve("trigger", self._trigger)
+        if self._silences:
+            self._middleware.subscribe(REPORTED, self._on_reported)
 
     def on_events(self, events: Sequence[EngineEvent]) -> None:
         """Follow the transitions of one step."""
@@ -63,6 +72,18 @@ class ResourceManager:
             if latest.state == state and latest.reason != reason:
                 self._latest[resource] = replace(latest, reason=reason)
                 self._publish(self._middleware.now_ns())
+
+    def _on_reported(self, reported: ResourceStates) -> None:
+        """Note the resources that a reporter says it reports."""
+        now_ns = self._middleware.now_ns()
+        for name in self._silences.keys() & reported.resources.keys():
+            self._staleness.heard(name, now_ns, self._silence_ns(name))
+
+    def _on_silence(self, name: str) -> None:
+        self.transition(name, self._silences[name].initial, f"not heard of for {self._silence_ns(name) / 1e9:g} s")
+
+    def _silence_ns(self, name: str) -> int:
+        return round((self._silences[name].silence_s or 0.0) * 1e9)
 
     def _publish(self, stamp_ns: int) -> None:
         self._publisher.publish(ResourceStates(self._instance_id, self._after, stamp_ns, dict(self._latest)))

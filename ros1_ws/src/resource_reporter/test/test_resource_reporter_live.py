@@ -134,6 +134,18 @@ def test_a_service_that_appears_late_and_a_skillset_that_restarts_are_told(skill
     becomes(skillset, "BROKEN")
 
 
+def test_it_is_heard_of_as_long_as_it_lives(ros_master):
+    beats: list[ResourceStates] = []
+    subscriber = rospy.Subscriber(f"/{SKILLSET}/reported", ResourceStates, beats.append)
+    reporter = ResourceReporter(SKILLSET)
+    reporter.report("zed_status", "OK")  # nobody takes it, and it is alive all the same
+    until(lambda: len(beats) > 2, what="it beats")
+    assert {(one.skillset, one.resources[0].name, one.resources[0].state) for one in beats} == {(SKILLSET, "zed_status", "OK")}
+    reporter.close()
+    until(lambda: not subscriber.get_num_connections(), what="nothing of it is left on the topic")
+    subscriber.unregister()
+
+
 def test_a_refused_state_does_not_stand_in_the_way_of_the_next(skillset, reporter):
     skillset.serve()
     reporter.report("zed_status", "OK")

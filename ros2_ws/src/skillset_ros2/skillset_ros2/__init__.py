@@ -7,6 +7,7 @@ from skillset_ros2.base import QUIET
 from skillset_ros2.client import SkillsetClient
 from skillset_ros2.executor import NodeExecutor
 from skillset_ros2.function_skill import Ending
+from skillset_ros2.heartbeat import Heartbeat
 from skillset_ros2.node import SkillsetNode
 from skillset_ros2.robot import Robot
 from skillset_ros2.service_skill import ServiceSkill
@@ -18,6 +19,7 @@ __all__ = [
     "ActionClient",
     "ActionSkill",
     "Ending",
+    "Heartbeat",
     "NodeExecutor",
     "Robot",
     "ServiceSkill",

@@ -113,6 +113,11 @@ class Ledger:
         self._told.add((call, reason))
         return first
 
+    @property
+    def wanted(self) -> dict[str, str]:
+        """Return the state that the hardware has of each resource."""
+        return {name: entry.state for name, entry in self._wanted.items()}
+
     def unknown(self) -> list[str]:
         """Return the wanted resources that the skillset, which has shown its states, does not have."""
         return [name for name in self._wanted if self._actual and name not in self._actual]

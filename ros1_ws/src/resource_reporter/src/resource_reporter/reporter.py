@@ -2,12 +2,13 @@
 
 from __future__ import annotations
 
+import contextlib
 import threading
 import time
 from collections.abc import Callable
 
 import rospy
-from skillset_interfaces.msg import ResourceStates
+from skillset_interfaces.msg import ResourceState, ResourceStates
 from skillset_interfaces.srv import Transition, TransitionRequest
 
 from resource_reporter.caller import CallFailedError, ServiceCaller
@@ -17,6 +18,8 @@ from resource_reporter.ledger import Call, Ledger
 
 # A latched topic may have been missed only while its publisher was away: nothing has to be polled. This bounds one wait.
 LONGEST_WAIT_S = 1.0
+# Mission clock; the managers count a `silence` by it.
+HEARTBEAT_S = 0.5
 # What waits for the skillset to know waits no longer than this (wall clock): a skillset that hangs must stop nothing.
 SETTLE_LIMIT_S = 10.0
 
@@ -27,6 +30,9 @@ class ResourceReporter:
     To be made after ``rospy.init_node``. ``report`` may be called from any thread, as often as one likes, and never blocks: the
     service is called by a thread of its own, at once, and until ``/<skillset>/resource_states`` agrees with what was reported last.
     An error in that thread ends the node, with exit code 1.
+
+    Twice a second of mission clock it says on ``/<skillset>/reported`` what it reports: its heartbeat. Where the model gives a resource
+    a ``silence``, the managers take it for unknown when that is not heard any more.
     """
 
     def __init__(self, skillset: str) -> None:
@@ -41,6 +47,8 @@ class ResourceReporter:
         self._caller = ServiceCaller(f"/{skillset}/transition", Transition)
         self._worker = threading.Thread(target=self._work, name=f"report_{skillset}", daemon=True)
         self._worker.start()
+        self._heartbeat = rospy.Publisher(f"/{skillset}/reported", ResourceStates, queue_size=1, latch=True, tcp_nodelay=True)
+        self._beats = rospy.Timer(rospy.Duration(HEARTBEAT_S), self._beat, reset=True)
         self._subscriber = rospy.Subscriber(f"/{skillset}/resource_states", ResourceStates, self._on_states, tcp_nodelay=True)
 
     def report(self, resource: str, state: str, reason: str = "", *, insist: bool = True) -> None:
@@ -73,11 +81,24 @@ class ResourceReporter:
     def close(self) -> None:
         """End the worker and drop the connections."""
         self._subscriber.unregister()
+        self._beats.shutdown()
+        self._heartbeat.unregister()
         with self._changed:
             self._ended = True
             self._changed.notify()
         self._caller.close()
         self._worker.join(LONGEST_WAIT_S)
+
+    @ends_the_node
+    def _beat(self, event: rospy.timer.TimerEvent) -> None:
+        with self._changed:
+            wanted = self._ledger.wanted
+        if not wanted or self._ended:
+            return
+        message = ResourceStates(skillset=self._skillset, resources=[ResourceState(name=one, state=state) for one, state in wanted.items()])
+        message.header.stamp = event.current_real
+        with contextlib.suppress(rospy.ROSException):  # at the end of the node the topic is closed first
+            self._heartbeat.publish(message)
 
     @ends_the_node
     def _on_states(self, message: ResourceStates) -> None:
