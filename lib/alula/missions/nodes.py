@@ -8,7 +8,7 @@ from collections.abc import Sequence
 from alula.missions.blackboard import Blackboard
 from alula.trees.ends import ENDS, FAILS, SUCCEEDS, Ends, Given, whole_number
 from alula.trees.errors import TickError
-from alula.trees.node import Action, Condition, Decorator, Script, SyncAction, Wiring
+from alula.trees.node import Action, Condition, Count, Decorator, Script, SyncAction, Wiring
 from alula.trees.palette import Palette, input_port
 from alula.trees.status import FAILURE, IDLE, RUNNING, SKIPPED, SUCCESS, Answer
 from alula.trees.ticking import AGAIN, Order, Ticking
@@ -147,6 +147,7 @@ class RetryAfter(Decorator):
     may_run = True
 
     remembers_running = ("_left", "_again_ns")
+    counts = (Count("_left", "the attempts left", down=True),)
 
     @classmethod
     def may_end(cls, given: Given, children: Sequence[Ends]) -> Ends:

@@ -89,6 +89,15 @@ class After:
     always: Script | None = None
 
 
+@dataclass(frozen=True)
+class Count:
+    """An attribute of a node that counts: ``what`` is what messages call it, ``down`` counts to 0."""
+
+    attribute: str
+    what: str
+    down: bool = False
+
+
 def pointer(text: str, name: str) -> str | None:
     """Return the entry that the text of a port names (``{entry}``, ``{=}`` for the port's own name), None for a plain value."""
     stripped = text.strip(" ")
@@ -116,6 +125,10 @@ class Node(Behaviour):  # type: ignore[misc]  # py_trees is seen untyped
     """The attributes that one tick leaves for the next, besides the status; what takes a tree to another moment needs all of them."""
     remembers_running: ClassVar[tuple[str, ...]] = ()
     """Those of them that are set anew when the node begins: while it does not run, nothing hangs on them."""
+    counts: ClassVar[tuple[Count, ...]] = ()
+    """Those of them that count, of which a search of all runs keeps a few numbers."""
+    watches: ClassVar[Mapping[str, str]] = {}
+    """Those that have how often the entry that a port names was written, by attribute the port."""
     ticking: ClassVar[Ticking] = ANY_TICKING
     """How it ticks its children; what is not said may be anything."""
     ends: ClassVar[Ends] = ANY_END

@@ -286,7 +286,7 @@ class Liveness:
 
     def _kept_always(self, node: Node) -> Reads:
         """Return what may be read at any time: in a halt, or by nodes that ask how often an entry was written."""
-        counted = NOTHING if "_seen" not in node.remembers else self._ports(node)
+        counted = self._ports(node) if node.watches else NOTHING
         return counted | self._asked(node, "_onHalted")
 
     def _all_read(self, node: Node) -> Reads:

@@ -20,17 +20,11 @@ from alula.prove.mission.reading import ANOTHER, Read
 from alula.prove.mission.robot import Handle, Memory, Robot
 from alula.prove.mission.unknown import Unknown, UnknownNumber, UnknownText, is_unknown
 from alula.trees.blackboard import Entry
-from alula.trees.node import Node
+from alula.trees.node import Count, Node
 from alula.trees.status import IDLE, RUNNING, Skipped, Status
 from alula.trees.tree import Tree
 from alula.trees.values import ANY, STRING
 
-SEEN = "_seen"
-LEFT = "_left"
-COUNTS = {LEFT: "the attempts left", "_count": "the rounds", "_retries": "the retries"}
-"""Attributes of nodes that count: what is left of a number of attempts, or what there was."""
-NOT_AS_THEY_ARE = frozenset({SEEN, *COUNTS})
-"""Attributes of which another value is kept than theirs."""
 FEW = 2
 STATUS_OF = {one.value: one for one in Status}
 TAKE_TEXT = (STRING, ANY)
@@ -40,12 +34,32 @@ PLAIN = frozenset({type(None), bool, int, float, str, Status, Skipped, Unknown})
 
 
 class _Value(NamedTuple):
-    """Which value of a memory is which: a node's status, at ``start``, or an attribute, which counts only while it runs or at any time."""
+    """Which value of a memory is which: a node's status, at ``start``, or an attribute, which counts only while it runs or at any time.
+
+    ``watched`` is the port whose entry's writings it has the number of.
+    """
 
     node: Node
     name: str
     start: int
     while_running: bool
+    watched: str = ""
+
+
+class _Remembered(NamedTuple):
+    """What a node remembers: at any time ``names``, while it runs ``all_names``; ``not_as_is`` are kept by another value than theirs."""
+
+    node: Node
+    names: tuple[str, ...]
+    all_names: tuple[str, ...]
+    counts: Mapping[str, Count]
+    not_as_is: frozenset[str]
+
+    @classmethod
+    def of(cls, node: Node) -> _Remembered:
+        """Read what its class tells."""
+        counts = {one.attribute: one for one in node.counts}
+        return cls(node, node.remembers, (*node.remembers, *node.remembers_running), counts, frozenset({*counts, *node.watches}))
 
 
 class TreeMemory(NamedTuple):
@@ -91,7 +105,7 @@ class Keeper:
 
     def __init__(self, body: Body) -> None:
         self._body = body
-        self._nodes = [(node, node.remembers, (*node.remembers, *node.remembers_running)) for node in body.nodes()]
+        self._nodes = [_Remembered.of(node) for node in body.nodes()]
         self.leaves = [node for node in body.nodes() if isinstance(node, SkillNode)]
         self._boards = list(dict.fromkeys(subtree.blackboard for tree in body.trees for subtree in tree.subtrees))
         self._looking = Looking(body.trees, body.read)
@@ -99,12 +113,12 @@ class Keeper:
         self._known: dict[tuple[str, bool, tuple[Hashable, ...]], tuple[tuple[Hashable, ...], Ahead, Live | None]] = {}
         self._places: list[tuple[tuple[str, ...], int, int]] = []
         self._values_of: list[_Value] = []
-        for node, names, all_names in self._nodes:
+        for node, names, all_names, _, _ in self._nodes:
             start = len(self._values_of)
             self._values_of.append(_Value(node, "status", start, while_running=False))
-            self._values_of += [_Value(node, name, start, while_running=name not in names) for name in all_names]
+            self._values_of += [_Value(node, name, start, name not in names, node.watches.get(name, "")) for name in all_names]
             self._places.append((("status", *all_names), start, len(self._values_of)))
-        self._always = [at for at, one in enumerate(self._values_of) if one.name == SEEN or one.while_running]
+        self._always = [at for at, one in enumerate(self._values_of) if one.watched or one.while_running]
         self._thawing = Thawing(body.robot.oracle)
         self._first = self._left = self._values()[0]
 
@@ -160,39 +174,39 @@ class Keeper:
         """Return the values of the nodes, and by their places what was a moment, with its name."""
         values: list[Hashable] = []
         moments: dict[int, tuple[str, Moment | Later]] = {}
-        for node, names, all_names in self._nodes:
+        for node, names, all_names, counts, not_as_is in self._nodes:
             status = node.status
             values.append(status._value_)  # the hash of an Enum takes long, and each memory has hundreds
             for name in names if status is IDLE else all_names:
                 value = getattr(node, name)
                 exact = type(value) is int and isinstance(node, Run)
-                if type(value) in PLAIN and name not in NOT_AS_THEY_ARE and not exact:  # nearly all
+                if type(value) in PLAIN and name not in not_as_is and not exact:  # nearly all
                     values.append(value)
                     continue
                 if isinstance(value, Moment | Later):
                     moments[len(values)] = name, value
-                values.append(self._seen(node) if name == SEEN else self._kept(node, name))
+                values.append(self._seen(node, name) if name in node.watches else self._kept(node, name, counts.get(name)))
             if status is IDLE and names is not all_names:
                 values += [None] * (len(all_names) - len(names))
         return tuple(values), moments
 
-    def _kept(self, node: Node, name: str) -> Hashable:
+    def _kept(self, node: Node, name: str, count: Count | None) -> Hashable:
         """Return an attribute; counts of attempts and rounds are kept up to a few: from then on there may be more, or not."""
         value = getattr(node, name)
         if isinstance(node, Run):
             return _exactly(node, name, value)
-        if name not in COUNTS or not isinstance(value, int | float):
+        if count is None or not isinstance(value, int | float):
             return _frozen(value)
         if not isinstance(value, UnknownNumber) and value <= self._body.few:
             return _frozen(value)
         least = value.low if isinstance(value, UnknownNumber) else float(value)
-        low = max(1.0, min(least, self._body.few - 1.0)) if name == LEFT else self._body.few + 1.0
-        return _frozen(UnknownNumber(self._body.robot.oracle, f"{COUNTS[name]} of '{node.name}'", low))
+        low = max(1.0, min(least, self._body.few - 1.0)) if count.down else self._body.few + 1.0
+        return _frozen(UnknownNumber(self._body.robot.oracle, f"{count.what} of '{node.name}'", low))
 
     @staticmethod
-    def _seen(node: Node) -> bool:
-        entry = node.entry("entry")
-        return bool(getattr(node, SEEN) == (0 if entry is None else entry.sequence))
+    def _seen(node: Node, name: str) -> bool:
+        entry = node.entry(node.watches[name])
+        return bool(getattr(node, name) == (0 if entry is None else entry.sequence))
 
     def _entries(self, number: int, ahead: Ahead, live: Live | None) -> Hashable:
         board = self._boards[number]
@@ -233,9 +247,9 @@ class Keeper:
 
     def inside(self) -> Hashable:
         """Return, in the middle of a tick, all that the rest of it hangs on, and keep no more of what is counted than between two ticks."""
-        for node, _, all_names in self._nodes:
-            for name in (one for one in all_names if one in COUNTS):
-                setattr(node, name, self._thawed(self._kept(node, name)))
+        for node, _, _, counts, _ in self._nodes:
+            for name, count in counts.items():
+                setattr(node, name, self._thawed(self._kept(node, name, count)))
         for board in self._boards:
             for name, entry in board.entries().items():
                 if name in self._body.read.counted:
@@ -281,13 +295,13 @@ class Keeper:
         changed = compress(range(len(values)), map(ne, values, left))
         inside = (at for at, kind in enumerate(map(type, values)) if kind is tuple)
         for at in {*changed, *inside, *self._always}:
-            node, name, start, while_running = self._values_of[at]
+            node, name, start, while_running, watched = self._values_of[at]
             value = values[at]
             if at == start:
                 node.status = STATUS_OF[value]  # type: ignore[index]
-            elif name == SEEN:
-                entry = node.entry("entry")
-                setattr(node, SEEN, (0 if entry is None else entry.sequence) if value else -1)
+            elif watched:
+                entry = node.entry(watched)
+                setattr(node, name, (0 if entry is None else entry.sequence) if value else -1)
             elif not while_running or values[start] != IDLE.value:
                 setattr(node, name, self._thawed(value))
 

@@ -6,7 +6,7 @@ from collections.abc import Iterator, Sequence
 
 from alula.trees.ends import ENDS, FAILS, NO_END, SKIPS, SUCCEEDS, Ends, Given, stops_at, together
 from alula.trees.errors import TickError
-from alula.trees.node import Control, Wiring
+from alula.trees.node import Control, Count, Wiring
 from alula.trees.palette import inout_port, input_port
 from alula.trees.status import FAILURE, RUNNING, SKIPPED, SUCCESS, Answer
 from alula.trees.ticking import Order, Ticking
@@ -70,6 +70,7 @@ class RecoveryNode(Control):
     child_count = (2, 2)
 
     remembers = ("_recovers", "_retries")
+    counts = (Count("_retries", "the retries"),)
 
     @classmethod
     def may_end(cls, given: Given, children: Sequence[Ends]) -> Ends:  # noqa: ARG003

@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Sequence
 
 from alula.trees.ends import FAILS, SKIPS, SUCCEEDS, Ends, Given, answer_in, whole_number
-from alula.trees.node import NANOSECONDS_PER_MS, Decorator, Script, Wiring
+from alula.trees.node import NANOSECONDS_PER_MS, Count, Decorator, Script, Wiring
 from alula.trees.palette import input_port
 from alula.trees.status import FAILURE, IDLE, RUNNING, SKIPPED, SUCCESS, Answer, Status
 from alula.trees.ticking import AGAIN, Begin, Order, Steps, Ticking
@@ -80,6 +80,7 @@ class _Again(Decorator):
 
     may_run = False
     remembers = ("_count",)
+    counts = (Count("_count", "the rounds"),)
 
     def __init__(self, wiring: Wiring) -> None:
         super().__init__(wiring)

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from typing import ClassVar
 
 from alula.trees.blackboard import type_of
@@ -64,6 +64,7 @@ class WasEntryUpdated(SyncAction):
     ports = ENTRY
 
     remembers = ("_seen",)
+    watches: ClassVar[Mapping[str, str]] = {"_seen": "entry"}
 
     ends = ENDS
 
@@ -87,6 +88,7 @@ class _IfUpdated(Decorator):
     otherwise: ClassVar[Answer]
 
     remembers = ("_seen", "_running")
+    watches: ClassVar[Mapping[str, str]] = {"_seen": "entry"}
 
     ticking = Ticking(Order.SINGLE, begins=Begin.PERHAPS)
 

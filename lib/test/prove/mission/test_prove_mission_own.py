@@ -83,6 +83,43 @@ def test_a_class_that_is_run_is_known_exactly(tmp_path: Path) -> None:
     assert codes(several) == {"ALU703", "ALU715"}
 
 
+@register("robot.Third")
+class ThirdBySeen(Decorator):
+    """Ticks its child from the third tick on, by a count in an attribute that one of Alula's nodes has for something else."""
+
+    def setup(self) -> None:
+        """Begin to count."""
+        self._seen = 0
+
+    def update(self) -> Answer:
+        """Count."""
+        self.become(RUNNING)
+        self._seen += 1 if self._seen < 3 else 0
+        return self.child.execute() if self._seen == 3 else RUNNING
+
+
+@register("robot.Third")
+class ThirdByCount(Decorator):
+    """As that one, by another attribute."""
+
+    def setup(self) -> None:
+        """Begin to count."""
+        self._count = 0
+
+    def update(self) -> Answer:
+        """Count."""
+        self.become(RUNNING)
+        self._count += 1 if self._count < 3 else 0
+        return self.child.execute() if self._count == 3 else RUNNING
+
+
+@pytest.mark.parametrize("node", [ThirdBySeen, ThirdByCount])
+def test_what_a_class_remembers_means_what_its_code_makes_of_it_whatever_its_name(node: type[Node], tmp_path: Path) -> None:
+    several = found(tmp_path, f"<robot.Third {STILL}><r1.drive/></robot.Third>", MissionPart((node,)))
+    assert "ALU714" in codes(several)
+    assert "ALU703" not in codes(several)
+
+
 def test_it_is_said_once_for_each_type_how_it_is_taken(tmp_path: Path) -> None:
     inside = "<robot.Guard><r1.drive/></robot.Guard><robot.Guard><robot.Moody><r1.drive/></robot.Moody></robot.Guard>"
     told = {one.message: one for one in found(tmp_path, f"<Fallback>{inside}</Fallback>") if one.code == "ALU715"}
