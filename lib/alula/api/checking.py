@@ -7,7 +7,7 @@ all runs of each skillset, all runs of each mission.
 from __future__ import annotations
 
 import re
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Collection, Mapping, Sequence
 from dataclasses import dataclass, replace
 from functools import partial
 from pathlib import Path
@@ -51,6 +51,7 @@ def check_files(
     palettes: Sequence[str | Path] = (),
     main: str = "",
     packages: Mapping[str, str | Path] | None = None,
+    enums: Collection[str] = (),
     proofs: bool = True,
     closed_world: bool = False,
     timeout_s: float = TIME_S,
@@ -68,6 +69,7 @@ def check_files(
         palettes: of missions, files of more types of nodes (TreeNodesModel).
         main: the ID of the main tree, where a mission does not say it.
         packages: folders of ROS packages, by their names, for includes that name one.
+        enums: names of numbers that scripts of missions may use.
         proofs: False: leave out the proofs.
         closed_world: assume that transitions that are neither extern nor used by an effect are never taken.
         timeout_s: for the proofs of a file; what could not be decided in it is a finding.
@@ -79,7 +81,7 @@ def check_files(
     with meaning(None if robot is None else load_robot_folder(Path(robot).resolve())):
         given = list(map(str, paths)) or robot_models(find_robot())
         others = {name: Path(folder) for name, folder in (packages or {}).items()}
-        files = checked_files(given, palettes=list(map(str, palettes)), main=main, packages=others, tell=tell)
+        files = checked_files(given, palettes=list(map(str, palettes)), main=main, packages=others, enums=enums, tell=tell)
         if proofs:
             prove_files(files, timeout_s, closed_world=closed_world, tell=tell)
     return [finding for file in files for finding in file.findings]
@@ -102,6 +104,7 @@ def checked_files(
     palettes: Sequence[str] = (),
     main: str = "",
     packages: Mapping[str, Path] | None = None,
+    enums: Collection[str] = (),
     tell: Tell = ignore,
 ) -> list[ModelFile]:
     """Return the models, then the missions, with their findings; `-` is the standard input where that is given."""
@@ -117,7 +120,7 @@ def checked_files(
     read = models.check_files(list(paths), standard_input)
     for model in read:
         check_fields(model)
-    return [*read, *checked_missions(list(missions), palettes, tell, library=library, main=main)]
+    return [*read, *checked_missions(list(missions), palettes, tell, library=library, main=main, enums=enums)]
 
 
 def prove_files(files: Sequence[ModelFile], timeout_s: float, *, closed_world: bool = False, tell: Tell = ignore) -> None:
@@ -177,7 +180,13 @@ def _not_begun(skillsets: Sequence[Skillset], timeout_s: float) -> Diagnostic:
 
 
 def checked_missions(
-    paths: Sequence[str], palettes: Sequence[str] = (), tell: Tell = ignore, *, library: Library | None = None, main: str = ""
+    paths: Sequence[str],
+    palettes: Sequence[str] = (),
+    tell: Tell = ignore,
+    *,
+    library: Library | None = None,
+    main: str = "",
+    enums: Collection[str] = (),
 ) -> list[ModelFile]:
     """Return each mission with its findings; what can't be read is told, too, in one line.
 
@@ -192,7 +201,7 @@ def checked_missions(
     files = {Path(path).resolve(): ModelFile(path) for path in paths}
     for path, file in files.items():
         mine = main if path in {Path(one.place.path).resolve() for one in library.trees.get(main, ())} or len(paths) == 1 else ""
-        for finding in _checked(file.path, robot, [Path(one) for one in palettes], library, mine, tell):
+        for finding in _checked(file.path, robot, [Path(one) for one in palettes], library, mine, tell, enums):
             its = files.get(Path(finding.span.file).resolve(), file)  # one file's tree is checked in another, too, that uses it
             if finding not in its.findings:
                 its.findings.append(finding)
@@ -257,12 +266,14 @@ def _robot(tell: Tell) -> _Robot:
     return _Robot(robot.root, models_of(robot, tell), part_of(robot, tell), messages_of(robot))
 
 
-def _checked(path: str, robot: _Robot, palettes: Sequence[Path], library: Library, main: str, tell: Tell) -> list[Diagnostic]:
+def _checked(
+    path: str, robot: _Robot, palettes: Sequence[Path], library: Library, main: str, tell: Tell, enums: Collection[str]
+) -> list[Diagnostic]:
     try:
         source = read_source(Path(path))
         own = robot if robot.has(Path(path), source) else _Robot()
         others = own.root is None
-        found = findings_of(path, source, own.skillsets, palettes, own.part, own.messages, library, main, of_others=others)
+        found = findings_of(path, source, own.skillsets, palettes, own.part, own.messages, library, main, of_others=others, enums=enums)
     except FileError as error:
         found = [Diagnostic("ALU001", error.problem.message, Span(path, 0, 0, 0))]
     for finding in found:

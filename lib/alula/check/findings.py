@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import re
-from collections.abc import Sequence
+from collections.abc import Collection, Sequence
 from dataclasses import replace
 from pathlib import Path
 
@@ -32,10 +32,11 @@ def findings_of(
     main: str = "",
     *,
     of_others: bool = False,
+    enums: Collection[str] = (),
 ) -> list[Diagnostic]:
     """Return what `check_mission` finds wrong with a mission; what keeps it from being read at all is the only finding then (ALU0..)."""
     try:
-        problems = check_mission(Path(path), source, skillsets, palettes, part, messages, library, main, of_others=of_others)
+        problems = check_mission(Path(path), source, skillsets, palettes, part, messages, library, main, of_others=of_others, enums=enums)
     except FileError as error:
         problem = error.problem
         code = problem.code if problem.code.startswith("ALU0") else "ALU004"

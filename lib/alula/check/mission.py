@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections import Counter
-from collections.abc import Sequence
+from collections.abc import Collection, Sequence
 from dataclasses import replace
 from pathlib import Path
 
@@ -35,12 +35,13 @@ def check_mission(
     main: str = "",
     *,
     of_others: bool = False,
+    enums: Collection[str] = (),
 ) -> list[Problem]:
     """Return what is wrong with a mission, each thing once.
 
     ``source`` is what its file has, or will have, ``part`` what the robot adds, ``messages`` what is known of the fields of its data,
     ``library`` the files whose trees it may use, ``main`` its main tree instead of what it says itself. A tree ``of_others`` is loaded by a
-    program that chooses the main tree, fills the blackboard, and has nodes that no file declares.
+    program that chooses the main tree, fills the blackboard, and has nodes that no file declares. ``enums`` are names that scripts may use.
 
     Raises:
         FileError: the file, one that it includes, or a palette can't be read or is no XML of trees.
@@ -51,7 +52,7 @@ def check_mission(
     rules = SkillRules(skills)
     known = palette_for(files, skillsets, palettes, part)
     own = (rules.units, rules.results, rules.resources, NameRules(skills).names)
-    found += check(files, known, SkillTraits(skills), own, beside=BESIDE, foreign=bool(palettes) or of_others, of_others=of_others)
+    found += check(files, known, SkillTraits(skills, enums), own, beside=BESIDE, foreign=bool(palettes) or of_others, of_others=of_others)
     if of_others:
         found = _told_once(found)
     if not palettes and not of_others and (problem := no_class(files, known)) is not None:

@@ -21,6 +21,8 @@ from alula.language.errors import Diagnostic, Severity, has_errors, render
 from alula.language.models import ModelFile
 from alula.language.notation import Notation
 from alula.language.printer import print_file
+from alula.trees.enums import read_enums
+from alula.trees.errors import TreeError
 
 COMMAND = "alula check"
 UNREADABLE = "ALU0"
@@ -40,7 +42,14 @@ def main(arguments: Sequence[str] | None = None) -> int:
         sys.stderr.write(f"{COMMAND}: no files are named, and {error}\n")
         return 2
     warn = warner(COMMAND)
-    files = checked_files(given, sys.stdin.buffer, palettes=options.palette, main=options.main, packages=options.package, tell=warn)
+    try:
+        enums = {} if options.enums is None else read_enums(options.enums)
+    except TreeError as error:
+        warn(str(error))
+        return 2
+    files = checked_files(
+        given, sys.stdin.buffer, palettes=options.palette, main=options.main, packages=options.package, enums=enums, tell=warn
+    )
     if options.proofs and options.to is None:
         prove_files(files, options.time, closed_world=options.closed_world, tell=warn)
     for file in files:

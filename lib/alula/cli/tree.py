@@ -22,6 +22,7 @@ from alula.missions.drawing import draw, drawn_as_text
 from alula.missions.part import NO_PART
 from alula.trees.answers import Answers, AnswersError, StepClock, read_answers, scripted_tree, ticks
 from alula.trees.document import read_document
+from alula.trees.enums import read_enums
 from alula.trees.errors import TreeError, did_you_mean
 from alula.trees.format3 import DECLARED, OLD, convert
 from alula.trees.library import Library
@@ -54,11 +55,12 @@ def run(given: argparse.Namespace) -> int:
     for option in ("svg", "answers"):
         if getattr(given, option) is not None and found[1:]:
             raise TreeError(f"--{option}: is of one tree; choose it with `--main`: {', '.join(files.main for files in found)}")
+    enums = {} if given.enums is None else read_enums(given.enums)
     answers = Answers({}) if given.answers is None else read_answers(given.answers)
     for files in found:
         clock = StepClock()
         try:
-            tree = scripted_tree(files, palette(files, given.palette), answers, clock)
+            tree = scripted_tree(files, palette(files, given.palette), answers, clock, enums)
         except TreeError as error:
             wrong.append(error)
             continue

@@ -116,16 +116,16 @@ class UnknownNode(Control):
         raise TickError(f"{self.place()}: nothing here ticks a '{self.wiring.type.name}'; only leaves can be scripted")
 
 
-def scripted_tree(files: TreeFiles, palette: Palette, answers: Answers, clock: Clock) -> Tree:
+def scripted_tree(files: TreeFiles, palette: Palette, answers: Answers, clock: Clock, enums: Mapping[str, float] | None = None) -> Tree:
     """Build a tree of any file: what the palette does not know is an action, or with children a node that can only be drawn.
 
-    By the script answer the leaves that it names, and all that only a robot could make.
+    By the script answer the leaves that it names, and all that only a robot could make. ``enums`` are the numbers of names in scripts.
 
     Raises:
         AnswersError: it names what is no leaf of the tree.
         TreeError: something is wrong in a file.
     """
-    tree = make_tree(files, _scripted(files, palette, answers), clock)
+    tree = make_tree(files, _scripted(files, palette, answers), clock, enums=enums)
     leaves = {node.name for node in tree.nodes if not node.children}
     for name in answers.script:
         if name not in leaves:

@@ -58,6 +58,8 @@ class _AddPackage(Action):
 
 def _trees(parser: ArgumentParser) -> None:
     """Add what commands about files of trees take in common."""
+    enums = 'enumerators that scripts may use, as the program registers them: {"NAME": 1, ...}'
+    parser.add_argument("--enums", type=Path, metavar="FILE", help=enums)
     parser.add_argument("--main", default="", metavar="ID", help="the main tree, where a file has several and does not say it")
     package = "the folder of a ROS package that an <include> names (default: those around, and those that are sourced)"
     parser.add_argument("--package", action=_AddPackage, default={}, metavar="NAME=DIR", help=package)
