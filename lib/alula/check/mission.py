@@ -54,7 +54,7 @@ def check_mission(
     own = (rules.units, rules.results, rules.resources, NameRules(skills).names)
     found += check(files, known, SkillTraits(skills, enums), own, beside=BESIDE, foreign=bool(palettes) or of_others, of_others=of_others)
     if of_others:
-        found = _told_once(found)
+        found = _told_once([replace(one, warning=one.warning or one.code == "ALU607") for one in found])
     if not palettes and not of_others and (problem := no_class(files, known)) is not None:
         found.append(replace(problem, warning=True))
     endless = [problem for problem in found if problem.code.startswith("ALU0")]
@@ -65,8 +65,8 @@ def check_mission(
 
 
 _ONCE = {
-    "ALU607": "and so it is in {} more places, which is right where the program writes them",
-    "ALU611": "and so it is in {} more places",
+    "ALU607": "and so it is in {} more, which is right where the program writes it",
+    "ALU611": "and so it is in {} more",
 }
 """Warnings about trees of others of which a file tells the first only."""
 

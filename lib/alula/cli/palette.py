@@ -71,7 +71,7 @@ def tree_types(places: Sequence[str], *, guess: bool) -> Iterator[NodeType]:
         return
     known = Palette({one.name: one for one in (*declared, *nav2.palette(), *mission_palette((), NO_PART))}.values())
     found = [one for one in guessed_types(library.elements(), known) if one.name not in library.trees]
-    warner(COMMAND)(f"{len(found)} nodes are guessed from their uses: look at categories, directions and types before you rely on them")
+    warner(COMMAND)(f"nodes that are guessed from their uses: {len(found)}; look at categories, directions and types first")
     yield from found
 
 

@@ -48,7 +48,7 @@ def modernised(document: Document) -> Document:
         return replace(document, slips=(*document.slips, slip)) if trees else document
     shown = _shown(mark)
     decisions = convert(document)
-    left = f", but for {len(decisions)} places that a person has to decide about" if decisions else ""
+    left = f", but for what a person has to decide ({len(decisions)})" if decisions else ""
     message = f"is of BehaviorTree.CPP 3, as {shown} shows, and is read by its rules{left}"
     cure = f"convert it: `alula tree --to {FORMAT} FILE --out FILE`"
     return replace(document, slips=(*document.slips, Problem(mark.place, message, cure, "ALU623", warning=True)))

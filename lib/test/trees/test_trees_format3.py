@@ -80,7 +80,9 @@ def test_a_file_is_read_as_its_conversion_and_told_once():
     read_text(OLD, "f.xml", problems.append)
     (told,) = problems
     assert (told.code, told.warning, told.place.line) == ("ALU623", True, 5)
-    assert told.message.startswith("is of BehaviorTree.CPP 3, as <SequenceStar> shows, and is read by its rules, but for 2 places")
+    assert told.message.startswith(
+        "is of BehaviorTree.CPP 3, as <SequenceStar> shows, and is read by its rules, but for what a person has to decide (2)"
+    )
     assert ticked(OLD) is SUCCESS
     assert ticked(OLD.replace('"dock" />', '"sea" />')) is FAILURE
 

@@ -60,7 +60,7 @@ def test_a_check_with_the_guess_finds_nothing_unknown(tmp_path, capsys):
     (tmp_path / "main.xml").write_text(TEXT.replace(' ID="Main"', ""))
     assert main([str(tmp_path), "--guess"]) == 0
     out, err = capsys.readouterr()
-    assert err == "alula palette: 7 nodes are guessed from their uses: look at categories, directions and types before you rely on them\n"
+    assert err == "alula palette: nodes that are guessed from their uses: 7; look at categories, directions and types first\n"
     assert "guessed from 2 uses" in out
     guess = tmp_path / "guess.model"
     guess.write_text(out)
@@ -68,7 +68,7 @@ def test_a_check_with_the_guess_finds_nothing_unknown(tmp_path, capsys):
     (told,) = findings_of("main.xml", TEXT.encode(), (), of_others=True, palettes=[guess])
     assert told.code == "ALU607"  # `tool` and `pause`, which nothing writes
     assert main([str(tmp_path / "main.xml"), str(guess), "--guess"]) == 0
-    assert "0 nodes are guessed" in capsys.readouterr().err
+    assert "guessed from their uses: 0;" in capsys.readouterr().err
     assert main([str(guess)]) == 0
     assert capsys.readouterr().out.count("<Decorator ") == 1
 
@@ -85,8 +85,16 @@ def test_undeclared_nodes_of_others_are_told_once_and_slips_one_by_one():
 def test_a_program_writes_entries_which_is_told_once():
     text = '<root BTCPP_format="4"><BehaviorTree ID="M"><Sequence><Sleep msec="{a}"/><Sleep msec="{b}"/></Sequence></BehaviorTree></root>'
     (told,) = findings_of("m.xml", text.encode(), (), of_others=True)
-    assert told.message.endswith("nothing before writes it, and so it is in 1 more places, which is right where the program writes them")
+    assert told.message.endswith("nothing before writes it, and so it is in 1 more, which is right where the program writes it")
     assert len(findings_of("m.xml", text.encode(), ())) == 2
+
+
+def test_an_entry_that_is_written_later_may_be_the_programs_before():
+    nodes = '<Script code="a := goal"/><Script code="goal := 1"/>'
+    text = f'<root BTCPP_format="4"><BehaviorTree ID="M"><Sequence>{nodes}</Sequence></BehaviorTree></root>'.encode()
+    for of_others, severity in ((False, "error"), (True, "warning")):
+        (told,) = findings_of("m.xml", text, (), of_others=of_others)
+        assert (told.code, told.severity.value) == ("ALU607", severity)
 
 
 def test_a_folder_without_trees_has_nothing_to_guess(tmp_path, capsys):
