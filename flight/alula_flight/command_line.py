@@ -21,6 +21,20 @@ from alula.runtime.live.spec import RequestError, RunSpec
 from alula_flight.launch import launch_file
 
 
+MASTER, USUAL_MASTER = "ROS_MASTER_URI", "ALULA_USUAL_MASTER"
+"""Variables: the ROS 1 master, and the one that `setup/env.sh` has put there because the caller exports none."""
+
+
+def check_no_master(environment: Mapping[str, str]) -> None:
+    """Refuse to start a graph of its own where the caller has exported the master of another one; raises RequestError."""
+    master = environment.get(MASTER, "")
+    if master and master != environment.get(USUAL_MASTER):
+        raise RequestError(
+            f"{MASTER} is {master}, and a run without --on has a master of its own: name a deployment to run on what is there "
+            f"(--on NAME), or leave the variable out (env -u {MASTER} alula run ...)"
+        )
+
+
 def parse(arguments: Sequence[str], part: RunPart) -> RunSpec:
     """Turn the command line into a specification; raise RequestError, or exit 2 as argparse does."""
     parser = parser_of("run")

@@ -32,7 +32,7 @@ from alula.report.ends import FRONT, ReportedEnd, ended_by_signal, note_end
 from alula.report.live import LiveEvents
 from alula.runtime.live.part import part_of_robot
 from alula.runtime.live.spec import FILE, RequestError, RunSpec
-from alula_flight.command_line import parse, with_claim
+from alula_flight.command_line import check_no_master, parse, with_claim
 from alula_flight.console_page import console_page
 from alula_flight.members import members_of, reports_of
 from alula_flight.outcome import CANNOT_START, GIVEN_UP, finish
@@ -143,6 +143,7 @@ def main(arguments: list[str]) -> int:
     try:
         part = part_of_robot()
         request = parse(arguments, part)
+        check_no_master(os.environ)
         claim = claim_domain([request.domain] if request.domain else DOMAINS, request.namespace)
         spec = with_claim(request, claim, part)
     except (RequestError, RobotError, ScenarioError, NoFreeDomainError, NoFreePortError) as error:

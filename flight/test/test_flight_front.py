@@ -26,7 +26,7 @@ from alula.runtime.core.events import ExecutionEvent, TransitionEvent
 from alula.runtime.live.options import RunOption, words_of
 from alula.runtime.live.part import RunPart
 from alula.runtime.live.spec import RequestError, RunSpec
-from alula_flight.command_line import parse, with_claim
+from alula_flight.command_line import MASTER, USUAL_MASTER, check_no_master, parse, with_claim
 from alula_flight.console_page import console_page
 from alula_flight.outcome import CANNOT_START
 from alula_flight.run import main, monitor_of
@@ -73,6 +73,23 @@ def test_a_run_never_overwrites_another(tmp_path, capsys):
     assert main(["mapping", "--out", str(tmp_path)]) == CANNOT_START
     assert "never overwrites" in capsys.readouterr().err
     assert (tmp_path / "summary.json").read_text() == "{}"
+
+
+def test_the_master_of_another_graph_is_not_silently_left_aside(tmp_path, capsys, monkeypatch):
+    monkeypatch.setenv(MASTER, "http://10.0.0.2:11311")
+    assert main(["mapping", "--out", str(tmp_path / "run")]) == CANNOT_START
+    told = capsys.readouterr().err
+    assert "ROS_MASTER_URI is http://10.0.0.2:11311" in told
+    assert "--on NAME" in told
+    assert not (tmp_path / "run").exists()
+
+
+def test_the_usual_master_is_none_that_the_caller_has_exported():
+    exported = {MASTER: "http://127.0.0.1:11311"}
+    check_no_master({})
+    check_no_master({**exported, USUAL_MASTER: exported[MASTER]})
+    with pytest.raises(RequestError, match="--on NAME"):
+        check_no_master(exported)
 
 
 def test_a_specification_survives_its_file(tmp_path):
