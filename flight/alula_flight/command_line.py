@@ -20,7 +20,6 @@ from alula.runtime.live.part import RunPart
 from alula.runtime.live.spec import RequestError, RunSpec
 from alula_flight.launch import launch_file
 
-
 MASTER, USUAL_MASTER = "ROS_MASTER_URI", "ALULA_USUAL_MASTER"
 """Variables: the ROS 1 master, and the one that `setup/env.sh` has put there because the caller exports none."""
 

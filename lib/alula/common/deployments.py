@@ -1,0 +1,258 @@
+"""Where a robot's skills run on its own computers: ``deployments/NAME.yaml`` says it of each place (docs/on-the-robot.md)."""
+
+from __future__ import annotations
+
+import re
+import shlex
+from collections.abc import Mapping
+from dataclasses import dataclass, field
+from enum import Enum
+from ipaddress import ip_address
+from pathlib import Path
+from typing import TypeVar
+from urllib.parse import urlsplit
+
+from alula.common.errors import AlulaError
+from alula.common.located_yaml import Located, choices, read_yaml
+from alula.common.network import DOMAINS, NAMESPACE
+from alula.common.robots import RobotError, RobotFolder, find_robot
+from alula.common.suggestions import nearest
+
+FOLDER = "deployments"
+KEYS = ("about", "ros1", "ros2", "managers", "bridge", "record", "page")
+ROS1_KEYS, ROS2_KEYS = ("master", "address"), ("domain", "discovery", "peers", "namespace")
+RECORD_KEYS, PAGE_KEYS = ("topics", "disk_gb"), ("users", "address", "port")
+LOOPBACK = "127.0.0.1"
+PAGE_PORT, MAX_PORT = 8440, 65535
+DISK_GB, MAX_DISK_GB = 20.0, 1e6
+EnumT = TypeVar("EnumT", bound=Enum)
+_WORD = re.compile(r"[a-z][a-z0-9_]*")
+_TOPIC = re.compile(r"/[A-Za-z][A-Za-z0-9_/]*")
+_HOST = re.compile(r"[A-Za-z0-9]([A-Za-z0-9.-]*[A-Za-z0-9])?")
+
+
+class DeploymentError(AlulaError):
+    """A deployment does not exist or its file is wrong; the message says where, and what would be right."""
+
+
+class Discovery(Enum):
+    """How far nodes of ROS 2 look for one another, as ``ROS_AUTOMATIC_DISCOVERY_RANGE`` has it."""
+
+    LOCALHOST = "LOCALHOST"
+    SUBNET = "SUBNET"
+    OFF = "OFF"
+
+
+class PageUsers(Enum):
+    """Who may use the operator's page."""
+
+    HERE = "here"  # programs of this computer
+    WATCHERS = "watchers"  # others may watch, without TLS
+    OPERATORS = "operators"  # others may command, over TLS, with the address that holds the token
+
+
+@dataclass(frozen=True)
+class Page:
+    """The operator's page: who may use it, and the address and TCP port that it listens on."""
+
+    users: PageUsers = PageUsers.HERE
+    address: str = LOOPBACK
+    port: int = PAGE_PORT
+
+
+@dataclass(frozen=True)
+class Deployment:
+    """What of a robot runs on this computer, beside which ROS 1 master, and in which DDS domain.
+
+    Attributes:
+        name: as on the command line.
+        path: its file.
+        about: in a sentence.
+        master: URI of the ROS 1 master that runs already.
+        address: this computer's, as the nodes of ROS 1 reach it: an IP address or a host's name.
+        domain: DDS domain; 0 is what every program of ROS 2 has that is told nothing.
+        discovery: how far nodes of ROS 2 look for one another.
+        peers: addresses of computers that are found without multicast.
+        namespace: what the robot's names in ROS 2 begin with, as ``/rover``; empty: nothing.
+        managers: the commands that serve the skillsets here, each as words, by the skillset's name.
+        bridge: the bridge's configuration: one that set-up generates, by its name, or a file of the robot; empty: it runs elsewhere.
+        topics: of ROS 1, recorded all the time and in each mission; none: there is no recorder.
+        disk_gb: what the missions and recordings of this deployment may take together, 1e9 bytes.
+        page: the operator's page; None: it is not served.
+    """
+
+    name: str
+    path: Path
+    about: str = ""
+    master: str = "http://127.0.0.1:11311"
+    address: str = LOOPBACK
+    domain: int = 0
+    discovery: Discovery = Discovery.LOCALHOST
+    peers: tuple[str, ...] = ()
+    namespace: str = ""
+    managers: Mapping[str, tuple[str, ...]] = field(default_factory=dict)
+    bridge: str = ""
+    topics: tuple[str, ...] = ()
+    disk_gb: float = DISK_GB
+    page: Page | None = None
+
+    @property
+    def parts(self) -> tuple[str, ...]:
+        """Return the names of what runs here, in the order of the start."""
+        return (
+            *(["bridge"] if self.bridge else []),
+            *self.managers,
+            *(["recorder"] if self.topics else []),
+            *(["page"] if self.page else []),
+        )
+
+
+RESERVED = ("bridge", "recorder", "page", "mission")
+"""Names of parts that no manager can have."""
+
+
+def deployment_names(robot: RobotFolder | None = None) -> list[str]:
+    """Return the names of a robot's deployments; raises RobotError where none is named and there is no robot."""
+    return sorted(path.stem for path in ((robot or find_robot()).root / FOLDER).glob("*.yaml"))
+
+
+def load_deployment(name: str, robot: RobotFolder | None = None) -> Deployment:
+    """Read a deployment; raises DeploymentError."""
+    try:
+        folder = (robot or find_robot()).root / FOLDER
+    except RobotError as error:
+        raise DeploymentError(str(error)) from None
+    names = sorted(path.stem for path in folder.glob("*.yaml"))
+    if name not in names:
+        hint = nearest(name, names) or (f"there are {', '.join(names)}" if names else "write one: docs/on-the-robot.md says what is in it")
+        raise DeploymentError(f"there is no deployment '{name}' in {folder}; {hint}")
+    return read_deployment(folder / f"{name}.yaml")
+
+
+def read_deployment(path: Path) -> Deployment:
+    """Read the file of a deployment; raises DeploymentError with file and line."""
+    document = read_yaml(path, DeploymentError)
+    if document is None:
+        raise DeploymentError(f"{path}: is empty; a deployment needs `ros1` and `ros2`")
+    said = document.record("a deployment", KEYS)
+    for key in ("ros1", "ros2"):
+        if key not in said:
+            raise document.wrong(f"a deployment needs `{key}`")
+    ros1, ros2 = said["ros1"].record("`ros1`", ROS1_KEYS), said["ros2"].record("`ros2`", ROS2_KEYS)
+    record = said["record"].record("`record`", RECORD_KEYS) if "record" in said else {}
+    if "master" not in ros1:
+        raise said["ros1"].wrong("`ros1` needs `master`, as http://192.168.1.10:11311")
+    deployment = Deployment(
+        name=path.stem,
+        path=path,
+        about=said["about"].text("`about`") if "about" in said else "",
+        master=_master(ros1["master"]),
+        address=_host(ros1["address"], "`address`") if "address" in ros1 else LOOPBACK,
+        domain=_whole(ros2["domain"], "`domain`", 0, DOMAINS[-1]) if "domain" in ros2 else 0,
+        discovery=_one_of(Discovery, ros2["discovery"], "`discovery`") if "discovery" in ros2 else Discovery.LOCALHOST,
+        peers=tuple(_host(one, "a peer") for one in ros2["peers"].elements()) if "peers" in ros2 else (),
+        namespace=_namespace(ros2["namespace"]) if "namespace" in ros2 else "",
+        managers=_managers(said["managers"]) if "managers" in said else {},
+        bridge=said["bridge"].text("`bridge`") if "bridge" in said else "",
+        topics=tuple(_topic(one) for one in record["topics"].elements()) if "topics" in record else (),
+        disk_gb=record["disk_gb"].number("`disk_gb`", 0.1, MAX_DISK_GB) if "disk_gb" in record else DISK_GB,
+        page=_page(said["page"]) if "page" in said else None,
+    )
+    _check_reach(deployment, ros1, ros2)
+    return deployment
+
+
+def _check_reach(deployment: Deployment, ros1: Mapping[str, Located], ros2: Mapping[str, Located]) -> None:
+    """Refuse what would start and never meet the other computer."""
+    if not is_loopback(urlsplit(deployment.master).hostname or "") and is_loopback(deployment.address):
+        place = ros1.get("address", ros1["master"])
+        raise place.wrong(f"the master is on another computer, whose nodes can't reach {deployment.address}: `address` is this computer's")
+    if deployment.peers and deployment.discovery is Discovery.LOCALHOST:
+        raise ros2["peers"].wrong(
+            "peers on other computers are not found with `discovery: LOCALHOST`; write SUBNET, or OFF for peers alone"
+        )
+
+
+def is_loopback(host: str) -> bool:
+    """Tell whether a host is this computer by an address that no other one reaches."""
+    if host == "localhost":
+        return True
+    try:
+        return ip_address(host).is_loopback
+    except ValueError:
+        return False
+
+
+def _one_of(kind: type[EnumT], part: Located, what: str) -> EnumT:
+    text = part.text(what)
+    known = [one.value for one in kind]
+    if text not in known:
+        raise part.wrong(f"{what} is not {text}; it may be {choices(text, known)}")
+    return kind(text)
+
+
+def _whole(part: Located, what: str, low: int, high: int) -> int:
+    number = part.number(what, low, high)
+    if number != int(number):
+        raise part.wrong(f"{what} should be a whole number, not {number:g}")
+    return int(number)
+
+
+def _master(part: Located) -> str:
+    text = part.text("`master`")
+    try:
+        parts = urlsplit(text)
+        good = parts.scheme == "http" and bool(parts.hostname) and bool(parts.port) and parts.path in {"", "/"}
+    except ValueError:
+        good = False
+    if not good:
+        raise part.wrong(f"`master` should be the URI of a ROS master, as http://192.168.1.10:11311, not {text}")
+    return text.rstrip("/")
+
+
+def _host(part: Located, what: str) -> str:
+    text = part.text(what)
+    if _HOST.fullmatch(text) is None:
+        raise part.wrong(f"{what} should be an IPv4 address or a host's name, not {text}")
+    return text
+
+
+def _topic(part: Located) -> str:
+    text = part.text("a topic of `record`")
+    if _TOPIC.fullmatch(text) is None:
+        raise part.wrong(f"a topic of `record` should be a whole name, as /base/odom, not {text}")
+    return text
+
+
+def _namespace(part: Located) -> str:
+    text = part.text("`namespace`").strip("/")
+    if text and not NAMESPACE.fullmatch(f"/{text}"):
+        raise part.wrong(f"`namespace` should be a name such as rover, of letters, digits and _, not {text}")
+    return f"/{text}" if text else ""
+
+
+def _managers(part: Located) -> dict[str, tuple[str, ...]]:
+    found: dict[str, tuple[str, ...]] = {}
+    for name, command in part.entries("`managers`").items():
+        if _WORD.fullmatch(name) is None or name in RESERVED:
+            raise command.wrong(f"`managers`: `{name}` names no skillset")
+        try:
+            words = shlex.split(command.text(f"the command of {name}"))
+        except ValueError as error:
+            raise command.wrong(f"the command of {name}: {error}") from None
+        if not words:
+            raise command.wrong(f"the command of {name} is empty; write one as python -m my_robot.hooks")
+        found[name] = tuple(words)
+    return found
+
+
+def _page(part: Located) -> Page:
+    said = part.record("`page`", PAGE_KEYS)
+    users = _one_of(PageUsers, said["users"], "`users`") if "users" in said else PageUsers.HERE
+    address = _host(said["address"], "`address`") if "address" in said else LOOPBACK
+    if is_loopback(address) is not (users is PageUsers.HERE):
+        place = said.get("address", part)
+        if users is PageUsers.HERE:
+            raise place.wrong(f"with `users: here` the page listens on {LOOPBACK} only; let others in: `users: watchers` or `operators`")
+        raise place.wrong(f"with `users: {users.value}` the page needs an `address` of this computer that others reach, not {address}")
+    return Page(users, address, _whole(said["port"], "`port`", 1, MAX_PORT) if "port" in said else PAGE_PORT)
