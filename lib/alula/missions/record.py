@@ -45,9 +45,11 @@ class MissionRecord:
 
     A folder that can't be written to any more ends the record and not the mission; ``problems`` says so. Nothing raises here: what can't
     be written, whatever the reason, is told by ``failure``, upon which the mission's driver has the robot come to rest.
+
+    ``joins``: the managers ran before the mission, and tell it of what has happened; that is not the mission's, and is left out.
     """
 
-    def __init__(self, out: Path, plan: MissionPlan, clock_ns: Clock, parameters: Mapping[str, float]) -> None:
+    def __init__(self, out: Path, plan: MissionPlan, clock_ns: Clock, parameters: Mapping[str, float], *, joins: bool = False) -> None:
         self.problems: list[str] = []
         self.failure = ""
         """What first kept something from being recorded, other than the folder; empty: nothing did."""
@@ -55,6 +57,9 @@ class MissionRecord:
         self._plan = plan
         self._clock_ns = clock_ns
         self._parameters = dict(parameters)
+        self._since_ns = clock_ns() if joins else 0
+        self._joined: dict[str, int] = {}
+        """The number of the last event of a skillset that was left out."""
         self._departure = _departure()
         self._departure_s: float | None = None
         self._unended: set[str] = set()
@@ -80,6 +85,9 @@ class MissionRecord:
     @_kept
     def event(self, event: EngineEvent) -> None:
         """Write an event of a skillset."""
+        if event.stamp_ns < self._since_ns:
+            self._joined[event.skillset] = event.sequence
+            return
         self._writer.write(EVENTS, event.stamp_ns, event_record(event))
         if isinstance(event, ExecutionEvent):
             (self._unended.discard if event.state.terminal else self._unended.add)(event.id)
@@ -187,6 +195,7 @@ class MissionRecord:
             "parameters": self._parameters,
             "inputs": to_plain(self._plan.inputs),
             "problems": self.problems,
+            **({"joined": self._joined} if self._joined else {}),
             **facts,
         }
         self._write(MISSION, content)

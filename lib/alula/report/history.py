@@ -15,7 +15,7 @@ from alula.common.record import EVENTS, Entry, RecordFollower
 from alula.common.run_log import account
 from alula.records.causes.told_ends import with_told_ends
 from alula.records.tree import Places, places_in
-from alula.report.files import Problems
+from alula.report.files import Problems, mapping
 from alula.runtime.core.events import EngineEvent, TransitionEvent, read_event
 from alula.runtime.core.records import ExecutionRecord
 
@@ -53,9 +53,10 @@ def read_history(path: Path, problems: Problems) -> History:
     events = read_events(path, entries, problems)
     if record.cut:
         problems.note(f"{path.name}: {record.cut}")
-    for sentence in gaps(events):
+    mission = account(path.parent, entries)
+    for sentence in gaps(events, mapping(mission.get("joined", {}))):
         problems.note(f"{path.name}: {sentence}")
-    return replace(fold(with_told_ends(events, entries), problems, places_in(entries)), mission=account(path.parent, entries))
+    return replace(fold(with_told_ends(events, entries), problems, places_in(entries)), mission=mission)
 
 
 def read_events(path: Path, entries: Iterable[Entry], problems: Problems) -> list[EngineEvent]:
@@ -87,9 +88,12 @@ def _what(event: EngineEvent) -> tuple[str, ...]:
     return (event.skill, event.id, event.state.value)
 
 
-def gaps(events: Sequence[EngineEvent]) -> Iterator[str]:
-    """Yield a sentence for each hole in a skillset's numbering, which begins at 1 and again at 1 with each restart."""
-    last: dict[str, int] = {}
+def gaps(events: Sequence[EngineEvent], joined: Mapping[str, object] | None = None) -> Iterator[str]:
+    """Yield a sentence for each hole in a skillset's numbering, which begins at 1 and again at 1 with each restart.
+
+    ``joined``: the number of a skillset's last event before the mission, where its managers ran already.
+    """
+    last = {skillset: number for skillset, number in (joined or {}).items() if isinstance(number, int)}
     for event in events:
         before = last.get(event.skillset, 0)
         last[event.skillset] = max(before, event.sequence) if event.sequence != 1 else 1

@@ -52,7 +52,7 @@ Summary = dict[str, Any]
 """The whole file: what every run has (``summarise``), and what the robot's part of the report adds."""
 
 
-TOLD_ABOVE = ("scenario", "outcome", "reason", "problems", "start_s", "lift_off_s", "end_s")
+TOLD_ABOVE = ("scenario", "outcome", "reason", "problems", "start_s", "lift_off_s", "end_s", "joined")
 """What of the mission's account has a place of its own in the summary, and its stamps, which don't count from the departure."""
 
 

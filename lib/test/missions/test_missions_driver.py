@@ -101,7 +101,7 @@ class Root(Behaviour):
 class Host:
     """Has jobs done when the test says so."""
 
-    def __init__(self, out: Path, *, recorded: bool = True) -> None:
+    def __init__(self, out: Path, *, recorded: bool = True, joins: bool = False) -> None:
         self.clock, self.tree, self.jobs, self.said = Clock(), Tree(), list[Callable[[], None]](), list[str]()
         self.out = out
         self.entries: dict[str, object] = {}
@@ -111,7 +111,7 @@ class Host:
             return self.tree, Blackboard(clock_ns=self.clock.ns, pending=pending, entries=lambda: self.entries)
 
         plan = MissionPlan("patrol", (), make, facts=self.tree.facts)
-        record = MissionRecord(out, plan, self.clock.ns, {}) if recorded else None
+        record = MissionRecord(out, plan, self.clock.ns, {}, joins=joins) if recorded else None
         client = lambda _name, _wake: None  # noqa: E731
         self.driver = MissionDriver(plan, client, self.clock.ns, {}, record=record, soon=self.jobs.append, say=self.said.append)
 
@@ -131,6 +131,20 @@ class Host:
 @pytest.fixture
 def host(tmp_path: Path) -> Host:
     return Host(tmp_path)
+
+
+@pytest.mark.parametrize("joins", [True, False])
+def test_what_happened_before_a_mission_is_not_its_own_where_it_joins_managers_that_run(tmp_path: Path, joins: bool) -> None:
+    host = Host(tmp_path, joins=joins)
+    host.clock.now_ns += 10
+    for number in (7, 8, 9):  # the client is told of the first two after the mission has begun: they are history
+        stamp_ns = host.clock.now_ns - (20 if number < 9 else 0)
+        host.driver.event(TransitionEvent(number, stamp_ns, "wheels", "FREE", "USED", "extern", skillset="base"))
+    host.work()
+    host.driver.finish(End(Outcome.ACCOMPLISHED))
+    assert [event["sequence"] for event in host.written(EVENTS)] == ([9] if joins else [7, 8, 9])
+    assert host.written(MISSION)[-1].get("joined") == ({"base": 8} if joins else None)
+    assert len(host.written(TICKS)) == 1
 
 
 def test_several_events_at_a_moment_make_one_tick(host: Host) -> None:

@@ -14,7 +14,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from alula.common.record import EVENTS, FILE, RecordError, RecordWriter
+from alula.common.record import EVENTS, FILE, MISSION, RecordError, RecordWriter
 from alula.model.execution_state import ExecutionState
 from alula.records.causes.alarms import Alarms
 from alula.report.files import Problems
@@ -102,6 +102,17 @@ def test_latched_repetitions_count_once_and_gaps_are_told():
     events = in_order([at(2, 2.0), at(1, 1.0), at(2, 2.0), at(5, 3.0), at(1, 9.0), at(2, 10.0)])
     assert [event.sequence for event in events] == [1, 2, 5, 1, 2]
     assert list(gaps(events)) == ["navigation lost 2 events before 3.00 s of mission clock"]
+
+
+def test_what_a_mission_has_left_out_because_it_was_before_it_is_not_lost(tmp_path):
+    writer = RecordWriter(tmp_path / FILE)
+    writer.write(EVENTS, 5_000_000_000, started(sequence=41, stamp_s=5.0, skill="goto", id="g", state="REQUESTED"))
+    writer.write(MISSION, 6_000_000_000, {"outcome": "accomplished", "joined": {"navigation": 40}})
+    writer.close()
+    problems = Problems()
+    history = read_history(tmp_path / FILE, problems)
+    assert ([event.sequence for event in history.events], problems.sentences) == ([41], [])
+    assert list(gaps(history.events, {"navigation": 39})) == ["navigation lost 1 events before 5.00 s of mission clock"]
 
 
 def test_missing_file_is_a_problem(tmp_path):

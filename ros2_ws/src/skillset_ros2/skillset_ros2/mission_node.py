@@ -56,7 +56,8 @@ class MissionNode(Node):  # type: ignore[misc]  # rclpy is not typed
         self._simulated_time = SimulatedTime(self)
         self._plan = plan
         values = {name: self._parameter(name, value) for name, value in plan.parameters.items()}
-        self._record = MissionRecord(out, plan, self._clock_ns, values)
+        joins = bool(self.declare_parameter("joins", value=False).value)
+        self._record = MissionRecord(out, plan, self._clock_ns, values, joins=joins)
         self._robots: dict[str, list[MissionClient]] = {}  # clients, by the namespace of their robot
         self.driver = MissionDriver(
             plan,
