@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import argparse
+import os
 import sys
 import uuid
 from collections.abc import Mapping, Sequence
@@ -10,6 +12,7 @@ from dataclasses import replace
 from alula.cli.options.runs import fleet_run
 from alula.cli.run_request import check_limit, check_seed, groot_address, run_folder, world_file
 from alula.cli.table import parser_of
+from alula.common.deployments import load_deployment
 from alula.common.faults import FaultError, parse_fault
 from alula.common.network import DOMAINS, NAMESPACE, DomainClaim, free_port
 from alula.common.robots import find_robot, fleet_name
@@ -19,6 +22,7 @@ from alula.runtime.live import options
 from alula.runtime.live.part import RunPart
 from alula.runtime.live.spec import RequestError, RunSpec
 from alula_flight.launch import launch_file
+from alula_flight.station.parts import DEPLOYMENT_VARIABLE
 
 MASTER, USUAL_MASTER = "ROS_MASTER_URI", "ALULA_USUAL_MASTER"
 """Variables: the ROS 1 master, and the one that `setup/env.sh` has put there because the caller exports none."""
@@ -37,16 +41,20 @@ def check_no_master(environment: Mapping[str, str]) -> None:
 def parse(arguments: Sequence[str], part: RunPart) -> RunSpec:
     """Turn the command line into a specification; raise RequestError, or exit 2 as argparse does."""
     parser = parser_of("run")
+    deployment = deployment_of(arguments)
     if find_robot().robots:
         fleet_run(parser)
-    part.add_options(parser)
+    if not deployment:
+        part.add_options(parser)
     if options.FLAG in arguments:
         sys.stdout.write(f"{options.as_json(part)}\n")
         parser.exit()
     given = parser.parse_args(arguments)
-    scenario = read_scenario(given.scenario)
     if given.behaviour:
         raise RequestError("--behaviour is for mocks; add --mock")
+    if deployment:
+        return attached(given, deployment)
+    scenario = read_scenario(given.scenario)
     if given.commanded and scenario.mission:
         raise RequestError(f"--commanded: the scenario {scenario.name} has a mission; name one without, that serves its skills only")
     seed, world = check_seed(given.seed), world_file(scenario, given.world)
@@ -73,6 +81,43 @@ def parse(arguments: Sequence[str], part: RunPart) -> RunSpec:
         members=members,
         groot=groot_address(given.groot),
         own=own,
+    )
+
+
+def deployment_of(arguments: Sequence[str]) -> str:
+    """Return the deployment that a run is to be on: where none is named, the one that this process belongs to, as the page does."""
+    on = argparse.ArgumentParser(add_help=False, allow_abbrev=False)
+    on.add_argument("--on", default=os.environ.get(DEPLOYMENT_VARIABLE, ""))
+    return str(on.parse_known_args(arguments)[0].on)
+
+
+def attached(given: argparse.Namespace, name: str) -> RunSpec:
+    """Return the specification of a run on what runs already; raises RequestError, DeploymentError."""
+    deployment = load_deployment(name)
+    scenario = load_scenario(given.scenario)
+    if not scenario.mission:
+        raise RequestError(f"the scenario {scenario.name} has no mission: `alula up {name}` alone serves the skills")
+    if find_robot().robots:
+        raise RequestError("--on: a fleet has no deployment of its own; each of its robots has: alula up, with --robot DIR")
+    for option, value in {"--fail": given.fail, "--commanded": given.commanded}.items():
+        if value:
+            raise RequestError(f"{option}: is of runs with a graph of their own; on what runs already nothing is made to fail or to wait")
+    for option, value in {"--domain": given.domain, "--namespace": given.namespace}.items():
+        if value:
+            raise RequestError(f"{option}: the deployment says it, in {deployment.path}")
+    return RunSpec(
+        scenario=scenario.name,
+        out_dir=str(run_folder(given.out, scenario.name)),
+        run_id=uuid.uuid4().hex,
+        seed=check_seed(given.seed),
+        world=world_file(scenario, given.world),
+        domain=deployment.domain,
+        namespace=deployment.namespace,
+        console=given.console,
+        monitor=given.monitor,
+        limit_s=check_limit(given.limit),
+        groot=groot_address(given.groot),
+        deployment=name,
     )
 
 

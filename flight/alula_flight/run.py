@@ -8,21 +8,22 @@
 from __future__ import annotations
 
 import contextlib
+import functools
 import os
 import signal
 import subprocess
 import sys
 import time
-from collections.abc import Callable
+from collections.abc import Callable, Mapping, Sequence
 from pathlib import Path
 
 import psutil
 
 from alula.cli.run_request import shown_at
+from alula.common.errors import AlulaError
 from alula.common.network import DOMAINS, DomainClaim, NoFreeDomainError, NoFreePortError, claim_domain
 from alula.common.processes import NAMESPACE_VARIABLE, RUN_ID_VARIABLE, die_with_parent, end_run, ends_within, node_name, processes_of_run
-from alula.common.robots import RobotError
-from alula.common.scenarios import ScenarioError, load_scenario
+from alula.common.scenarios import load_scenario
 from alula.common.shared_memory import sweep_shared_memory
 from alula.common.signals import Interrupts
 from alula.records.conformance import Monitor
@@ -32,6 +33,7 @@ from alula.report.ends import FRONT, ReportedEnd, ended_by_signal, note_end
 from alula.report.live import LiveEvents
 from alula.runtime.live.part import part_of_robot
 from alula.runtime.live.spec import FILE, RequestError, RunSpec
+from alula_flight.attaching import attached_to, leave_at_rest
 from alula_flight.command_line import check_no_master, parse, with_claim
 from alula_flight.console_page import console_page
 from alula_flight.members import members_of, reports_of
@@ -44,10 +46,10 @@ MISSION_NODE = "mission"
 STOPPING = "stopping: the robot comes to rest first; Ctrl-C again ends everything at once"
 
 
-def start_supervisor(spec: RunSpec, spec_path: Path, claim: DomainClaim) -> subprocess.Popen[bytes]:
-    """Start the supervisor in a session of its own, so that a Ctrl-C reaches the front only; it shares the claim."""
+def own_graph(spec: RunSpec) -> dict[str, str]:
+    """Return the environment of a run with a graph of its own."""
     out = Path(spec.out_dir)
-    environment = {
+    return {
         **os.environ,
         RUN_ID_VARIABLE: spec.run_id,
         "ROS_MASTER_URI": f"http://127.0.0.1:{spec.master_port}",
@@ -57,15 +59,21 @@ def start_supervisor(spec: RunSpec, spec_path: Path, claim: DomainClaim) -> subp
         "ROS_DOMAIN_ID": str(spec.domain),
         NAMESPACE_VARIABLE: spec.namespace,
     }
+
+
+def start_supervisor(spec: RunSpec, graph: Mapping[str, str], claim: DomainClaim | None) -> subprocess.Popen[bytes]:
+    """Start the supervisor in a session of its own, so that a Ctrl-C reaches the front only; it shares the claim."""
+    out = Path(spec.out_dir)
+    module = "alula_flight.attached" if spec.deployment else "alula_flight.supervisor"
     with (out / "logs" / "supervisor.log").open("wb") as log:
         return subprocess.Popen(
-            [sys.executable, "-m", "alula_flight.supervisor", str(spec_path)],
-            env=environment,
+            [sys.executable, "-m", module, str(out / FILE)],
+            env=graph,
             stdin=subprocess.DEVNULL,
             stdout=log,
             stderr=subprocess.STDOUT,
             start_new_session=True,
-            pass_fds=[lock.fileno() for lock in claim.locks],
+            pass_fds=[] if claim is None else [lock.fileno() for lock in claim.locks],
             preexec_fn=die_with_parent,  # noqa: PLW1509  (one prctl, no allocation)
         )
 
@@ -73,16 +81,22 @@ def start_supervisor(spec: RunSpec, spec_path: Path, claim: DomainClaim) -> subp
 class Front:
     """Watches the supervisor; the first Ctrl-C has the robot come to rest, the second ends everything at once."""
 
-    def __init__(self, spec: RunSpec, claim: DomainClaim, say: Callable[[str], None], monitor: Monitor | None = None) -> None:
+    def __init__(
+        self,
+        spec: RunSpec,
+        start: Callable[[], subprocess.Popen[bytes]],
+        say: Callable[[str], None],
+        monitor: Monitor | None = None,
+    ) -> None:
         self._spec = spec
-        self._claim = claim
+        self._start = start
         self._say = say
         self._monitor = monitor
         self._members = members_of(spec)
         self._interrupts = Interrupts(self._stop, lambda: say("ending everything at once"))
         self._supervisor: subprocess.Popen[bytes] | None = None
 
-    def run(self, spec_path: Path) -> int:
+    def run(self) -> int:
         """Run the supervisor to its end and return the mission's exit code; the run's processes are gone afterwards.
 
         Of a fleet, the robots' runs first, and afterwards to their ends; raises RequestError where one of these could not begin.
@@ -94,12 +108,12 @@ class Front:
                 raise RequestError(why_not)
             if self._interrupts.asked:
                 return CANNOT_START
-            return self._run(spec_path)
+            return self._run()
         finally:
             self._members.end(self._say, lambda: self._interrupts.at_once)
 
-    def _run(self, spec_path: Path) -> int:
-        supervisor = self._supervisor = start_supervisor(self._spec, spec_path, self._claim)
+    def _run(self) -> int:
+        supervisor = self._supervisor = self._start()
         live = LiveEvents(Path(self._spec.out_dir), self._say, self._monitor)
         try:
             while supervisor.poll() is None and not self._interrupts.at_once:
@@ -143,29 +157,34 @@ def main(arguments: list[str]) -> int:
     try:
         part = part_of_robot()
         request = parse(arguments, part)
+        if request.deployment:
+            with attached_to(request) as graph:
+                return fly(request, (), functools.partial(start_supervisor, request, graph, None))
         check_no_master(os.environ)
         claim = claim_domain([request.domain] if request.domain else DOMAINS, request.namespace)
         spec = with_claim(request, claim, part)
-    except (RequestError, RobotError, ScenarioError, NoFreeDomainError, NoFreePortError) as error:
+        return fly(spec, part.words(spec), functools.partial(start_supervisor, spec, own_graph(spec), claim))
+    except (AlulaError, NoFreeDomainError, NoFreePortError) as error:
         sys.stderr.write(f"alula run: {error}\n")
         return CANNOT_START
+
+
+def fly(spec: RunSpec, words: Sequence[str], start: Callable[[], subprocess.Popen[bytes]]) -> int:
+    """Make the folder, run, and report; return the exit code. Raises RequestError."""
     out = Path(spec.out_dir)
     try:
         (out / "logs").mkdir(parents=True)
         spec.save(out / FILE)
     except OSError as error:
-        sys.stderr.write(f"alula run: can't make the folder {out}: {error.strerror}; choose another with --out\n")
-        return CANNOT_START
+        raise RequestError(f"can't make the folder {out}: {error.strerror}; choose another with --out") from None
     say = announce(spec)
-    for line in ([shown_at(spec.groot)] if spec.groot else []) + list(part.words(spec)):
+    for line in ([shown_at(spec.groot)] if spec.groot else []) + list(words):
         say(line)
     monitor = monitor_of(spec)
     with console_page(out, say) if spec.console else contextlib.nullcontext():
-        try:
-            code = Front(spec, claim, say, monitor).run(out / FILE)
-        except RequestError as error:
-            sys.stderr.write(f"alula run: {error}\n")
-            return CANNOT_START
+        code = Front(spec, start, say, monitor).run()
+        if spec.deployment:
+            leave_at_rest(spec, say)
         say("making the report")
         code = finish(spec, code, monitor)
         sys.stdout.write("".join(f"  {line}\n" for line in reports_of(spec)))
@@ -186,7 +205,7 @@ def announce(spec: RunSpec) -> Callable[[str], None]:
         sys.stderr.flush()
 
     failing = f", failing {', '.join(spec.faults)}" if spec.faults else ""
-    place = f", in {spec.namespace} of DDS domain {spec.domain}" if spec.namespace else ""
+    place = f", on {spec.deployment}" if spec.deployment else f", in {spec.namespace} of DDS domain {spec.domain}" if spec.namespace else ""
     say(f"running '{spec.scenario}', seed {spec.seed}{failing}{place}; results in {spec.out_dir}")
     return say
 

@@ -21,6 +21,7 @@ from argcomplete.shell_integration import shellcode
 from alula.cli.checkout import Checkout, checkout
 from alula.cli.parser import Parser, words_completing
 from alula.cli.table import COMMANDS, Command, parse
+from alula.common.deployments import deployment_names
 from alula.common.robots import FAULTS, RobotError, RobotFolder, find_robot
 from alula.common.scenarios import ScenarioError, load_scenario, scenario_names
 
@@ -203,6 +204,7 @@ WORDS: Mapping[str, Callable[[RobotFolder, Namespace], Iterable[str]]] = {
     "inputs": _inputs,
     "nothing": lambda _robot, _given: (),
     "resources": _resources,
+    "deployments": lambda robot, _given: deployment_names(robot),
     "scenarios": lambda _robot, _given: scenario_names(),
     "skills": _skills,
     "skillsets": lambda robot, _: (one.name for one in _models(robot)),

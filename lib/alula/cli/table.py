@@ -110,6 +110,10 @@ GROUPS: dict[str, Sequence[Command]] = {
     ),
     "A running robot": (
         Command("console", "serve the operator's page: start a mission, watch it, understand it", live.console, "alula.cli.console"),
+        Command("up", "start what of a deployment stays up between missions: bridge, managers, recorder, page", live.up, robot=True),
+        Command("down", "end what up has started", live.down, robot=True),
+        Command("status", "say how the parts of a deployment are", live.status, robot=True),
+        Command("service", "have systemd keep a deployment up: install, remove, or print its unit", live.service, robot=True),
         Command("panel", "show running skillsets in the terminal, and control them manually", live.panel),
         Command("skills", "list what the skillsets have and how it is", live.talking()),
         Command("start", "run a skill to its end; Ctrl-C interrupts it", live.talking(live.skill, live.inputs)),

@@ -60,6 +60,7 @@ class MissionRecord:
         self._since_ns = clock_ns() if joins else 0
         self._joined: dict[str, int] = {}
         """The number of the last event of a skillset that was left out."""
+        self._joined_told = True
         self._departure = _departure()
         self._departure_s: float | None = None
         self._unended: set[str] = set()
@@ -87,7 +88,10 @@ class MissionRecord:
         """Write an event of a skillset."""
         if event.stamp_ns < self._since_ns:
             self._joined[event.skillset] = event.sequence
+            self._joined_told = False
             return
+        if not self._joined_told:  # also for a mission that is killed
+            self._write_mission(End(Outcome.RUNNING), None, None)
         self._writer.write(EVENTS, event.stamp_ns, event_record(event))
         if isinstance(event, ExecutionEvent):
             (self._unended.discard if event.state.terminal else self._unended.add)(event.id)
@@ -179,6 +183,7 @@ class MissionRecord:
         self._writer.write(topic, self._clock_ns(), content)
 
     def _write_mission(self, end: End, start_s: float | None, end_s: float | None) -> None:
+        self._joined_told = True
         if self._writer.error and self._writer.error not in self.problems:
             self.problems.append(self._writer.error)
         facts: dict[str, object] = {}

@@ -134,14 +134,16 @@ def host(tmp_path: Path) -> Host:
 
 
 @pytest.mark.parametrize("joins", [True, False])
-def test_what_happened_before_a_mission_is_not_its_own_where_it_joins_managers_that_run(tmp_path: Path, joins: bool) -> None:
+def test_what_happened_before_a_mission_is_not_its_own_where_it_joins_managers_that_run(tmp_path: Path, *, joins: bool) -> None:
     host = Host(tmp_path, joins=joins)
     host.clock.now_ns += 10
     for number in (7, 8, 9):  # the client is told of the first two after the mission has begun: they are history
         stamp_ns = host.clock.now_ns - (20 if number < 9 else 0)
         host.driver.event(TransitionEvent(number, stamp_ns, "wheels", "FREE", "USED", "extern", skillset="base"))
     host.work()
+    killed = host.written(MISSION)[-1]
     host.driver.finish(End(Outcome.ACCOMPLISHED))
+    assert (killed["outcome"], killed.get("joined")) == ("running", {"base": 8} if joins else None)
     assert [event["sequence"] for event in host.written(EVENTS)] == ([9] if joins else [7, 8, 9])
     assert host.written(MISSION)[-1].get("joined") == ({"base": 8} if joins else None)
     assert len(host.written(TICKS)) == 1

@@ -83,6 +83,37 @@ def talking(*own: Callable[[ArgumentParser], None]) -> Callable[[ArgumentParser]
     return add
 
 
+def deployed(parser: ArgumentParser) -> None:
+    """Add the name of a deployment that may be left out where the robot has only one."""
+    completed_by(parser.add_argument("deployment", nargs="?", metavar="DEPLOYMENT", help="name in deployments/"), "deployments")
+
+
+def up(parser: ArgumentParser) -> None:
+    """Add what ``alula up`` takes."""
+    completed_by(parser.add_argument("deployment", metavar="DEPLOYMENT", help="name in deployments/"), "deployments")
+    parser.add_argument("--restart", action="append", default=[], metavar="PART", help="end this part, and start it again; repeatable")
+
+
+def down(parser: ArgumentParser) -> None:
+    """Add what ``alula down`` takes."""
+    deployed(parser)
+    parser.add_argument("--now", action="store_true", help="also under a mission that runs")
+
+
+def status(parser: ArgumentParser) -> None:
+    """Add what ``alula status`` takes."""
+    deployed(parser)
+    parser.add_argument("--json", action="store_true", help="print a JSON object")
+
+
+def service(parser: ArgumentParser) -> None:
+    """Add what ``alula service`` takes."""
+    words = parser.add_argument("words", nargs="+", metavar="[install|remove] DEPLOYMENT", help="what is done, and with which deployment")
+    completed_by(words, "deployments")
+    parser.add_argument("--print", dest="told", action="store_true", help="print the unit, and change nothing")
+    parser.add_argument("--system", action="store_true", help="a unit of the system, which starts at boot (default: of the user)")
+
+
 def skill(parser: ArgumentParser) -> None:
     """Add the name of a skill."""
     completed_by(parser.add_argument("skill", metavar="SKILL", help="a skill, such as drive or base.drive"), "skills")

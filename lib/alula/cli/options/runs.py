@@ -41,6 +41,13 @@ def every_run(parser: ArgumentParser) -> None:
 def run(parser: ArgumentParser) -> None:
     """Add what a live ``alula run`` takes of every robot; a robot's part adds its own."""
     every_run(parser)
+    on = parser.add_argument(
+        "--on",
+        default="",
+        metavar="DEPLOYMENT",
+        help="run on what runs already, as deployments/DEPLOYMENT.yaml says",
+    )
+    completed_by(on, "deployments")
     parser.add_argument("--console", action="store_true", help="serve the operator's page beside the run")
     parser.add_argument("--domain", type=int, metavar="N", help="run in this DDS domain (default: a free one)")
     parser.add_argument(
