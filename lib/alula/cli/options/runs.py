@@ -143,7 +143,7 @@ def compare(parser: ArgumentParser) -> None:
 
 def campaign(parser: ArgumentParser) -> None:
     """Add what ``alula campaign`` takes."""
-    parser.add_argument("file", type=Path, metavar="FILE", help="campaign file (docs/reference/records.md)")
+    parser.add_argument("file", type=Path, metavar="FILE", help="campaign file (docs/how-to/campaigns.md)")
     parser.add_argument(
         "--out", type=Path, metavar="DIR", help="folder for the results (default: runs/campaign-NAME); an interrupted one continues there"
     )
