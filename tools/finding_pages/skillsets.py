@@ -17,7 +17,7 @@ from alula.common.files import write_text
 from alula.language.codes import CODES, PROOF_CODES
 from alula.language.errors import Diagnostic
 from alula.language.models import ModelFile, check_texts
-from alula.prove import prove
+from alula.prove.skillset.prover import prove
 from finding_pages.examples import LANGUAGE, PROOFS, Example, examples
 
 MARK = "<!-- Below this line: written by"

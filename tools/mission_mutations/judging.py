@@ -16,7 +16,6 @@ from alula.language.messages import NO_MESSAGES, Messages
 from alula.missions.part import MissionPart
 from alula.missions.plan import InputError
 from alula.model.model import Skillset
-from alula.prove import prove
 from alula.prove.limits import Deadline, OutOfTimeError
 from alula.prove.mission.accepted import acceptances, divided
 from alula.prove.mission.answers import Answers
@@ -32,6 +31,7 @@ from alula.prove.mission.system import System
 from alula.prove.mission.unknown import is_unknown
 from alula.prove.mission.waits import Waits
 from alula.prove.mission.wanted import wanted
+from alula.prove.skillset.prover import prove
 from mission_mutations.differing import differing, flown, writing
 from mission_mutations.mutants import Mutant
 from mission_mutations.sameness import Seen, Shown, same

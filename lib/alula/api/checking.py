@@ -135,7 +135,7 @@ def prove_files(files: Sequence[ModelFile], timeout_s: float, *, closed_world: b
 def prove_models(files: Sequence[ModelFile], timeout_s: float, *, closed_world: bool, tell: Tell = ignore) -> None:
     """Add the prover's findings about every skillset of a file that is free of errors."""
     # The prover brings its solvers along, which a conversion should not wait for.
-    from alula.prove import prove
+    from alula.prove.skillset.prover import prove
 
     for file in files:
         if has_errors(file.findings) or file.damaged:

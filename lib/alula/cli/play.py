@@ -14,7 +14,7 @@ from alula.api.checking import counterexamples_of, is_mission
 from alula.cli.play_mission import play_mission
 from alula.cli.saying import warner
 from alula.language.models import check_files, models_in
-from alula.runtime.counterexample_play import PlayedStep, play
+from alula.prove.skillset.play import PlayedStep, play
 
 
 def run(options: argparse.Namespace) -> int:

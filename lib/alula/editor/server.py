@@ -152,7 +152,7 @@ def did_close(ls: SkillLanguageServer, params: lsp.DidCloseTextDocumentParams) -
 def did_save(ls: SkillLanguageServer, params: lsp.DidSaveTextDocumentParams) -> None:
     """Prove a file that was saved; tell what was found if it has not changed meanwhile."""
     # The solvers are loaded only for a proof.
-    from alula.prove import prove
+    from alula.prove.skillset.prover import prove
 
     uri = params.text_document.uri
     file = ls.file(uri)

@@ -1,10 +1,5 @@
-"""Proofs: of one skillset (``skillset``), and of a mission together with the skillsets that it uses (``mission``).
+"""Proofs: of one skillset (``skillset.prover``), and of a mission together with the skillsets that it uses (``mission.prover``).
 
-``prove`` is all that others need for a skillset. See PROOFS.md beside the skillsets for each code with an example.
+Nothing is imported here: counterexamples are played where no solver is installed. PROOFS.md beside the skillsets has an example for each
+code.
 """
-
-from __future__ import annotations
-
-from alula.prove.skillset.prover import prove
-
-__all__ = ["prove"]

@@ -11,7 +11,7 @@ import pytest
 from alula.cli import check
 from alula.language.counterexamples import NumberedExecution, StepKind
 from alula.language.models import check_files
-from alula.prove import prove
+from alula.prove.skillset.prover import prove
 
 BOTH = pytest.mark.parametrize("most", [2000, 0], ids=["one by one", "as sets"])
 

@@ -9,7 +9,7 @@ from alula.common.faults import parse_fault
 from alula.language.load import parse_skillset
 from alula.mock import load_behaviour, mock_world
 from alula.model.execution_state import ExecutionState
-from alula.prove import prove
+from alula.prove.skillset.prover import prove
 from alula.records.conformance import Monitor
 from alula.runtime.core.records import ResourceStatus
 from alula.runtime.local import LocalWorld

@@ -14,7 +14,7 @@ from rosmaster.master import Master
 from skillset_interfaces import msg as messages
 
 from alula.model.model import Skillset
-from alula.runtime.counterexample_world import Hooks
+from alula.prove.skillset.play_world import Hooks
 from alula_testing.live_counterexample import LiveWorld, interfaces_of, serve
 from skillset_ros1.middleware import RospyMiddleware
 from skillset_ros1.names import place

@@ -12,7 +12,7 @@ from skillset_interfaces import action
 
 from alula.common.network import claim_domain
 from alula.model.model import Skillset
-from alula.runtime.counterexample_world import Hooks
+from alula.prove.skillset.play_world import Hooks
 from alula_testing.live_counterexample import LiveWorld, interfaces_of, serve
 from skillset_ros2.middleware import RclpyMiddleware
 from skillset_ros2.session import Session

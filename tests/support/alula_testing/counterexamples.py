@@ -7,7 +7,7 @@ from pathlib import Path
 from alula.language.errors import Diagnostic
 from alula.language.models import check_files
 from alula.model.model import Skillset
-from alula.prove import prove
+from alula.prove.skillset.prover import prove
 from finding_pages.examples import PROOFS, examples
 
 EXAMPLES = {code: example.broken for code, example in examples(PROOFS).items() if example.broken}

@@ -16,10 +16,10 @@ from alula.language.counterexamples import Counterexample, CounterexampleStep
 from alula.model.json_form import from_json, to_json
 from alula.model.model import Skillset
 from alula.model.ros_types import camel
+from alula.prove.skillset.play import PlayedStep, play
+from alula.prove.skillset.play_world import Hooks, MakeWorld
 from alula.runtime.client import Client
 from alula.runtime.core.errors import SkillRuntimeError
-from alula.runtime.counterexample_play import PlayedStep, play
-from alula.runtime.counterexample_world import Hooks, MakeWorld
 from alula.runtime.managers import Managers
 from alula.runtime.middleware import Middleware
 

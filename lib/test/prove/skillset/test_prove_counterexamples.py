@@ -26,8 +26,9 @@ from alula.model.model import (
     Skillset,
     Transition,
 )
-from alula.prove import limits, prove
+from alula.prove import limits
 from alula.prove.skillset import sets
+from alula.prove.skillset.prover import prove
 from prove_bench import skillsets as bench
 
 BOTH = pytest.mark.parametrize("most", [2000, 0], ids=["one by one", "as sets"])

@@ -12,7 +12,7 @@ from alula.language.errors import Severity, has_errors
 from alula.language.models import check_files
 from alula.language.notation import Notation, read
 from alula.language.printer import print_file
-from alula.prove import prove
+from alula.prove.skillset.prover import prove
 from finding_pages.examples import PROOFS, examples
 from finding_pages.skillsets import PAGES, page
 

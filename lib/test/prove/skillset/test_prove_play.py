@@ -10,7 +10,7 @@ import pytest
 from alula.cli import check
 from alula.language.counterexamples import Counterexample, CounterexampleEnd, CounterexampleStep, NumberedExecution, StateChange
 from alula.language.counterexamples import StepKind as Kind
-from alula.runtime.counterexample_play import play
+from alula.prove.skillset.play import play
 from alula_testing.counterexamples import DATA, EXAMPLES, OUTSIDE, counterexamples
 
 

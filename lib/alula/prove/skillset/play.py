@@ -16,9 +16,9 @@ from alula.language.counterexamples import Counterexample, CounterexampleStep, N
 from alula.language.counterexamples import StepKind as Kind
 from alula.language.outside import opened
 from alula.model.model import Skillset
+from alula.prove.skillset.play_world import MakeWorld, PlayWorld, virtual_world
 from alula.runtime.core.execution import Execution as Running
 from alula.runtime.core.replies import TransitionReply
-from alula.runtime.counterexample_world import MakeWorld, PlayWorld, virtual_world
 from alula.runtime.handle import SkillHandle
 from alula.runtime.hooks import SkillHooks
 from alula.runtime.waiting import Pending
