@@ -188,7 +188,7 @@ class Seen:
         """Return a node that writes on the blackboard, or gives inputs to what it asks for, as its file has it."""
         element, wiring = node.wiring.element, node.wiring
         writes = any(port.direction is not Direction.INPUT for port in wiring.type.ports.values() if port.name in wiring.ports)
-        if not (writes or isinstance(node, SkillNode) or any(map(self._computes, scripts_of(element)))):
+        if not (writes or isinstance(node, SkillNode) or any(map(self._computes, scripts_of(element, wiring.type)))):
             return None
         return (node.name, *_attributes(element))
 

@@ -90,10 +90,9 @@ class Uses:
             if port is None:
                 continue
             key = pointer(attribute.value, port.name)
-            names_entry = site.kind == "SetBlackboard" and port.name == "output_key"
-            if names_entry and key is None and write:
-                yield Use(site.board.key(attribute.value), attribute.value, True, attribute, None, _set_type(site))
-            if key is None or not self._uses(site, port, write=write) or (names_entry and write):
+            if port.written_from and key is None and write:
+                yield Use(site.board.key(attribute.value), attribute.value, True, attribute, None, _set_type(site, port.written_from))
+            if key is None or not self._uses(site, port, write=write) or (port.written_from and write):
                 continue
             yield Use(site.board.key(key), key, write, attribute, None, _type_name(port), port.unit)
 
@@ -157,9 +156,9 @@ def _written(value: Node) -> str:
             return UNKNOWN
 
 
-def _set_type(site: Site) -> str:
-    text = site.given("value") or ""
-    if pointer(text, "value") is not None:
+def _set_type(site: Site, source: str) -> str:
+    text = site.given(source) or ""
+    if pointer(text, source) is not None:
         return UNKNOWN
     try:
         float(text)
@@ -246,16 +245,17 @@ def goes_back(site: Site) -> bool:
 
 def _unset(parent: Site, child: Site) -> tuple[Key, ...]:
     """Return the entry that a child has surely taken away when the next one's turn comes."""
-    key = child.given("key") or ""
+    port = child.described.takes_away if child.described else ""
+    key = child.given(port) or ""
     in_order = parent.ticking.lists and parent.ticking.goes_on is SUCCESS
     sure = in_order and not any(goes_back(one) for one, _ in child.above())
-    if child.kind != "UnsetBlackboard" or not sure or pointer(key, "key") is not None or _ASKED.intersection(child.element.attributes):
+    if not port or not sure or pointer(key, port) is not None or _ASKED.intersection(child.element.attributes):
         return ()
     return (child.board.key(key),)
 
 
 def _taken_away(use: Use, by: Site) -> Problem:
-    message = f"`{use.name}` is read, and UnsetBlackboard in line {by.element.place.line} has taken it away"
+    message = f"`{use.name}` is read, and {by.kind} in line {by.element.place.line} has taken it away"
     return use.problem("ALU607", message, "read it before, or write it again")
 
 

@@ -11,9 +11,6 @@ from alula.trees.errors import Problem
 from alula.trees.reading import POSTCONDITIONS, PRECONDITIONS
 from alula.trees.script import Program, ScriptError, parse
 
-PORTS = {"Script": ("code",), "ScriptCondition": ("code",), "Needs": ("if", "otherwise")}
-"""The ports that hold a script; of any other node `if` does, as that of Precondition."""
-
 
 class Scripts:
     """The scripts of a tree by their attributes."""
@@ -48,10 +45,11 @@ def before(site: Site) -> Iterator[Attribute]:
 
 
 def within(site: Site) -> Iterator[Attribute]:
-    """Yield those of the node itself: a text that names an entry holds none, and an empty Script does nothing."""
-    for attribute in _present(site, PORTS.get(site.kind, ("if",))):
-        if not attribute.value.lstrip().startswith("{") and (attribute.value or site.kind != "Script"):
-            yield attribute
+    """Yield those of the node itself: a text that names an entry holds none, and an empty one may do nothing."""
+    if site.type is not None:
+        for attribute in _present(site, site.type.scripts):
+            if not attribute.value.lstrip().startswith("{") and (attribute.value or not site.type.ports[attribute.name].may_be_empty):
+                yield attribute
 
 
 def after(site: Site) -> Iterator[Attribute]:

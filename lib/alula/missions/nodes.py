@@ -9,12 +9,12 @@ from alula.missions.blackboard import Blackboard
 from alula.trees.ends import ENDS, FAILS, SUCCEEDS, Ends, Given, whole_number
 from alula.trees.errors import TickError
 from alula.trees.node import Action, Condition, Count, Decorator, Script, SyncAction, Wiring
-from alula.trees.palette import Palette, input_port
+from alula.trees.palette import Palette, input_port, script_port
 from alula.trees.status import FAILURE, IDLE, RUNNING, SKIPPED, SUCCESS, Answer
 from alula.trees.ticking import AGAIN, Order, Ticking
-from alula.trees.values import DOUBLE, INT, STRING
+from alula.trees.values import DOUBLE, INT
 
-IF = input_port("if", STRING, doc="a script that says yes or no")
+IF = script_port("if", "a script that says yes or no")
 SECOND_NS = 1e9
 FOR_EVER = -1
 """A count that is none."""
@@ -36,6 +36,7 @@ class WaitFor(Action):
     """Runs until a condition holds."""
 
     ports = (IF,)
+    answers_by = "if"
     ends = SUCCEEDS
 
     def __init__(self, wiring: Wiring) -> None:
@@ -55,6 +56,7 @@ class Stays(Action):
     """Succeeds when a condition has held for a time without a break, fails as soon as it does not."""
 
     ports = (IF, input_port("for", DOUBLE, doc="how long", unit="s"))
+    answers_by = "if"
     ends = ENDS
 
     remembers_running = ("_since_ns",)
@@ -84,6 +86,7 @@ class Awaits(Action):
         input_port("within", DOUBLE, doc="how long to wait", unit="s"),
         input_port("for", DOUBLE, "0", "how long it holds", unit="s"),
     )
+    answers_by = "if"
     ends = ENDS
 
     remembers_running = ("_since_ns", "_holds_since_ns")
@@ -189,7 +192,7 @@ class RetryAfter(Decorator):
 class Needs(Condition):
     """What a mission needs to start: its name says it, ``otherwise`` is a script of a text that says what is so instead."""
 
-    ports = (IF, input_port("otherwise", STRING, doc="a script of a text"))
+    ports = (IF, script_port("otherwise", "a script of a text"))
     ends = ENDS
 
     def __init__(self, wiring: Wiring) -> None:

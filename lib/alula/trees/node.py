@@ -135,6 +135,12 @@ class Node(Behaviour):  # type: ignore[misc]  # py_trees is seen untyped
     """The ends that it may have, where they hang neither on ports nor on children."""
     may_run: ClassVar[bool | None] = None
     """Whether it may take several ticks, its children aside; None: nobody knows."""
+    answers_by: ClassVar[str] = ""
+    """The port with the condition of the file that a leaf answers by; empty where its answer is another's, or hangs on more."""
+    runs_script: ClassVar[str] = ""
+    """The port with the script that is all that a leaf does."""
+    takes_away: ClassVar[str] = ""
+    """The port that names an entry which it takes from the blackboard."""
     status: Status
     children: list[Node]
 
@@ -308,6 +314,8 @@ class Node(Behaviour):  # type: ignore[misc]  # py_trees is seen untyped
         text = self.wiring.ports.get(port, default)
         if text is None:
             raise TickError(f"{self.place()}: the port '{port}' is not given")
+        if port not in self.wiring.type.scripts:
+            raise TickError(f"{self.place()}: the port '{port}' holds a script, and does not say so: declare it with script_port('{port}')")
         return self.wiring.compile(text, port)
 
     def number(self, port: str) -> int:

@@ -9,7 +9,7 @@ from functools import cached_property
 from typing import TYPE_CHECKING, TypeGuard
 
 from alula.common.public import public
-from alula.trees.values import ANY, PortType
+from alula.trees.values import ANY, STRING, PortType
 
 if TYPE_CHECKING:
     from alula.trees.node import Node, Wiring
@@ -51,6 +51,12 @@ class Port:
     """A file has to give it; else a node does without it, or says so when it is ticked."""
     optional: bool = False
     """The node does without it, and without a value of the entry that it names."""
+    script: bool = False
+    """Its text is a script, unless it names an entry that has one."""
+    may_be_empty: bool = False
+    """A script that is empty does nothing; another node's is wrong then."""
+    written_from: str = ""
+    """A plain text names an entry, too, which gets what this other port says; empty: a plain text is a value."""
 
 
 @public("alula.trees")
@@ -73,6 +79,12 @@ def inout_port(name: str, type_: PortType = ANY, default: str | None = None, doc
     return Port(name, type_, Direction.INOUT, default, doc, unit)
 
 
+@public("alula.trees")
+def script_port(name: str, doc: str = "", *, may_be_empty: bool = False) -> Port:
+    """Return a port whose text is a script, which `Node.script` compiles: what it reads and writes is known before it is run."""
+    return Port(name, STRING, doc=doc, script=True, may_be_empty=may_be_empty)
+
+
 @dataclass(frozen=True)
 class NodeType:
     """A type of node: ``make`` makes a node of its wiring (None: known from a model only, so it can be drawn and checked)."""
@@ -84,6 +96,11 @@ class NodeType:
     make: Callable[[Wiring], Node] | None = None
     children: tuple[int, int | None] = (0, 0)
     """How many it may have, from and to; None: any number."""
+
+    @cached_property
+    def scripts(self) -> tuple[str, ...]:
+        """The ports that hold a script."""
+        return tuple(port.name for port in self.ports.values() if port.script)
 
     @cached_property
     def described(self) -> type[Node] | None:

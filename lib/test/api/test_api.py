@@ -16,7 +16,7 @@ import pytest
 import alula
 from alula import AlulaError, Mission, Outcome, Record, Severity, check_files, load_behaviour, load_skillset, open_run, parse_skillset
 from alula.common.public import lazy_names
-from alula.trees import FAILURE, RUNNING, STRING, SUCCESS, Action, Answer, Condition, input_port, register
+from alula.trees import FAILURE, RUNNING, STRING, SUCCESS, Action, Answer, Condition, input_port, register, script_port
 
 ROOT = Path(__file__).resolve().parents[3]
 MODULES = ("alula", "alula.parts", "alula.trees")
@@ -224,7 +224,7 @@ class Unregistered(Ready):
 class Scripted(Action):
     """Succeeds when its script holds; reads it once."""
 
-    ports = (input_port("if", STRING),)
+    ports = (script_port("if"),)
 
     def setup(self) -> None:
         self._script = self.script("if", "true")

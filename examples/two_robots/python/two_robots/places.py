@@ -8,7 +8,7 @@ from pathlib import Path
 import yaml
 
 from alula import parts
-from alula.trees import ANY, FAILURE, STRING, SUCCESS, Answer, Port, SyncAction, TickError, input_port, output_port, register
+from alula.trees import ANY, FAILURE, SUCCESS, Answer, Port, SyncAction, TickError, input_port, output_port, register, script_port
 
 
 def inputs_of(path: Path) -> parts.Inputs:
@@ -33,8 +33,8 @@ class InRoversMap(SyncAction):
     """Brings a place from the drone's map into the rover's, as a pose there that is turned as the maps are; fails while it is not known."""
 
     ports: tuple[Port, ...] = (
-        input_port("x", STRING, doc="a script that says it, in metres"),
-        input_port("y", STRING, doc="a script that says it, in metres"),
+        script_port("x", "a script that says it, in metres"),
+        script_port("y", "a script that says it, in metres"),
         input_port("T_rover_drone", ANY, doc="where the drone's map lies in the rover's: x, y, theta"),
         output_port("target", ANY, doc="x, y, theta in the rover's map"),
     )

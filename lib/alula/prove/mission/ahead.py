@@ -9,7 +9,7 @@ from __future__ import annotations
 from collections.abc import Hashable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
 
-from alula.prove.mission.reading import OUTCOME, SCRIPT_PORTS, Read
+from alula.prove.mission.reading import OUTCOME, Read
 from alula.trees.ends import ENDS
 from alula.trees.node import Node
 from alula.trees.status import RUNNING, SKIPPED
@@ -49,13 +49,13 @@ class Looking:
         self._number = {id(node): number for number, node in enumerate(self._nodes)}
         self._roots = [tree.root for tree in trees]
         self._below = {number: frozenset(self._all(node)) for number, node in enumerate(self._nodes)}
-        self._asks = [read.asks(node.wiring.element) for node in self._nodes]
+        self._asks = [read.asks(node.wiring.element, node.wiring.type) for node in self._nodes]
         self._opaque = {number for number, node in enumerate(self._nodes) if not self._plain(node)}
         self._skips = {number for number, node in enumerate(self._nodes) if any(map(self._may_skip, self._below[number]))}
 
     def _plain(self, node: Node) -> bool:
         """Tell whether all that a node asks for stands in the file."""
-        texts = [node.wiring.element.get(name) for name in SCRIPT_PORTS]
+        texts = [node.wiring.element.get(name) for name in node.wiring.type.scripts]
         return node.wiring.type.name not in self.read.free and not any(text.lstrip().startswith("{") for text in texts)
 
     def _may_skip(self, number: int) -> bool:

@@ -11,9 +11,9 @@ from dataclasses import dataclass, field
 from alula.prove.mission.regions import Region, Regions, Sets, Ticked
 from alula.prove.mission.state import State
 from alula.prove.mission.ticking import ABORT, Outcome
+from alula.trees.ends import FAILS
 
 GOOD = frozenset({"accomplished", "degraded"})
-GIVES_UP = "AlwaysFailure"
 """The type of node by which a tree says that it gives up."""
 
 
@@ -73,7 +73,7 @@ class Answers:
         self._system = regions.system
         self._leads = self._leading()
         self._asking: dict[int, frozenset[frozenset[int]]] = {}
-        self._giving_up = {number for number, node in enumerate(self._system.nodes) if node.wiring.type.name == GIVES_UP}
+        self._giving_up = {number for number, node in enumerate(self._system.nodes) if not node.children and node.ends == FAILS}
         rows: dict[tuple[str, str, int, tuple[str, ...]], Row] = {}
         for number, region in enumerate(regions.regions):
             for target, ticked in _ticks(region):

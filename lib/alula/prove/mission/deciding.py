@@ -14,8 +14,6 @@ from alula.trees.script import ScriptError, parse
 from alula.trees.script.syntax import Call, Comparison, Literal, Name, walk
 from alula.trees.status import Status
 
-CONDITIONS = frozenset({"ScriptCondition", "WaitFor", "Awaits", "Stays"})
-"""Types of node that answer by a condition of the file."""
 Answers = Mapping[int, frozenset[str]]
 """By the node's number all that it ever answers; a node that stands in several places, as part of a subtree, has one set for all."""
 
@@ -37,7 +35,7 @@ def never_deciding(system: System, answers: Answers) -> Iterator[tuple[Node, boo
     told: set[int] = set()
     number_of = {id(node): number for number, node in enumerate(system.nodes)}
     for number, node in enumerate(system.nodes):
-        if node.wiring.type.name not in CONDITIONS or len(answers[number]) != 1 or id(node.wiring.element) in told:
+        if not node.answers_by or len(answers[number]) != 1 or id(node.wiring.element) in told:
             continue
         (answer,) = answers[number]
         siblings = node.parent.children if node.parent is not None else [node]
@@ -72,7 +70,7 @@ def _ends(regions: Regions) -> Mapping[int, frozenset[str]]:
 
 
 def _asked(system: System, node: Node, ends: Mapping[int, frozenset[str]]) -> Iterator[tuple[str, str]]:
-    for text in scripts_of(node.wiring.element):
+    for text in scripts_of(node.wiring.element, node.wiring.type):
         try:
             program = parse(text)
         except ScriptError:
@@ -97,7 +95,7 @@ def _writers(system: System, entry: str) -> list[int]:
     for node in system.nodes:
         ports = node.wiring.type.ports.values()
         written = {pointer(node.wiring.ports.get(port.name, ""), port.name) for port in ports if port.direction is not Direction.INPUT}
-        others = {str(one).removeprefix("@") for one in written if one} | system.reads.asks(node.wiring.element).written
+        others = {str(one).removeprefix("@") for one in written if one} | system.reads.asks(node.wiring.element, node.wiring.type).written
         if node not in system.leaves and names & others:
             return []
     return [leaf for leaf, node in enumerate(system.leaves) if _outcome(node) in names]

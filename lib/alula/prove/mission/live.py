@@ -13,10 +13,8 @@ from typing import NamedTuple
 from alula.missions.skill_types import OUTCOME_PORT
 from alula.missions.skills import SkillNode
 from alula.prove.mission.ahead import RUNS, Looking
-from alula.prove.mission.reading import ANOTHER, OUTCOME, SCRIPT_PORTS, scripts_of
+from alula.prove.mission.reading import ANOTHER, OUTCOME, scripts_of
 from alula.trees.node import Node, pointer
-from alula.trees.nodes.entries import UnsetBlackboard
-from alula.trees.nodes.leaves import ScriptNode
 from alula.trees.nodes.subtree import SubTree
 from alula.trees.palette import Direction
 from alula.trees.script import ScriptError, parse
@@ -98,7 +96,7 @@ class Liveness:
         outcome: Reads = frozenset((_place(tree.root, name), None) for tree in trees for name in OUTCOME)
         self._always = outcome.union(*(self._kept_always(node) for node in self._nodes))
         self._stop = NOTHING.union(*(self._begin(root, self._at_end) for root in self._roots[1:]))
-        self._whole = any(isinstance(node, UnsetBlackboard) for node in self._nodes)  # an entry may be another one's from then on
+        self._whole = any(node.takes_away for node in self._nodes)  # an entry may be another one's from then on
 
     @property
     def _at_end(self) -> Ends:
@@ -165,7 +163,7 @@ class Liveness:
         """Return what is live where the turn of an only child comes, with what is live before the child."""
         ticking = self._ticking(node)
         if ticking.begins is Begin.PERHAPS:
-            return again | ends.any | self._asked(node, *SCRIPT_PORTS)
+            return again | ends.any | self._asked(node, *node.wiring.type.scripts)
         if ticking.rounds and not _at_least_once(node.wiring.ports.get(ticking.rounds, "")):
             return again | ends.any  # perhaps the child is not ticked at all
         return again | ends.halted if ticking.begins is Begin.LATER else again
@@ -183,7 +181,7 @@ class Liveness:
         """Return what is live after an only child."""
         ticking = self._ticking(node)
         own = {SUCCESS: ends.success, FAILURE: ends.failure, SKIPPED: ends.skipped}
-        again |= ends.halted | self._ports(node) | self._asked(node, *SCRIPT_PORTS)
+        again |= ends.halted | self._ports(node) | self._asked(node, *node.wiring.type.scripts)
 
         def after(end: Answer) -> Reads:
             return NOTHING.union(*(again if step is AGAIN else own[step] for step in ticking.follows(end)))
@@ -191,10 +189,10 @@ class Liveness:
         return Ends(after(SUCCESS), after(FAILURE), after(SKIPPED), ends.halted.union(*(own[end] for end in ticking.cuts_off)))
 
     def _leaf(self, node: Node, ends: Ends, *, begins: bool = True) -> Reads:
-        if isinstance(node, ScriptNode):
-            return self._script(node, node.wiring.element.get("code"), ends.success)
+        if node.runs_script:
+            return self._script(node, node.wiring.element.get(node.runs_script), ends.success)
         own = node.wiring.type.name in self._unread
-        reads = NOTHING if own else self._ports(node) | self._asked(node, "code", "if", "otherwise")
+        reads = NOTHING if own else self._ports(node) | self._asked(node, *node.wiring.type.scripts)
         written = self._written(node) if own else frozenset()
         halted = frozenset({self._outcome(node)}) if isinstance(node, SkillNode) else frozenset()
         found = reads | _without(ends.success | ends.failure, written)
@@ -294,7 +292,7 @@ class Liveness:
         for one in (node, *_below(node)):
             if one.wiring.type.name not in self._unread:
                 found |= self._ports(one)
-            for text in scripts_of(one.wiring.element):
+            for text in scripts_of(one.wiring.element, one.wiring.type):
                 found |= self._script(one, text, NOTHING)
         return found
 

@@ -17,9 +17,10 @@ from typing import TYPE_CHECKING
 
 from alula.model.model import Skillset
 from alula.prove.mission.oracle import Asked, Oracle, UndecidedError
-from alula.prove.mission.reading import scripts_of
+from alula.prove.mission.reading import scripts_of, type_of
 from alula.prove.mission.unknown import Distance, UnknownNumber, UnknownText
 from alula.trees.document import Element
+from alula.trees.palette import Palette
 from alula.trees.reading import TreeFiles
 from alula.trees.script import ScriptError, parse
 from alula.trees.script.compiler import EPSILON
@@ -48,13 +49,13 @@ class Conditions:
     fresh: frozenset[str] = frozenset()
 
     @classmethod
-    def of(cls, files: TreeFiles, skillsets: Iterable[Skillset]) -> Conditions:
+    def of(cls, files: TreeFiles, palette: Palette, skillsets: Iterable[Skillset]) -> Conditions:
         """Read those of a mission; raises UndecidedError for what computes with data, or copies them."""
         types = {f"{one.name}.{data.name}": data.type for one in skillsets for data in one.data}
         asking = _Asking(types)
         for tree in files.trees.values():
             for element in tree.iterate():
-                for text in scripts_of(element):
+                for text in scripts_of(element, type_of(element, palette)):
                     asking.script(element, text)
         return cls(asking.kinds, frozenset(asking.fresh))
 

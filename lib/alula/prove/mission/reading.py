@@ -13,13 +13,12 @@ from alula.prove.mission.oracle import Oracle
 from alula.prove.mission.unknown import UNKNOWN, UnknownNumber, UnknownText
 from alula.trees.document import Element
 from alula.trees.node import pointer
-from alula.trees.palette import Category
+from alula.trees.palette import Category, NodeType, Palette
 from alula.trees.reading import POSTCONDITIONS, PRECONDITIONS, TreeFiles, is_port, type_name
 from alula.trees.script import ScriptError, parse
 from alula.trees.script.syntax import Assignment, Call, Chain, Comparison, Literal, Name, Node, walk
 
 ANOTHER = "(another text)"
-SCRIPT_PORTS = ("code", "if", "otherwise")
 OUTCOME = frozenset({DEGRADED, STOPPING})
 """Entries by which the director decides."""
 
@@ -75,12 +74,12 @@ class Read:
             todo += more
         return frozenset(found)
 
-    def asks(self, element: Element) -> Asks:
+    def asks(self, element: Element, type_: NodeType) -> Asks:
         """Return what one node asks for."""
         one = Read(self.oracle, names=set())
-        scripts = [_Named.of(text) for text in scripts_of(element)]
+        scripts = [_Named.of(text) for text in scripts_of(element, type_)]
         named = {name for script in scripts for name in script.names}
-        for text in scripts_of(element):
+        for text in scripts_of(element, type_):
             _script(one, text, {})
         _ports(one, element, self.unread)
         if type_name(element) not in self.unread:
@@ -121,7 +120,9 @@ class Read:
         return UnknownNumber(self.oracle, f"`{name}`", wide_low, wide_high)
 
 
-def what_is_read(files: TreeFiles, opaque: Iterable[str], constants: Mapping[str, float], oracle: Oracle, free: Iterable[str] = ()) -> Read:
+def what_is_read(
+    files: TreeFiles, palette: Palette, opaque: Iterable[str], constants: Mapping[str, float], oracle: Oracle, free: Iterable[str] = ()
+) -> Read:
     """Return what the trees of a mission decide by.
 
     ``opaque`` are types of node that decide by nothing that is known, ``free`` those that may ask for more than the file shows.
@@ -129,7 +130,7 @@ def what_is_read(files: TreeFiles, opaque: Iterable[str], constants: Mapping[str
     read = Read(oracle, unread=frozenset(opaque), free=frozenset(free))
     for tree in files.trees.values():
         for element in tree.iterate():
-            for text in scripts_of(element):
+            for text in scripts_of(element, type_of(element, palette)):
                 _script(read, text, constants)
             _ports(read, element, read.unread)
     for model in files.models.values():
@@ -148,9 +149,14 @@ def what_is_read(files: TreeFiles, opaque: Iterable[str], constants: Mapping[str
     return read
 
 
-def scripts_of(element: Element) -> Iterator[str]:
+def type_of(element: Element, palette: Palette) -> NodeType | None:
+    """Return a node's type; None for the use of a subtree, and for what no palette has."""
+    return None if element.tag == Category.SUBTREE.value else palette.get(type_name(element))
+
+
+def scripts_of(element: Element, type_: NodeType | None) -> Iterator[str]:
     """Yield the scripts of a node."""
-    for name in (*PRECONDITIONS, *POSTCONDITIONS, *SCRIPT_PORTS):
+    for name in (*PRECONDITIONS, *POSTCONDITIONS, *(type_.scripts if type_ is not None else ())):
         if name in element.attributes and not element.get(name).lstrip().startswith("{"):
             yield element.get(name)
 

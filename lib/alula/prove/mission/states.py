@@ -15,8 +15,9 @@ from typing import TYPE_CHECKING
 from alula.missions.world import states_of
 from alula.model.model import Skillset
 from alula.prove.mission.oracle import Oracle
-from alula.prove.mission.reading import SCRIPT_PORTS, scripts_of
+from alula.prove.mission.reading import scripts_of, type_of
 from alula.prove.mission.unknown import Distance
+from alula.trees.palette import Palette
 from alula.trees.reading import POSTCONDITIONS, PRECONDITIONS, TreeFiles, type_name
 from alula.trees.script import ScriptError, parse
 from alula.trees.script.syntax import Call, Comparison, Name, Node, children, walk
@@ -36,18 +37,20 @@ class Compared:
     states: Mapping[float, str] = field(default_factory=dict)
 
     @classmethod
-    def of(cls, files: TreeFiles, skillsets: Iterable[Skillset]) -> Compared:
+    def of(cls, files: TreeFiles, palette: Palette, skillsets: Iterable[Skillset]) -> Compared:
         """Read those of a mission's files; none where a script comes from the blackboard, for then anything may be asked."""
         several = list(skillsets)
         states = {f"{one.name}.{resource.name}": frozenset(resource.states) for one in several for resource in one.resources}
         elements = [element for tree in files.trees.values() for element in tree.iterate()]
-        if any(
-            element.get(name).lstrip().startswith("{") for element in elements for name in (*SCRIPT_PORTS, *PRECONDITIONS, *POSTCONDITIONS)
-        ):
-            return cls()
+        types = [type_of(element, palette) for element in elements]
+        for element, type_ in zip(elements, types, strict=True):
+            names = (*PRECONDITIONS, *POSTCONDITIONS, *(type_.scripts if type_ is not None else ()))
+            if any(element.get(name).lstrip().startswith("{") for name in names):
+                return cls()
+        texts = (text for element, type_ in zip(elements, types, strict=True) for text in scripts_of(element, type_))
         named: Counter[str] = Counter(type_name(element) for element in elements)
         compared: Counter[str] = Counter()
-        for program in (program for element in elements for text in scripts_of(element) for program in _parsed(text)):
+        for program in (program for text in texts for program in _parsed(text)):
             named.update(one.name for one in _read(program))
             compared.update(name for one in walk(program) if isinstance(one, Comparison) for name in _compared(one, states))
         numbers = {number: name for name, number in states_of(several).items()}

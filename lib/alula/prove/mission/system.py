@@ -95,7 +95,8 @@ class System:
         files = read_files(path)
         skillsets = [one for one in models if one.name in _named(files)]
         oracle = Oracle()
-        robot = Robot(oracle, Conditions.of(files, skillsets), Compared.of(files, skillsets))
+        palette = palette_of(files, models, part)
+        robot = Robot(oracle, Conditions.of(files, palette, skillsets), Compared.of(files, palette, skillsets))
         inputs = {port.name: UNKNOWN for port in _ports(files)} if known is None else known
         own = own_nodes(robot, part, nowhere_made(files, models, part), why_any_order, known=known is not None)
         plan = plan_of_file(path, path.stem, skillsets, inputs, own.part)
@@ -108,7 +109,7 @@ class System:
         trees = (mission.tree, *([stop] if stop else []))
         director = Director(OneStop(mission, stop), board)
         unread = [*own.unread, *(f"{one.name}.{skill.name}" for one in skillsets for skill in one.skills)]
-        read = what_is_read(files, unread, plan.parameters, oracle, own.free)
+        read = what_is_read(files, palette, unread, plan.parameters, oracle, own.free)
         body = Body(robot, director, board, trees, {one.name: one for one in skillsets}, read, few)
         ticker = Ticker(body, oracle)
         board.pending = Waits(robot, [one.name for one in skillsets], ticker.leaves)

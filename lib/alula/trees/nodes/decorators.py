@@ -6,10 +6,10 @@ from collections.abc import Sequence
 
 from alula.trees.ends import FAILS, SKIPS, SUCCEEDS, Ends, Given, answer_in, whole_number
 from alula.trees.node import NANOSECONDS_PER_MS, Count, Decorator, Script, Wiring
-from alula.trees.palette import input_port
+from alula.trees.palette import input_port, script_port
 from alula.trees.status import FAILURE, IDLE, RUNNING, SKIPPED, SUCCESS, Answer, Status
 from alula.trees.ticking import AGAIN, Begin, Order, Steps, Ticking
-from alula.trees.values import BOOL, INT, STATUS, STRING, UINT
+from alula.trees.values import BOOL, INT, STATUS, UINT
 
 ONCE_MORE: Steps = frozenset({AGAIN})
 
@@ -170,7 +170,7 @@ class RunOnce(Decorator):
 class Precondition(Decorator):
     """Ticks its child when a script says yes; it is asked until the child runs."""
 
-    ports = (input_port("if", STRING, doc="the script"), input_port("else", STATUS, "FAILURE", "what it answers when the script says no"))
+    ports = (script_port("if", "the script"), input_port("else", STATUS, "FAILURE", "what it answers when the script says no"))
 
     may_run = None
     ticking = Ticking(Order.SINGLE, begins=Begin.PERHAPS)

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
+from dataclasses import replace
 from typing import ClassVar
 
 from alula.trees.blackboard import type_of
@@ -18,7 +19,7 @@ from alula.trees.values import ANY, STRING, shown
 class SetBlackboard(SyncAction):
     """Writes a value, or what another entry has, into an entry."""
 
-    ports = (input_port("value", doc="what is written"), inout_port("output_key", doc="the entry's name"))
+    ports = (input_port("value", doc="what is written"), replace(inout_port("output_key", doc="the entry's name"), written_from="value"))
 
     ends = ENDS
 
@@ -46,6 +47,7 @@ class UnsetBlackboard(SyncAction):
     """Takes an entry away."""
 
     ports = (input_port("key", STRING, doc="the entry's name"),)
+    takes_away = "key"
 
     ends = SUCCEEDS
 

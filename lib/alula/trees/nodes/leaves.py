@@ -4,11 +4,9 @@ from __future__ import annotations
 
 from alula.trees.ends import ENDS, FAILS, SUCCEEDS
 from alula.trees.node import NANOSECONDS_PER_MS, Action, Condition, Node, Script, SyncAction, Wiring
-from alula.trees.palette import input_port
+from alula.trees.palette import input_port, script_port
 from alula.trees.status import FAILURE, RUNNING, SUCCESS, Answer
-from alula.trees.values import STRING, UINT
-
-CODE = (input_port("code", STRING, doc="the script"),)
+from alula.trees.values import UINT
 
 
 class AlwaysSuccess(SyncAction):
@@ -43,8 +41,8 @@ class _Code:
 
     @property
     def is_empty(self) -> bool:
-        """Whether the file gives it as an empty text: a Script that does nothing, as editors write it."""
-        return self._node.wiring.ports.get("code") == "" and isinstance(self._node, ScriptNode)
+        """Whether the file gives it as an empty text, and that does nothing, as editors write a Script."""
+        return self._node.wiring.ports.get("code") == "" and self._node.wiring.type.ports["code"].may_be_empty
 
     def script(self) -> Script:
         """Return it."""
@@ -57,7 +55,8 @@ class _Code:
 class ScriptNode(SyncAction):
     """Runs a script, and succeeds."""
 
-    ports = CODE
+    ports = (script_port("code", "the script", may_be_empty=True),)
+    runs_script = "code"
 
     ends = SUCCEEDS
 
@@ -75,7 +74,8 @@ class ScriptNode(SyncAction):
 class ScriptCondition(Condition):
     """Succeeds when a script says yes."""
 
-    ports = CODE
+    ports = (script_port("code", "the script"),)
+    answers_by = "code"
 
     ends = ENDS
 

@@ -17,7 +17,23 @@ from alula.missions.part import MissionPart
 from alula.prove.limits import Deadline
 from alula.prove.mission.regions import Regions
 from alula.prove.mission.system import System
-from alula.trees import FAILURE, RUNNING, SUCCESS, Answer, Control, Decorator, Node, Order, Ticking, register
+from alula.trees import (
+    FAILURE,
+    RUNNING,
+    STRING,
+    SUCCESS,
+    Answer,
+    Condition,
+    Control,
+    Decorator,
+    Node,
+    Order,
+    TickError,
+    Ticking,
+    input_port,
+    register,
+    script_port,
+)
 from alula.trees.factory import make_tree
 from alula.trees.node import Wiring
 from alula.trees.nodes.decorators import Inverter
@@ -140,3 +156,40 @@ def test_a_class_that_halts_otherwise_than_its_base_is_not_taken_for_it() -> Non
     assert Plain.known_ticking() is Inverter.ticking
     assert Kept.known_ticking() is ANY_TICKING
     assert Decorator.known_ticking() is ANY_TICKING
+
+
+@register("robot.Asked")
+class Asked(Condition):
+    """Answers by its script."""
+
+    ports = (script_port("that"),)
+    answers_by = "that"
+    ends = frozenset({SUCCESS, FAILURE})
+
+    def setup(self) -> None:
+        """Read it."""
+        self._that = self.script("that")
+
+    def update(self) -> Answer:
+        """Ask."""
+        return SUCCESS if self._that.holds() else FAILURE
+
+
+@register("robot.Asked")
+class Undeclared(Asked):
+    """Has a script in a port that does not say so."""
+
+    ports = (input_port("that", STRING),)
+
+
+def test_what_a_script_of_a_port_reads_is_known() -> None:
+    assert [code for code, _ in checked('<robot.Asked that="n == 1"/>', Asked)] == ["ALU607"]
+    assert [code for code, _ in checked('<robot.Asked that="n =="/>', Asked)] == ["ALU614"]
+
+
+def test_a_script_of_a_port_that_does_not_say_so_is_refused() -> None:
+    text = '<root BTCPP_format="4"><BehaviorTree ID="m"><robot.Asked that="1"/></BehaviorTree></root>'
+    palette = standard_palette()
+    palette.register(Undeclared)
+    with pytest.raises(TickError, match=r"the port 'that' holds a script, and does not say so: declare it with script_port\('that'\)"):
+        make_tree(read_text(text), palette, int)
