@@ -14,7 +14,6 @@ from alula.prove.mission.ticking import ABORT, Outcome
 from alula.trees.ends import FAILS
 
 GOOD = frozenset({"accomplished", "degraded"})
-"""The type of node by which a tree says that it gives up."""
 
 
 Way = tuple[Outcome, Sets]
