@@ -15,6 +15,7 @@ from pathlib import Path
 from alula.check.robot import part_of
 from alula.cli.saying import warner
 from alula.cli.table import parse
+from alula.common.robots import FILE as ROBOT_FILE
 from alula.common.robots import RobotError, RobotFolder, find_robot
 from alula.language.errors import LanguageError, has_errors
 from alula.language.fleet import load_models
@@ -60,7 +61,8 @@ def tree_types(places: Sequence[str], *, guess: bool) -> Iterator[NodeType]:
         raise FileError(library.broken[0])
     for problem in library.broken:
         warner(COMMAND)(str(problem))
-    if not library.documents and not guess and len(places) == 1:
+    is_robot = (Path(places[0]) / ROBOT_FILE).is_file()  # which has missions beside its models
+    if (is_robot or not library.documents) and not guess and len(places) == 1:
         yield from robot_types(places[0])
         return
     if not library.documents:
