@@ -104,6 +104,8 @@ def test_the_tutorial_works(tmp_path, request):
     assert (summary["mock"], summary["problems"], summary["died"]) == (None, [], [])
     assert [(one["skill"], one["result"]) for one in summary["skills"]] == [("drive", "way_stays_clear"), ("back_off", "CLEAR_OF_IT")]
     assert summary["bridge"]["/rover/odom"]["count"] > 0
+    assert summary["bridge"]["/rover/alive"]["count"] > 0, "what stops the base hears the managers"
+    assert "/rover/alive is heard" in (flown / "logs/nodes/rosout.log").read_text(encoding="utf-8")
     assert (flown / "functional.bag").is_file()
     assert json.loads((flown / "run.json").read_text(encoding="utf-8"))["namespace"] == "/rover"
     assert "not in /rover" not in "".join(log.read_text(encoding="utf-8") for log in (flown / "logs").rglob("*.log"))
