@@ -205,13 +205,17 @@ class Forgetful(list):
     def __init__(self, comes) -> None:
         super().__init__()
         self._comes = threading.Thread(target=comes)
+        self._forgotten = threading.Event()
 
     def clear(self) -> None:
         self._comes.start()
         self._comes.join(ENOUGH_S)
         super().clear()
+        self._forgotten.set()
 
     def come(self) -> None:
+        """Return when the other one has come; a call that is under way may outlast ``close``."""
+        assert self._forgotten.wait(HANGS_S)
         self._comes.join(HANGS_S)
 
 
