@@ -8,7 +8,7 @@ import subprocess
 import sys
 import threading
 import uuid
-from dataclasses import asdict, replace
+from dataclasses import replace
 
 import psutil
 import pytest
@@ -23,7 +23,7 @@ from alula.report.deaths import Death, describe_exit, note_again, note_death, re
 from alula.report.live import LiveEvents, event_line
 from alula.report.verdict import conformance_lines
 from alula.runtime.core.events import ExecutionEvent, TransitionEvent
-from alula.runtime.live.options import RunOption, words_of
+from alula.runtime.live.options import RunOffer, RunOption, read_offer, words_of
 from alula.runtime.live.part import RunPart
 from alula.runtime.live.spec import RequestError, RunSpec
 from alula_flight.command_line import MASTER, USUAL_MASTER, check_no_master, parse, with_claim
@@ -33,7 +33,9 @@ from alula_flight.run import main, monitor_of
 
 
 class Delivering(RunPart):
-    """A robot that can be told where to and how."""
+    """A robot that can be told where to and how, and whose parcels fail."""
+
+    faults = {"parcel": ("lost", "wet")}  # noqa: RUF012  # as a robot's part writes it
 
     def add_options(self, parser):
         parser.add_argument("--to", metavar="ROOM", default="dock", help="where the parcel goes")
@@ -50,7 +52,8 @@ def test_the_robots_own_options_are_told_as_data(tmp_path, capsys):
         RunOption("gently", "slow in curves", takes_value=False),
         RunOption("gear", "of the drive", choices=("1", "2")),
     ]
-    assert json.loads(capsys.readouterr().out) == [json.loads(json.dumps(asdict(option))) for option in options]
+    offer = RunOffer(tuple(options), Delivering.faults)
+    assert read_offer(capsys.readouterr().out) == offer
     words = words_of({"to": "lab 3", "gently": "", "gear": "2"}, options)
     assert words == ["--to=lab 3", "--gently", "--gear=2"]
     assert parse(["mapping", *words, "--out", str(tmp_path / "run")], Delivering()).scenario == "mapping"

@@ -208,8 +208,9 @@ class Forgetful(list):
         self._forgotten = threading.Event()
 
     def clear(self) -> None:
-        self._comes.start()
-        self._comes.join(ENOUGH_S)
+        if not self._forgotten.is_set():
+            self._comes.start()
+            self._comes.join(ENOUGH_S)
         super().clear()
         self._forgotten.set()
 

@@ -119,7 +119,7 @@ class ResourceReporter:
             self._over = True
 
     def _settled(self) -> bool:
-        if self._ledger.settled or not self._subscriber.get_num_connections():
+        if self._ended or self._ledger.settled or not self._subscriber.get_num_connections():  # at the end it hears nothing any more
             self._unsettled_since_s = None
             return True
         now_s = time.monotonic()
