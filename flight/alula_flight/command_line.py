@@ -80,6 +80,7 @@ def parse(arguments: Sequence[str], part: RunPart) -> RunSpec:
         commanded=given.commanded,
         members=members,
         groot=groot_address(given.groot),
+        robot=str(find_robot().root),
         own=own,
     )
 
@@ -118,6 +119,7 @@ def attached(given: argparse.Namespace, name: str) -> RunSpec:
         limit_s=check_limit(given.limit),
         groot=groot_address(given.groot),
         deployment=name,
+        robot=str(find_robot().root),
     )
 
 

@@ -172,6 +172,7 @@ class Mission:
                 world=self.world,
                 monitor=monitor,
                 groot=groot,
+                robot="" if self.robot is None else str(self.robot.root),
                 own={"mock": True},
             ).save(folder / FILE)
         with meaning(self.robot):

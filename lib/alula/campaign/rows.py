@@ -25,7 +25,7 @@ from alula.records.causes.told_ends import with_told_ends
 from alula.records.conformance import Monitor
 from alula.records.errors import AnalysisError
 from alula.records.models import models_of
-from alula.records.run import RecordedRun, lift_off_of, load_recorded_run, origin_of
+from alula.records.run import RecordedRun, departure, lift_off_of, load_recorded_run, origin_of
 from alula.records.tree import Places, places_in
 from alula.runtime.core.events import EngineEvent, ExecutionEvent, TransitionEvent
 from alula.runtime.live.options import entry
@@ -102,9 +102,11 @@ def _row(planned: PlannedRun, found: Mapping[str, Any], left: _Evidence, monitor
     for event in left.events:
         monitor.take(event)
     events = left.events if left.known is None else left.known
-    origin_s = origin_of(events)
+    origin_s = origin_of(events, departure())
     effects = effects_of_robot()
-    asked = faults_asked(planned.requests, events, lift_off_of(events), effects, first_s=left.first_s, behaviour=left.behaviour)
+    asked = faults_asked(
+        planned.requests, events, lift_off_of(events, departure()), effects, first_s=left.first_s, behaviour=left.behaviour
+    )
     begun = [(Way(FAULT, name_of(request)), fault) for request, fault in asked]
     died = [(Way(PROCESS, one["name"]), _ended(one, events, effects)) for one in found["died"]]
     every = [failure for causes in (begun, died) for failure in failures_by(causes, events, left.places)]
@@ -135,8 +137,8 @@ def _answers(answers: Sequence[FlownAnswer], events: Sequence[EngineEvent], faul
 def _ended(died: Mapping[str, Any], events: Sequence[EngineEvent], effects: EffectsByFault) -> Fault:
     """Return the end of a process, as the summary tells of it, as a fault; without a time it ended before the mission clock ran."""
     begun_s = min((event.stamp_s for event in events), default=0.0)
-    at_s = begun_s if died["when_s"] is None else origin_of(events) + died["when_s"]
-    until_s = math.inf if died.get("again_s") is None else origin_of(events) + died["again_s"]
+    at_s = begun_s if died["when_s"] is None else origin_of(events, departure()) + died["when_s"]
+    until_s = math.inf if died.get("again_s") is None else origin_of(events, departure()) + died["again_s"]
     return Fault(died["name"], at_s, until_s, effects.of(died["name"]))
 
 

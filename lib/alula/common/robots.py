@@ -191,8 +191,8 @@ _MEANT: ContextVar[RobotFolder | None] = ContextVar("robot", default=None)
 
 @contextlib.contextmanager
 def meaning(robot: RobotFolder | None) -> Iterator[None]:
-    """Have `find_robot` return this robot as long as the context lasts, in this thread; None: the one that it finds."""
-    token = _MEANT.set(robot)
+    """Have `find_robot` return this robot as long as the context lasts, in this thread; None: what it returned before."""
+    token = _MEANT.set(robot or _MEANT.get())
     try:
         yield
     finally:

@@ -9,7 +9,8 @@ from pathlib import Path
 from alula.common.errors import AlulaError
 from alula.common.network import is_claimed
 from alula.common.processes import processes_of_run
-from alula.common.robots import RobotError, find_robot
+from alula.common.robots import FILE as ROBOT_FILE
+from alula.common.robots import RobotError, RobotFolder, find_robot, load_robot_folder
 
 LATEST = "latest"
 
@@ -39,6 +40,28 @@ def runs_folder() -> Path:
         return find_robot().runs
     except RobotError:
         return Path("runs")
+
+
+def robot_of(log: Path) -> RobotFolder | None:
+    """Return the robot that a run or a log is of: the one that ``run.json`` names, else that of a folder above it.
+
+    None: neither is there, or its file is wrong. The current folder and the robot that is meant do not matter.
+    """
+    place = log.resolve()
+    folder = place if place.is_dir() else place.parent
+    named = (Path(text) for text in [_robot_named(folder)] if text)
+    found = next((one for one in (*named, *(folder, *folder.parents)) if (one / ROBOT_FILE).is_file()), None)
+    try:
+        return None if found is None else load_robot_folder(found)
+    except RobotError:
+        return None
+
+
+def _robot_named(folder: Path) -> str:
+    try:
+        return str(json.loads((folder / "run.json").read_text(encoding="utf-8")).get("robot", ""))
+    except (OSError, ValueError, AttributeError, RecursionError):
+        return ""
 
 
 def load_run(folder: Path) -> Run:

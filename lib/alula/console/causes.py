@@ -112,7 +112,7 @@ class Causes:
 
     def _departed_s(self, events: list[EngineEvent]) -> float | None:
         said = self._mission.get("lift_off_s")
-        return float(said) if isinstance(said, int | float) else lift_off_of(events)
+        return float(said) if isinstance(said, int | float) else lift_off_of(events, departure())
 
     def _known_effects(self) -> EffectsByFault:
         if self._effects is None:
@@ -127,7 +127,7 @@ class Causes:
         if isinstance(answers := summary.get("answers"), list):
             lift_off = summary.get("lift_off") or {}
             departed_s = self._departed_s(events)
-            zero_s = float(lift_off.get("stamp_s", origin_of(events) if departed_s is None else departed_s))
+            zero_s = float(lift_off.get("stamp_s", origin_of(events, departure()) if departed_s is None else departed_s))
             found = [_summed(one, zero_s) for one in answers if isinstance(one.get("t_s"), int | float)]
         else:
             found = self._traced(events)

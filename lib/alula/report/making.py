@@ -11,6 +11,8 @@ from dataclasses import dataclass
 
 from alula.common.files import write_aside, write_json
 from alula.common.record import FILE as RECORD
+from alula.common.robots import meaning
+from alula.common.runs import robot_of
 from alula.common.scenarios import load_scenario
 from alula.console.entries import FAULT, Wire
 from alula.console.page import write_report
@@ -49,6 +51,11 @@ def make_report(facts: RunFacts) -> Summary:
     The robot's part adds files and numbers of its own. Whatever is missing, cut off, makes no sense or can't be written is named in the
     summary's ``problems``; numbers that depend on it are None.
     """
+    with meaning(robot_of(facts.out_dir)):
+        return _made(facts)
+
+
+def _made(facts: RunFacts) -> Summary:
     run = _begin(facts)
     part = part_of_robot(run)
     account = _account(run, part)

@@ -12,6 +12,7 @@ from alula.campaign.mocked_scenarios import load_mocked_scenario
 from alula.cli.compare import main
 from alula.common import run_log
 from alula.common.faults import parse_fault
+from alula.common.robots import find_robot
 from alula.records.comparing.telling import spread
 from alula.runtime.core.events import event_record
 
@@ -25,6 +26,7 @@ def folders(tmp_path_factory):
         folder.mkdir()
         lines = "".join(json.dumps(event_record(event)) + "\n" for event in flown.events)
         (folder / "events.jsonl").write_text(lines, encoding="utf-8")
+        (folder / "run.json").write_text(json.dumps({"robot": str(find_robot().root)}), encoding="utf-8")
         run_log.note(folder, run_log.MISSION, {"outcome": flown.end.outcome.value})
     summary = {"duration_s": 100.0, "recovery": {"failure_s": 30.0, "detected_s": 30.5}, "map": {"coverage": 0.9}, "video": None}
     (found["zed-fails"] / "summary.json").write_text(json.dumps(summary), encoding="utf-8")

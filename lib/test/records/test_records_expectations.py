@@ -14,7 +14,7 @@ from alula.campaign.mocked_scenarios import load_mocked_scenario
 from alula.cli.expect import main
 from alula.common import run_log
 from alula.common.faults import parse_fault
-from alula.common.robots import VARIABLE
+from alula.common.robots import VARIABLE, load_robot_folder
 from alula.records.errors import AnalysisError
 from alula.records.expectations import check, expectations_of, junit, load_expectations
 from alula.records.run import RecordedRun, load_recorded_run
@@ -28,7 +28,8 @@ FIGURES = ROOT / "tests" / "expectations"
 def runs():
     flights = load_mocked_scenario("mapping")
     flown = {"nominal": flights.run(), "failing": flights.run([parse_fault("zed@30")])}
-    return {name: RecordedRun(Path(name), one.events, {"outcome": one.end.outcome.value}) for name, one in flown.items()}
+    of_drone = load_robot_folder(ROOT).departure
+    return {name: RecordedRun(Path(name), one.events, {"outcome": one.end.outcome.value}, of_drone) for name, one in flown.items()}
 
 
 def problems(path, run):

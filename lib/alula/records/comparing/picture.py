@@ -9,7 +9,7 @@ import matplotlib as mpl
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
-from alula.records.comparing.sides import Compared, known_figures
+from alula.records.comparing.sides import Compared
 from alula.records.comparing.telling import SIDE_BY_SIDE
 
 # After Okabe and Ito (2008): told apart by the colour-blind.
@@ -50,14 +50,13 @@ def _timeline(compared: Compared) -> Figure:
 
 
 def _distributions(compared: Compared) -> Figure:
-    values = {name: [value for side in compared.sides if (value := side.figures[name]) is not None] for name in known_figures()}
-    shown = {name: some for name, some in values.items() if some}
+    shown = {name: some for name in compared.units if (some := compared.values(name))}
     figure = Figure(figsize=(WIDTH_IN, 0.75 * len(shown) + 0.6), layout="constrained")
     rows = figure.subplots(max(len(shown), 1), 1, squeeze=False)[:, 0]
     for axes, (name, some) in zip(rows, shown.items(), strict=False):
         axes.plot(some, [0.0] * len(some), "|", color=COLOURS[0], markersize=14, alpha=0.5)
         axes.plot([median(some)], [0.0], "o", color=COLOURS[5], markersize=5)
-        axes.set_yticks([0.0], [f"{name} {known_figures()[name][1]}".rstrip()])
+        axes.set_yticks([0.0], [f"{name} {compared.units[name]}".rstrip()])
         axes.spines[["top", "right", "left"]].set_visible(False)
     figure.suptitle(f"{len(compared.sides)} runs; a stroke a run, the dot is the median")
     return figure

@@ -9,7 +9,9 @@ from itertools import zip_longest
 from pathlib import Path
 from typing import Any
 
-from alula.common.robots import page_words
+from alula.common.robot_page import USUAL_PAGE
+from alula.common.robots import RobotFolder
+from alula.common.runs import robot_of
 from alula.model.execution_state import ExecutionState as S
 from alula.records.errors import AnalysisError
 from alula.records.run import RecordedRun, load_recorded_run
@@ -29,9 +31,9 @@ FIGURES: Mapping[str, tuple[tuple[str, ...], str]] = {
 """What ``summary.json`` has of each figure, and its unit, of every robot. Recovery times count from the failure."""
 
 
-def known_figures() -> Mapping[str, tuple[tuple[str, ...], str]]:
-    """Return FIGURES, and those that the robot says it has; without the factors by which reports tell them."""
-    of_robot = page_words()["figures"]
+def known_figures(robot: RobotFolder | None) -> Mapping[str, tuple[tuple[str, ...], str]]:
+    """Return FIGURES, and those that a robot says it has; without the factors by which reports tell them."""
+    of_robot = (USUAL_PAGE if robot is None else robot.page)["figures"]
     own = {path.replace(".", " "): (tuple(path.split(".")), told["unit"] if told["factor"] == 1 else "") for path, told in of_robot.items()}
     return {**FIGURES, **own}
 
@@ -46,13 +48,14 @@ class ComparedDecision:
 
 @dataclass(frozen=True)
 class Side:
-    """One run: its decisions in order, the times in which skills ran, and its figures, None where they are not known."""
+    """One run: its decisions in order, the times in which skills ran, and its figures, None where they are not known, with their units."""
 
     name: str
     outcome: str
     decisions: Sequence[ComparedDecision]
     spans: Sequence[tuple[str, float, float]]
     figures: Mapping[str, float | None]
+    units: Mapping[str, str]
 
 
 @dataclass(frozen=True)
@@ -67,15 +70,25 @@ class Compared:
         """Tell whether all have decided the same."""
         return all(at is None for at in self.differs_at)
 
+    @property
+    def units(self) -> Mapping[str, str]:
+        """The figures of any of them, in order, with their units."""
+        return {name: unit for side in reversed(self.sides) for name, unit in side.units.items()} | dict(self.sides[0].units)
+
+    def values(self, figure: str) -> list[float]:
+        """Return the values of a figure, of the runs that have it."""
+        return [value for side in self.sides if (value := side.figures.get(figure)) is not None]
+
 
 def load_side(path: Path, name: str) -> Side:
     """Read a run; raises AnalysisError."""
     run = load_recorded_run(path)
     summary = _summary(path)
-    figures = {figure: _figure(summary, where) for figure, (where, _) in known_figures().items()}
+    known = known_figures(robot_of(path))
+    figures = {figure: _figure(summary, where) for figure, (where, _) in known.items()}
     if figures["duration"] is None:
         figures["duration"] = run.events[-1].stamp_s - run.events[0].stamp_s
-    return Side(name, run.outcome, decisions_of(run), list(_spans(run)), figures)
+    return Side(name, run.outcome, decisions_of(run), list(_spans(run)), figures, {name: unit for name, (_, unit) in known.items()})
 
 
 def compare(sides: Sequence[Side]) -> Compared:

@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Iterator, Sequence
 from statistics import median
 
-from alula.records.comparing.sides import Compared, Side, known_figures
+from alula.records.comparing.sides import Compared, Side
 
 SIDE_BY_SIDE = 6
 """More runs than these are told as distributions."""
@@ -32,8 +32,7 @@ def _plain(side: Side) -> list[dict[str, object]]:
 
 def _known(compared: Compared) -> dict[str, list[float]]:
     """Return the values of each figure that some run has."""
-    found = {name: [value for side in compared.sides if (value := side.figures[name]) is not None] for name in known_figures()}
-    return {name: values for name, values in found.items() if values}
+    return {name: values for name in compared.units if (values := compared.values(name))}
 
 
 def lines(compared: Compared) -> Iterator[str]:
@@ -42,7 +41,9 @@ def lines(compared: Compared) -> Iterator[str]:
     if len(sides) <= SIDE_BY_SIDE:
         yield from _table([["", *(side.name for side in sides)], *_columns(compared)])
     else:
-        rows = [[_titled(name), *(f"{value:.3f}" for value in spread(values).values())] for name, values in _known(compared).items()]
+        rows = [
+            [_titled(compared, name), *(f"{value:.3f}" for value in spread(values).values())] for name, values in _known(compared).items()
+        ]
         yield from _table([[f"{len(sides)} runs", "min", "median", "p95", "max"], *rows])
         outcomes = [side.outcome or "not known" for side in sides]
         yield "outcomes: " + ", ".join(f"{outcomes.count(one)} {one}" for one in dict.fromkeys(outcomes))
@@ -54,12 +55,12 @@ def _columns(compared: Compared) -> Iterator[list[str]]:
     yield ["outcome", *(side.outcome or "not known" for side in compared.sides)]
     yield ["decisions", *(str(len(side.decisions)) for side in compared.sides)]
     for name in _known(compared):
-        values = [side.figures[name] for side in compared.sides]
-        yield [_titled(name), *("-" if value is None else f"{value:.3f}" for value in values)]
+        values = [side.figures.get(name) for side in compared.sides]
+        yield [_titled(compared, name), *("-" if value is None else f"{value:.3f}" for value in values)]
 
 
-def _titled(name: str) -> str:
-    unit = known_figures()[name][1]
+def _titled(compared: Compared, name: str) -> str:
+    unit = compared.units[name]
     return f"{name} ({unit})" if unit else name
 
 

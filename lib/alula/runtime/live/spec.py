@@ -43,6 +43,7 @@ class RunSpec:
         members: of a fleet, the words of ``alula run`` for the run of each robot, by its name; empty: its robots are served elsewhere.
         groot: ``HOST:PORT`` where viewers find the mission's tree; empty: nowhere.
         deployment: whose graph it runs in, beside what runs there already; empty: it has a graph of its own, and starts all of it.
+        robot: the robot's folder, absolute; empty: not known.
         own: what the robot's part has made of its own options, by name; in the file these values stand beside the others.
     """
 
@@ -63,6 +64,7 @@ class RunSpec:
     members: Mapping[str, Sequence[str]] = field(default_factory=dict)
     groot: str = ""
     deployment: str = ""
+    robot: str = ""
     own: Mapping[str, Any] = field(default_factory=dict)
 
     def save(self, path: Path) -> None:
