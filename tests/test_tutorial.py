@@ -18,6 +18,7 @@ import pytest
 
 from alula_testing.cover import read_only
 from alula_testing.flights import Flight, start_flight
+from alula_testing.on_what_runs import fly_on_what_runs
 
 ALULA_ROOT = Path(__file__).resolve().parents[1]
 SECTION = (ALULA_ROOT / "docs/start/own-robot.md").read_text(encoding="utf-8")
@@ -43,13 +44,13 @@ class Home:
         (folder / "bin" / "alula").symlink_to(ALULA_ROOT / "alula")
         self._before = read_only()
         kept = {k: v for k, v in os.environ.items() if not k.startswith(("ALULA_ROBOT", "PYTHONPATH", "PYTEST_ADDOPTS", "ROS_DOMAIN_ID"))}
-        self._environment = {**kept, "HOME": str(folder), "PATH": f"{folder / 'bin'}:{os.environ['PATH']}"}
+        self.environment = {**kept, "HOME": str(folder), "PATH": f"{folder / 'bin'}:{os.environ['PATH']}"}
 
     def run(self, command: str) -> str:
         """Run a command of the page; return its standard output."""
         place = self.robot if self.robot.exists() else self.folder
         words = [*self._before, "sh", "-c", command]
-        done = subprocess.run(words, cwd=place, capture_output=True, text=True, check=False, env=self._environment)
+        done = subprocess.run(words, cwd=place, capture_output=True, text=True, check=False, env=self.environment)
         assert done.returncode == 0, f"{command}\n{done.stdout[-4000:]}\n{done.stderr[-2000:]}"
         return done.stdout
 
@@ -127,3 +128,5 @@ def test_the_tutorial_works(tmp_path, request):
     flown = max(home.robot.glob("runs/*-patrol*"), key=lambda run: (run / "report.html").stat().st_mtime)
     summary = json.loads((flown / "summary.json").read_text(encoding="utf-8"))
     assert [(one["skill"], one["result"]) for one in summary["skills"][1:]] == [("rest", "RESTED"), ("back_off", "CLEAR_OF_IT")]
+
+    fly_on_what_runs(home.robot, home.run, home.environment)

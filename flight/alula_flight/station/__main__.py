@@ -41,10 +41,11 @@ def up(given: Any) -> int:
     why = why_no_master(station.deployment.master)
     if why:
         say(f"no ROS master at {station.deployment.master}: {why}; the bridge waits for it")
-    if station.is_up:
-        station.ask(given.restart)
-    else:
+    was_up = station.is_up
+    if not was_up:
         station.begin()
+    if was_up or given.restart:
+        station.ask(given.restart)
     state = station.settle()
     sys.stdout.write("".join(f"{line}\n" for line in lines_of(station, state)))
     return DONE if all(part.state == states.RUNNING for part in state.parts.values()) else DOWN
@@ -76,7 +77,9 @@ def the_only_one() -> str:
     """Return the robot's deployment where it has only one; raises DeploymentError."""
     names = deployment_names()
     if len(names) != 1:
-        raise DeploymentError(f"name a deployment: {', '.join(names)}" if names else "this robot has no deployment: docs/on-the-robot.md")
+        raise DeploymentError(
+            f"name a deployment: {', '.join(names)}" if names else "this robot has no deployment: docs/how-to/on-the-robot.md"
+        )
     return names[0]
 
 

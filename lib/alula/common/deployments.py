@@ -1,4 +1,4 @@
-"""Where a robot's skills run on its own computers: ``deployments/NAME.yaml`` says it of each place (docs/on-the-robot.md)."""
+"""Where a robot's skills run on its own computers: ``deployments/NAME.yaml`` says it of each place (docs/how-to/on-the-robot.md)."""
 
 from __future__ import annotations
 
@@ -124,7 +124,9 @@ def load_deployment(name: str, robot: RobotFolder | None = None) -> Deployment:
         raise DeploymentError(str(error)) from None
     names = sorted(path.stem for path in folder.glob("*.yaml"))
     if name not in names:
-        hint = nearest(name, names) or (f"there are {', '.join(names)}" if names else "write one: docs/on-the-robot.md says what is in it")
+        hint = nearest(name, names) or (
+            f"there are {', '.join(names)}" if names else "write one: docs/how-to/on-the-robot.md says what is in it"
+        )
         raise DeploymentError(f"there is no deployment '{name}' in {folder}; {hint}")
     return read_deployment(folder / f"{name}.yaml")
 

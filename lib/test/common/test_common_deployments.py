@@ -120,7 +120,7 @@ def test_a_name_that_is_not_there_is_refused_with_those_that_are(tmp_path):
     (tmp_path / "skillsets").mkdir()
     (tmp_path / "robot.yaml").write_text("name: rover\n")
     robot = load_robot_folder(tmp_path)
-    with pytest.raises(DeploymentError, match=r"there is no deployment 'lab' in .*docs/on-the-robot.md"):
+    with pytest.raises(DeploymentError, match=r"there is no deployment 'lab' in .*docs/how-to/on-the-robot.md"):
         load_deployment("lab", robot)
     (tmp_path / "deployments").mkdir()
     (tmp_path / "deployments" / "field.yaml").write_text(LEAST)
