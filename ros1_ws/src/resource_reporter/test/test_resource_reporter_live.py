@@ -105,18 +105,22 @@ def test_reports_within_milliseconds_once_connected(skillset, reporter):
     skillset.serve()
     reporter.report("zed_status", "OK")
     becomes(skillset, "OK")
-    latencies = []
+    latencies, plain = [], []
+    direct = rospy.ServiceProxy(f"/{SKILLSET}/transition", Transition, persistent=True)
     for index in range(20):
         state = "BROKEN" if index % 2 == 0 else "OK"
+        begin_s = time.monotonic()
+        direct("zed_status", "NOWHERE", "")
+        plain.append(skillset.calls[-1][0] - begin_s)
         begin_s = time.monotonic()
         reporter.report("zed_status", state)
         returned_s = time.monotonic()
         becomes(skillset, state)
         latencies.append(skillset.calls[-1][0] - begin_s)
         assert returned_s - begin_s < 0.5
-    # A quarter of them: on a busy machine the others tell how long a thread waits for its turn.
-    assert sorted(latencies)[5] < 0.005
-    assert len(skillset.calls) == 21
+    # A quarter of them, beside plain calls: on a busy machine the others tell how long a thread waits for its turn.
+    assert sorted(latencies)[5] < 0.004 + 2.0 * sorted(plain)[5]
+    assert len(skillset.calls) == 41
 
 
 def test_its_calls_are_advertised_before_the_first(ros_master):

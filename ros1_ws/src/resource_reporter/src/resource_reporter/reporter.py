@@ -80,12 +80,12 @@ class ResourceReporter:
 
     def close(self) -> None:
         """End the worker and drop the connections."""
+        with self._changed:  # first: who comes from now on asks no subscriber any more
+            self._ended = True
+            self._changed.notify()
         self._subscriber.unregister()
         self._beats.shutdown()
         self._heartbeat.unregister()
-        with self._changed:
-            self._ended = True
-            self._changed.notify()
         self._caller.close()
         self._worker.join(LONGEST_WAIT_S)
 
