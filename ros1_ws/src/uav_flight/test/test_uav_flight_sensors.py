@@ -141,6 +141,16 @@ def test_a_wrong_request_is_told_in_a_line(measured, tmp_path, words, complaint)
     assert done.stderr.count("\n") == 1
 
 
+def test_a_topic_of_another_type_is_refused_by_name_and_leaves_nothing(tmp_path):
+    with rosbag.Bag(str(tmp_path / "scans.bag"), "w") as bag:
+        bag.write("/base_scan", TFMessage(), stamp(START_S))
+    done = perceive(tmp_path / "scans.bag", tmp_path / "none.bag", "--map", "/base_scan:=/lidar/points")
+    assert done.returncode == 2
+    words = "/base_scan (--map /base_scan:=/lidar/points) is of type tf2_msgs/TFMessage, expected sensor_msgs/PointCloud2"
+    assert done.stderr == f"{tmp_path / 'scans.bag'}: {words}\n"
+    assert not (tmp_path / "none.bag").exists()
+
+
 def test_a_bag_without_measurements_is_refused(tmp_path):
     with rosbag.Bag(str(tmp_path / "bare.bag"), "w") as bag:
         bag.write("/tf_static", TFMessage(), stamp(START_S))

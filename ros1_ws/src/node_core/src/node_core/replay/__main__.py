@@ -53,8 +53,12 @@ def perceive(part: SensorPart, source: Path, target: Path, given: Conditions) ->
             raise ReplayPartError(
                 f"{source}: holds no measurements ({', '.join(sorted(judged))}); see docs/how-to/replays.md for how to record them"
             )
-        with rosbag.Bag(str(target), "w") as out:
-            Perceiving(part, bag, out, given, Path(folder)).run()
+        try:
+            with rosbag.Bag(str(target), "w") as out:
+                Perceiving(part, bag, out, given, Path(folder)).run()
+        except ReplayPartError:
+            target.unlink()  # nothing was perceived
+            raise
 
 
 def main(words: Sequence[str] | None = None) -> int:

@@ -17,7 +17,7 @@ import rospy
 from alula.common.faults import FaultRequest
 from node_core.core import Input, Switched
 from node_core.replay.host import CALLS, BagHost, Timeline
-from node_core.replay.part import Arrival, SensorPart
+from node_core.replay.part import Arrival, ReplayPartError, SensorPart
 
 if TYPE_CHECKING:
     from node_core.core import Core, Host, Output
@@ -59,7 +59,7 @@ class Perceiving:
         self._cores: Mapping[str, Core] = {}
 
     def run(self) -> None:
-        """Give every recorded measurement to the cores, in the order of the bag."""
+        """Give every recorded measurement to the cores, in the order of the bag; raises ReplayPartError."""
         self._timeline.now_ns = round(self._source.get_start_time() * 1e9)
         self._cores = self._part.make(self)
         for core in self._cores.values():
@@ -67,12 +67,22 @@ class Perceiving:
                 self._inputs.setdefault(each.topic, []).append(each)
             for period_s, work in core.timers:
                 self._timeline.every(period_s, work)
+        self._check_types()
         again = {topic for host in self._hosts for topic in host.topics}
         for topic, (kind, data, *_, message_class), time in self._source.read_messages(raw=True):
             self._timeline.advance_to(time.to_nsec())
             name = self._given.names.get(topic, topic)
             if name not in again:
                 self._take(name, kind, data, message_class)
+
+    def _check_types(self) -> None:
+        """Refuse a topic of another type than the nodes take: in a replay it is a wrong name, not a driver that fails."""
+        for topic, told in self._source.get_type_and_topic_info().topics.items():
+            name = self._given.names.get(topic, topic)
+            wanted = {each.kind._type for each in self._inputs.get(name, ())}  # noqa: SLF001 -- generated messages have it
+            if wanted - {told.msg_type}:
+                of = f"{topic} (--map {topic}:={name})" if topic != name else topic
+                raise ReplayPartError(f"{self._source.filename}: {of} is of type {told.msg_type}, expected {' or '.join(sorted(wanted))}")
 
     # --- what the part asks of it -------------------------------------------------------------------------------------
 
