@@ -15,7 +15,7 @@ from alula.common.faults import FaultError, parse_fault
 from alula.common.robots import find_robot
 from alula.common.scenarios import load_scenario
 from alula.records.errors import AnalysisError
-from alula.runtime.live.options import ask_offer, words_of
+from alula.runtime.live.options import RunOffer, ask_offer, words_of
 from alula.runtime.live.spec import RequestError
 
 TOGETHER = 10
@@ -60,18 +60,16 @@ def run(campaign: Campaign, table: Table, out: Path, progress: Progress, options
             progress(len(table.rows))
 
 
-def options_of(campaign: Campaign) -> tuple[str, ...]:
-    """Return the options of its live runs as words of their command lines, once all faults of the runs are known to the robot.
-
-    Raises:
-        AnalysisError: the robot has no such option or fault, or can't be run live here.
-    """
-    if campaign.over != SIMULATOR:
-        return ()
+def offer_of(campaign: Campaign) -> RunOffer:
+    """Return what the robot declares for live runs; nothing where a campaign has none. Raises AnalysisError."""
     try:
-        offer = asyncio.run(ask_offer())
+        return asyncio.run(ask_offer()) if campaign.over == SIMULATOR else RunOffer()
     except RequestError as error:
         raise AnalysisError(str(error)) from None
+
+
+def check_live_faults(campaign: Campaign, offer: RunOffer) -> None:
+    """Refuse faults that the live runs of a scenario can't have; raises AnalysisError."""
     known = {name: {**offer.faults, **dict(load_scenario(name).faults)} for name in campaign.scenarios}
     for planned in () if find_robot().robots else campaign.runs:  # a fleet's robots each know their own
         for text in planned.faults:
@@ -79,6 +77,10 @@ def options_of(campaign: Campaign) -> tuple[str, ...]:
                 parse_fault(text, known[planned.scenario])
             except FaultError as error:
                 raise AnalysisError(f"the scenario {planned.scenario}: {error}") from None
+
+
+def options_of(campaign: Campaign, offer: RunOffer) -> tuple[str, ...]:
+    """Return the options of its live runs as words of their command lines; raises AnalysisError where the robot has no such options."""
     try:
         return tuple(words_of(campaign.options, offer.options))
     except RequestError as error:

@@ -18,7 +18,7 @@ from alula.campaign.failures import ways_to_fail
 from alula.campaign.mocked_scenarios import load_mocked_scenario
 from alula.campaign.plan import MOCKS, Campaign, load_campaign
 from alula.campaign.proved import proved
-from alula.campaign.running import options_of, run
+from alula.campaign.running import check_live_faults, offer_of, options_of, run
 from alula.campaign.table import ROWS, Row, Table
 from alula.campaign.telling import as_page, as_text
 from alula.cli.table import parse
@@ -30,15 +30,18 @@ from alula.common.scenarios import ScenarioError, load_scenario, scenario_names
 from alula.records.causes.fault_file import effects_of_robot
 from alula.records.errors import AnalysisError
 from alula.records.models import robot_skillsets
+from alula.runtime.live.options import RunOffer
 
 DONE, TROUBLE, CANNOT_START = 0, 1, 2
 SHOW_EVERY_S = 1.0
 
 
-def check_faults(campaign: Campaign) -> None:
-    """Refuse faults that the mocks of a scenario don't have, and a robot's file of faults that is wrong; raises AnalysisError."""
+def check_faults(campaign: Campaign, offer: RunOffer) -> None:
+    """Refuse faults that the runs of a scenario can't have, and a robot's file of faults that is wrong; raises AnalysisError."""
     effects_of_robot()
-    if campaign.over == MOCKS:
+    if campaign.over != MOCKS:
+        check_live_faults(campaign, offer)
+    else:
         scenarios = {name: load_mocked_scenario(name, campaign.behaviour) for name in campaign.scenarios}
         for planned in campaign.runs:
             scenarios[planned.scenario].check(planned.requests)
@@ -98,8 +101,9 @@ def main(arguments: Sequence[str] | None = None) -> int:
     out = given.out or runs_folder() / f"campaign-{given.file.stem}"
     try:
         campaign = load_campaign(given.file)
-        check_faults(campaign)
-        options = options_of(campaign)
+        offer = offer_of(campaign)
+        check_faults(campaign, offer)
+        options = options_of(campaign, offer)
         table = Table(out, campaign)
         if table.rows:
             sys.stderr.write(f"{len(table.rows)} of {len(campaign.runs)} runs are in {out / ROWS}\n")

@@ -31,8 +31,6 @@ ENTRY = re.compile(r"[A-Za-z_]\w*")
 BRACES = re.compile(r"\s*\$?\{\s*(.*?)\s*\}\s*")
 NUMBER = re.compile(r"\s*[-+]?\d+(?:\.\d*)?\s*")
 WORDS = frozenset({"true", "false"})
-_PLUS = "_plus"
-"""Marks what was a SubTreePlus, until it is converted."""
 
 
 def modernised(document: Document) -> Document:
@@ -60,9 +58,10 @@ def convert(document: Document) -> list[Problem]:
     document.root.set(DECLARED, FORMAT)
     for top in document.root.children:
         for element in list(top.iterate()):
+            was = element.tag
             _rename(element)
             if top.tag == "BehaviorTree":
-                _convert(element, decisions.append)
+                _convert(element, was, decisions.append)
     return decisions
 
 
@@ -108,7 +107,6 @@ def _rename(element: Element) -> None:
     if name is not None:
         if name == "SubTree":
             _set_name(element, OLD_AUTOREMAP, AUTOREMAP)
-            element.attributes[_PLUS] = Attribute(_PLUS, "", element.place)
         _retag(element, name)
     elif element.tag in CATEGORIES and element.get("ID") in TAGS:
         element.set("ID", TAGS[element.get("ID")])
@@ -125,9 +123,10 @@ def _set_name(element: Element, old: str, new: str) -> None:
     element.attributes = {one.name: one for one in attributes}
 
 
-def _convert(element: Element, decide: Callable[[Problem], object]) -> None:
+def _convert(element: Element, was: str, decide: Callable[[Problem], object]) -> None:
+    """Convert what a node says; ``was``: the name of its type in format 3."""
     if element.tag == "SubTree":
-        _convert_subtree(element, decide)
+        _convert_subtree(element, [] if was != "SubTree" else _remappings(element), decide)
     elif _kind(element) == "Parallel":
         for old, new in THRESHOLDS.items():
             _set_name(element, old, new)
@@ -135,9 +134,8 @@ def _convert(element: Element, decide: Callable[[Problem], object]) -> None:
         _convert_check(element, decide)
 
 
-def _convert_subtree(element: Element, decide: Callable[[Problem], object]) -> None:
-    is_plus = element.attributes.pop(_PLUS, None) is not None
-    remappings = [] if is_plus else _remappings(element)
+def _convert_subtree(element: Element, remappings: list[Attribute], decide: Callable[[Problem], object]) -> None:
+    """Convert a subtree; ``remappings``: its attributes that name entries without braces, as those of a SubTreePlus don't."""
     for remap in [child for child in element.children if child.tag == "remap"]:
         element.content.remove(remap)
         element.set(remap.get("internal"), f"{{{remap.get('external')}}}")

@@ -12,7 +12,8 @@ from campaign_mocks import fly_recorded
 
 from alula.campaign.plan import SIMULATOR, PlannedRun, load_campaign
 from alula.campaign.rows import rows_of
-from alula.campaign.running import options_of
+from alula.campaign.running import offer_of
+from alula.cli.campaign import check_faults
 from alula.common.record import FILE, MISSION, RecordWriter
 from alula.common.scenarios import load_scenario
 from alula.records.errors import AnalysisError
@@ -108,11 +109,13 @@ def test_the_campaigns_of_thirty_flights_try_everything_that_can_fail_in_the_sim
 def test_a_fault_that_a_flight_can_not_have_is_refused_before_the_first_one(fault, words, tmp_path):
     file = tmp_path / "c.yaml"
     file.write_text(f"over: simulator\nscenarios: [mapping]\nfaults: [[zed@3], ['{fault}']]\n", encoding="utf-8")
+    campaign = load_campaign(file)
     with pytest.raises(AnalysisError) as refused:
-        options_of(load_campaign(file))
+        check_faults(campaign, offer_of(campaign))
     assert str(refused.value).startswith(words)
 
 
 @pytest.mark.parametrize("name", ["uav-simulator.yaml", "uav-simulator-short.yaml"])
 def test_flights_of_the_drones_campaigns_can_have_all_their_faults(name):
-    assert isinstance(options_of(load_campaign(CAMPAIGNS / name)), tuple)
+    campaign = load_campaign(CAMPAIGNS / name)
+    check_faults(campaign, offer_of(campaign))

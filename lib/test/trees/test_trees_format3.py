@@ -34,6 +34,9 @@ OLD = """<?xml version="1.0"?>
   <BehaviorTree ID="Leg">
     <BlackboardCheckString value_A="{target}" value_B="sea" return_on_mismatch="SUCCESS"><AlwaysFailure/></BlackboardCheckString>
   </BehaviorTree>
+  <TreeNodesModel>
+    <SubTreePlus ID="Leg"><input_port name="target"/></SubTreePlus>
+  </TreeNodesModel>
 </root>
 """
 NEW = """<?xml version="1.0"?>
@@ -58,6 +61,9 @@ NEW = """<?xml version="1.0"?>
   <BehaviorTree ID="Leg">
     <ReactiveFallback><Inverter><ScriptCondition code="target == 'sea'"/></Inverter><AlwaysFailure/></ReactiveFallback>
   </BehaviorTree>
+  <TreeNodesModel>
+    <SubTree ID="Leg"><input_port name="target"/></SubTree>
+  </TreeNodesModel>
 </root>
 """
 
