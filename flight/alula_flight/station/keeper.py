@@ -287,16 +287,17 @@ def main(arguments: Sequence[str]) -> int:
             sys.stderr.write(f"alula up: {deployment.name} is kept up by another process already; alula status {deployment.name}\n")
             return CANT_RUN
         states.note_holder(lock, f"the keeper of {deployment.name}")
+        front = psutil.Process(given.until) if given.until else None  # knows its process by its start, too: ids are used again
         claim = claim_domain([deployment.domain], deployment.namespace) if deployment.domain in DOMAINS else None
         keeper = Keeper(robot, deployment, places)
-    except (AlulaError, NoFreeDomainError, OSError) as error:
+    except (AlulaError, NoFreeDomainError, OSError, psutil.Error) as error:
         sys.stderr.write(f"alula up: {error}\n")
         return CANT_RUN
     for number in (signal.SIGINT, signal.SIGTERM):
         signal.signal(number, lambda *_: stop.set())
     signal.signal(signal.SIGHUP, lambda *_: setattr(keeper, "hung_up", True))
     notify("READY=1")
-    while not stop.is_set() and (not given.until or psutil.pid_exists(given.until)):
+    while not stop.is_set() and (front is None or front.is_running()):
         keeper.turn()
         notify("WATCHDOG=1")
         stop.wait(LOOK_S)
