@@ -139,14 +139,18 @@ def test_its_hooks_work_over_faked_functions(ready: Path) -> None:
 LAYER = """<launch>
   <include file="$(find rover_navigation)/launch/functional.launch">
     <arg name="world" value="$(env ALULA_ROBOT)/worlds/office.yaml"/>
-    <arg name="rate" value="4"/>
+    <arg name="rate" value="1"/>
   </include>
   <node pkg="skillset_ros1" type="in_ros2" name="base" args="python -m rover_robot.serve base --ros-args -p use_sim_time:=true"/>
   <node pkg="skillset_ros1" type="in_ros2" name="ros_bridge"
         args="python -m ros_bridge --config $(env ALULA_ROBOT_STATE)/generated/rover_bridge.yaml"/>
 </launch>
 """
-"""The functional layer, the bridge, and the managers of one skillset: no mission."""
+"""The functional layer, the bridge, and the managers of one skillset: no mission.
+
+Simulated time waits for no managers here, as a vehicle's does not: at a rate of 4 a machine that was busy for a second had the managers
+lose the navigation, which may be silent for 4 s of mission clock.
+"""
 
 
 @pytest.mark.flight
@@ -172,7 +176,7 @@ def test_stock_clients_drive_it_by_its_navigation_and_by_its_skills(ready: Path,
         finally:
             end_process(layer, timeout_s=60.0)
             domain.release()
-    assert (by_skills["driven"], by_skills["stopped"]) == (["TERMINATED", "ARRIVED"], "INTERRUPTED")
+    assert (by_skills["driven"], by_skills["stopped"]) == (["TERMINATED", "ARRIVED", ""], "INTERRUPTED")
     assert (by_navigation["state"], by_navigation["text"]) == (3, "arrived")  # actionlib's SUCCEEDED
     assert by_skills["heard"]
     assert by_navigation["heard"]

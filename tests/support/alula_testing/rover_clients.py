@@ -67,7 +67,7 @@ def skills() -> dict[str, Any]:
         rclpy.spin_once(node, timeout_sec=0.1)
     awaited(handle.cancel_goal_async())
     stopped = awaited(handle.get_result_async()).result
-    return {"driven": [driven.outcome, driven.result], "heard": len(heard), "stopped": stopped.outcome}
+    return {"driven": [driven.outcome, driven.result, driven.message], "heard": len(heard), "stopped": stopped.outcome}
 
 
 if __name__ == "__main__":
