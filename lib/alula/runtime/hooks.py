@@ -30,6 +30,7 @@ def is_written(hooks: SkillHooks, name: str) -> bool:
 class SkillHooks:
     """Base of all hooks; every method may be overridden, ``on_dispatch`` should be.
 
+    ``on_start`` is called once, when the managers start; no request is taken before it has returned.
     Order of calls for one execution: ``validate``, ``on_dispatch``, any number of ``progress``, ``on_pause`` and ``on_resume``, then
     at most one of ``on_interrupt``, ``on_violation``, ``on_failure``. The last never overtakes ``on_dispatch``, ``on_pause`` or
     ``on_resume``, and none of them is called after ``execution.terminate`` was accepted. ``on_emergency`` may come while any of
@@ -44,6 +45,14 @@ class SkillHooks:
     def make_inputs(self, values: Mapping[str, object]) -> object:
         """Make what ``validate`` gets and ``execution.inputs`` holds from the values by name."""
         return SimpleNamespace(**values) if self.inputs_type is None else self.inputs_type(**values)
+
+    @unwritten
+    def on_start(self) -> None:
+        """Stop what managers that were here before have started, or find out that nothing runs; may wait a bounded time.
+
+        Called once, when the managers start: they know of no execution then, also where their process was killed while functions ran.
+        Where it raises, or does not return in time, the skill refuses all requests and says why.
+        """
 
     @unwritten
     def validate(self, inputs: object) -> str:  # noqa: ARG002

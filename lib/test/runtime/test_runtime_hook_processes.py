@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import threading
 from multiprocessing.connection import Client
 
 import pytest
@@ -134,4 +135,41 @@ def test_a_process_that_sends_what_is_no_message_is_given_up_and_another_one_ser
     finally:
         pipe.close()
     rig.serve()
+    assert rig.ended().state is S.TERMINATED
+
+
+class Stopping(Film):
+    """Is held in ``on_start`` until the test lets go."""
+
+    def __init__(self) -> None:
+        super().__init__()
+        self.started, self.go = threading.Event(), threading.Event()
+
+    def on_start(self) -> None:
+        self.started.set()
+        self.go.wait()
+
+
+def test_a_process_that_was_started_again_stops_what_ran_before_it_takes_requests(rig):
+    rig.serve()
+    assert rig.ended().state is S.TERMINATED
+    rig.server.close("its process ends", 10.0)
+    until(lambda: rig.remote.wait(0.0) == ["film"], "it is gone")
+    rig.film = Stopping()
+    rig.serve()
+    assert rig.film.started.wait(60.0)
+    refused = rig.ended()
+    assert (refused.state, refused.message) == (S.NOT_VALIDATED, "what ran before has yet to be stopped: film")
+    rig.film.go.set()
+    until(lambda: rig.engine.why("film").ready, "it is ready")
+    assert rig.ended().state is S.TERMINATED
+
+
+def test_a_skill_whose_process_was_gone_when_the_managers_started_is_ready_when_it_comes(rig):
+    begun = []
+    rig.engine.start(rig.engine.skills_to_start, lambda job: job(), lambda: begun.append(True))
+    assert begun == [True]
+    assert "its process has ended" in rig.engine.why("film").reason
+    rig.serve()
+    until(lambda: rig.engine.why("film").ready, "it is ready")
     assert rig.ended().state is S.TERMINATED

@@ -18,7 +18,7 @@ from __future__ import annotations
 import functools
 import logging
 import threading
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Mapping, Sequence
 
 from alula.model import semantics
 from alula.model.errors import UnsupportedModelError
@@ -112,9 +112,62 @@ class SkillsetEngine:
         self._interrupt_timeout_s = interrupt_timeout_s
         self._hook_timeout_s = hook_timeout_s
         self._closed = ""
+        self._starting: set[str] = set()
+        """Skills whose ``on_start`` has not returned."""
+        self._begun = False
+        """Whether all have once returned: until then no skill takes a request, afterwards only those that start anew do not."""
+        self._unstarted: dict[str, str] = {}
+        """Why skills whose ``on_start`` went wrong take no requests."""
         self._lock = threading.Lock()
         self._outbox = Outbox(listener, on_error)
         self._context = SkillsetContext(skillset, clock_ns, self._outbox.put)
+
+    # --- the start: what managers that were here before have left running ---------------------------------------------------
+
+    @property
+    def skills_to_start(self) -> tuple[str, ...]:
+        """Return the skills whose ``on_start`` does anything."""
+        return tuple(skill.name for skill in self.skillset.skills if self._hooks.written(skill.name, "on_start"))
+
+    def start(self, skills: Sequence[str], submit: Submit, then: Job) -> None:
+        """Call the ``on_start`` of these skills by ``submit``, all beside each other; ``then`` is called once, when all have returned.
+
+        At the first time, no skill takes a request meanwhile: functions that are yet to be stopped may hold any resource. Later, when the
+        process of one skill was started again, the others go on.
+        """
+        left = set(skills)
+        with self._lock:
+            self._starting |= left
+            self._begun |= not left
+
+        def started(name: str, answer: HookOutcome) -> None:
+            with self._lock:
+                self._unstarted.pop(name, None)
+                if answer.error:
+                    self._unstarted[name] = f"{name} could not stop what ran of it before: {answer.error}; start the managers again"
+                self._starting.discard(name)
+                left.discard(name)
+                last = not left
+                self._begun |= last
+            if last:
+                then()
+
+        def call(name: str) -> None:
+            if self._hooks.written(name, "on_start"):
+                self._call(Entry(Execution(self, "", name, None), Running("", name)), "on_start", functools.partial(started, name))
+            else:
+                started(name, HookOutcome())
+
+        for name in skills:
+            submit(functools.partial(call, name))
+        if not skills:
+            then()
+
+    def _refusal(self, skill: str) -> str:
+        """Return why no request for a skill is taken now, or ""; called with the lock held."""
+        awaited = self._starting & {skill} if self._begun else self._starting
+        starting = f"what ran before has yet to be stopped: {', '.join(sorted(awaited))}" if awaited else ""
+        return self._closed or starting or self._unstarted.get(skill, "")
 
     # --- requests: validated, started in one step, dispatched (paper, Figure 5) --------------------------------------------
 
@@ -140,8 +193,8 @@ class SkillsetEngine:
             if execution_id in self._context.entries:
                 raise SkillRuntimeError(f"skill {skill}: the execution id {execution_id} is in use")
             entry = self._context.add(Execution(self, execution_id, skill, inputs))
-            if self._closed:
-                self._context.end_request(entry, ExecutionState.NOT_VALIDATED, self._closed)
+            if refusal := self._refusal(skill):
+                self._context.end_request(entry, ExecutionState.NOT_VALIDATED, refusal)
         self._outbox.deliver()
         return entry.execution
 
@@ -569,7 +622,7 @@ class SkillsetEngine:
         with self._lock:
             found = unmet(self.skillset, self._context.situation, model)
             history = self._context.records.history(resources_of(model))
-            reason = sentence(found, refusal, self._closed)
+            reason = sentence(found, refusal, self._refusal(skill))
         return Why(skill, not reason, reason, refusal, found, history)
 
 

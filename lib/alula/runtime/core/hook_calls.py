@@ -50,7 +50,7 @@ class LocalHooks:
         self._hooks = dict(hooks)
 
     def call(self, execution: Execution, hook: str, then: Then) -> None:
-        """Call a hook; ``validate`` gets the inputs, every other the execution."""
+        """Call a hook; ``validate`` gets the inputs, ``on_start`` nothing, every other the execution."""
         then(call_hook(self._hooks[execution.skill], execution, hook))
 
     def written(self, skill: str, hook: str) -> bool:
@@ -61,13 +61,23 @@ class LocalHooks:
 def call_hook(hooks: SkillHooks, execution: Execution, hook: str) -> HookOutcome:
     """Call one hook and return the outcome."""
     try:
-        value = getattr(hooks, hook)(execution.inputs if hook == "validate" else execution)
+        value = getattr(hooks, hook)(*_arguments(execution, hook))
     except BaseException as error:  # noqa: BLE001 - whatever a hook raises, also SystemExit, ends its execution only
         return HookOutcome(error=error_line(error), trace=as_text(_trace(error)))
     try:
         return HookOutcome(fitted_return(hook, value))
     except ValueError as error:
         return HookOutcome(wrong=str(error))
+
+
+def _arguments(execution: Execution, hook: str) -> tuple[object, ...]:
+    match hook:
+        case "on_start":
+            return ()
+        case "validate":
+            return (execution.inputs,)
+        case _:
+            return (execution,)
 
 
 def _trace(error: BaseException) -> str:

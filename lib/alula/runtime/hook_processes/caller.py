@@ -115,17 +115,32 @@ class RemoteHooks:
             pipe.close()
             return
         process = _SkillProcess(pipe, frozenset(written), self._ask)
+        if self._engine is None:
+            self._take(skill, process)
+        else:
+            self._restart(self._engine, skill, process)
+        why = process.read()
+        with self._changed:
+            if self._processes.get(skill) is process:
+                del self._processes[skill]
+        self._lost(skill, process, why)
+
+    def _restart(self, engine: SkillsetEngine, skill: str, process: _SkillProcess) -> None:
+        """Take another process of a skill, which stops first what the one before has left running."""
+
+        def take(call: Callable[[], None]) -> None:
+            self._take(skill, process)
+            call()
+
+        engine.start([skill], take, lambda: None)
+
+    def _take(self, skill: str, process: _SkillProcess) -> None:
         with self._changed:
             before = self._processes.get(skill)
             self._processes[skill] = process
             self._changed.notify_all()
         if before is not None:
             before.close()
-        why = process.read()
-        with self._changed:
-            if self._processes.get(skill) is process:
-                del self._processes[skill]
-        self._lost(skill, process, why)
 
     def _lost(self, skill: str, process: _SkillProcess, why: str) -> None:
         gone = f"the manager of {skill} has gone: {why}"

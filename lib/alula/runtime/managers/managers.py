@@ -20,6 +20,7 @@ from alula.runtime.managers.skill import SkillManager
 from alula.runtime.middleware import EVENTS, Middleware, PublishedEvent
 
 FLUSH_S = 1.0
+UNKNOWN_YET = "not known: the managers have just started, and what ran before has yet to be stopped"
 HOOKS_RETURN_S = 5.0
 """How long (wall clock) the end of the managers waits for hooks that have not returned."""
 MakeInputs = Callable[[str, Mapping[str, object]], object]
@@ -64,6 +65,7 @@ class Managers:
         self.skillset = skillset
         self.middleware = middleware
         self.instance_id = uuid.uuid4().hex[:12]
+        self._closed = False
         self.on_step: list[Listener] = []
         """Called at each step, within it, before it is published."""
         make = make_inputs or _maker(hooks)
@@ -88,11 +90,24 @@ class Managers:
         self.resources.serve()
         servers = {name: manager.serve() for name, manager in self.skills.items()}
         SkillsetServices(middleware, self.engine, servers, make)
-        # The heartbeat comes last: a client that hears it finds everything there.
-        middleware.announce(self.instance_id, on_rival or self._on_rival)
+        self._announce: Callable[[], None] = lambda: middleware.announce(self.instance_id, on_rival or self._on_rival)
+        self._start()
+
+    def _start(self) -> None:
+        """Announce the managers once what ran before has been stopped: a client that hears the heartbeat finds everything there."""
+        skills = self.engine.skills_to_start
+        if skills:
+            self.resources.doubt(UNKNOWN_YET)
+        self.engine.start(skills, self.middleware.defer, (lambda: self.middleware.submit(self._started)) if skills else self._announce)
+
+    def _started(self) -> None:
+        self.resources.doubt("")
+        if not self._closed:
+            self._announce()
 
     def close(self, reason: str) -> None:
         """Fail whatever runs for this reason, so that functions are stopped, and take no more requests."""
+        self._closed = True
         self.engine.close(reason)
         if not self.middleware.close_hooks(HOOKS_RETURN_S):
             self.middleware.log(f"a hook has not returned within {HOOKS_RETURN_S:g} s; its thread is abandoned")

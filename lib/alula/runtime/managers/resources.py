@@ -65,6 +65,14 @@ class ResourceManager:
             self._note(resource, to, as_text(reason))
         return reply
 
+    def doubt(self, reason: str) -> None:
+        """Give all resources that only skills set a reason for doubting their states; "": there is none any more."""
+        owned = [one.name for one in self._engine.skillset.resources if not any(arrow.extern for arrow in one.transitions)]
+        with self._lock:
+            self._latest |= {name: replace(self._latest[name], reason=reason) for name in owned}
+            if owned:
+                self._publish(self._middleware.now_ns())
+
     def _note(self, resource: str, state: str, reason: str) -> None:
         """Publish another reason for the state that a resource is in."""
         with self._lock:

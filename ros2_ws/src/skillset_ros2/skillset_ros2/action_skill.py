@@ -7,6 +7,7 @@ from dataclasses import dataclass
 from typing import Any, ClassVar
 
 from action_msgs.msg import GoalStatus
+from action_msgs.srv import CancelGoal
 
 from alula.runtime.core.execution import Execution
 from alula.runtime.core.sanitize import error_line
@@ -76,6 +77,11 @@ class ActionSkill(FunctionSkill[Goal]):
         return Ending(self.results[status], said_by(answer))
 
     # --- hooks --------------------------------------------------------------------------------------------------------
+
+    def on_start(self) -> None:
+        """Cancel all goals of the server: those of managers that were here before run on."""
+        if self.server:
+            self.call_at_start(CancelGoal, f"{self.server}/_action/cancel_goal", CancelGoal.Request())
 
     def on_dispatch(self, execution: Execution) -> None:
         """Send the goal, as soon as the server is there."""

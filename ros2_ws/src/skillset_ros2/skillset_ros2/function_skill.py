@@ -15,6 +15,8 @@ from skillset_ros2.convert import fields_of, fill
 from skillset_ros2.watch import Watch
 
 _TERMINATED = "terminated_"
+FOUND_S = 1.0
+"""Wall clock; so long a server that runs may take to be found when the managers start."""
 
 
 @dataclass(frozen=True)
@@ -62,6 +64,22 @@ class FunctionSkill(SkillHooks, Generic[CallT]):
         self._calls: dict[str, CallT] = {}
         _check_results(type(self))
         watch.every(self._look)
+
+    def call_at_start(self, kind: Any, server: str, request: Any) -> None:
+        """Call a service that stops what runs, and wait for its answer, wall clock; where it is not there nothing runs.
+
+        Raises:
+            SkillRuntimeError: it does not answer.
+        """
+        client = self.watch.node.create_client(kind, server)
+        try:
+            if client.wait_for_service(timeout_sec=FOUND_S):
+                answered = threading.Event()
+                client.call_async(request).add_done_callback(lambda _: answered.set())
+                if not answered.wait(self.answer_s):
+                    raise SkillRuntimeError(f"{server} does not answer for {self.answer_s:g} s")
+        finally:
+            self.watch.node.destroy_client(client)
 
     def server_for(self, inputs: Any) -> str:  # noqa: ARG002
         """Return the server for these inputs."""

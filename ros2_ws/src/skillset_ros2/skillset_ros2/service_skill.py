@@ -53,6 +53,11 @@ class ServiceSkill(FunctionSkill[ServiceCall]):
         """Return how this response ends the execution."""
         return Ending(self.results[response.success], said_by(response))
 
+    def on_start(self) -> None:
+        """Call the service that stops what was started before."""
+        if self.stop_server:
+            self.call_at_start(self.stop_service, self.stop_server, self.stop_request())
+
     def on_dispatch(self, execution: Execution) -> None:
         """Call the service, as soon as it is there."""
         server, request = self.server_for(execution.inputs), self.request(execution.inputs)

@@ -24,7 +24,7 @@ from std_srvs.srv import SetBool, Trigger  # noqa: E402
 from alula.model.execution_state import ExecutionState  # noqa: E402
 from alula.runtime.core.errors import SkillRuntimeError  # noqa: E402
 from alula_testing.navigation import FLYING  # noqa: E402
-from skillset_ros2 import ActionSkill, Ending, ServiceSkill, SkillsetClient, SkillsetNode, Watch  # noqa: E402
+from skillset_ros2 import ActionClient, ActionSkill, Ending, ServiceSkill, SkillsetClient, SkillsetNode, Watch  # noqa: E402
 
 S = ExecutionState
 Fly = navigation_actions.GotoStraight
@@ -305,6 +305,28 @@ def test_an_answer_ends_it_by_the_table_and_an_interruption_calls_the_stop(spinn
     assert rig.ended(late) == (S.TERMINATED, "ABORTED", "ask does not answer for 1 s")
     asked.answers[2]("late")
     asked.answers[3]("late")
+
+
+# --- managers that start where others have left something running ---------------------------------------------------------
+
+
+def test_managers_that_start_cancel_what_ran_before_and_are_there_then(spinning, flying):
+    before = ActionClient(spinning.spin(Node(f"before_{next(NUMBERS)}")), Fly, "fly")
+    assert before.wait_for_server(SOON_S)
+    before.send_goal_async(Fly.Goal())
+    goal = flying.goal()
+    rig = Rig(spinning, Quiet)
+    assert flying.cancels == 1
+    goal.end(("canceled", ""))
+    handle = rig.start()
+    flying.goal(1).end(("succeed", ""))
+    assert rig.ended(handle)[:2] == (S.TERMINATED, "ARRIVED")
+
+
+def test_managers_that_start_call_the_stop_of_a_service(spinning):
+    asked = AskServer(spinning)
+    Rig(spinning, Ask)
+    assert asked.stops == 1
 
 
 # --- what is wrong in the class -------------------------------------------------------------------------------------------
