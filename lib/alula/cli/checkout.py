@@ -17,12 +17,14 @@ from pathlib import Path
 from typing import Any, NoReturn
 
 from alula.cli.parser import WRONG
-from alula.cli.table import Command, Needs
+from alula.cli.table import Command, Needs, parse
 from alula.common.suggestions import nearest
 
 ROOT, STATE, ROBOT = "ALULA_ROOT", "ALULA_STATE", "ALULA_ROBOT"
 """Variables: the checkout, which its entry script names; what its set-up made; the robot's folder, empty where there is none."""
 FILE = "setup/commands.toml"
+BUILT = "ros2"
+"""The last step of the set-up."""
 
 
 class SetupError(Exception):
@@ -149,8 +151,20 @@ class Checkout:
             self._run("robot.sh")
         return 0
 
-    def _doctor(self, words: Sequence[str]) -> NoReturn:
-        self._exec("setup/doctor.sh", *words)
+    def _doctor(self, words: Sequence[str]) -> int:
+        """Look at the installation, or at a deployment: it builds nothing, as it is asked what is wrong."""
+        given = parse("doctor", words)
+        if given.deployment is None and not given.json:
+            self._exec("setup/doctor.sh")
+        if given.deployment is None:
+            why = "--json is of a deployment; name one: alula doctor DEPLOYMENT --json"
+        elif not os.environ.get(ROBOT):
+            why = "a deployment is a robot's; go into its folder, or name it with --robot DIR"
+        elif not self.has(BUILT):
+            why = "nothing is built here yet; first: alula setup"
+        else:
+            self.become(self.handlers["doctor"].world, self.handlers["doctor"].module, *words)
+        return _refuse("doctor", why)
 
     def _test(self, words: Sequence[str]) -> NoReturn:
         self.make_build()
@@ -165,9 +179,9 @@ class Checkout:
             sys.stdout.write(f"usage: alula bench [{'|'.join(self.benches)}] [its options; -h lists them]\n")
             return 0
         if name.startswith("-"):
-            return _refuse(f"options belong to one bench: alula bench {'|'.join(self.benches)} {' '.join(words)}")
+            return _refuse("bench", f"options belong to one bench: alula bench {'|'.join(self.benches)} {' '.join(words)}")
         if name and name not in self.benches:
-            return _refuse(f"there is no bench '{name}'; {nearest(name, self.benches) or f'there are {known}'}")
+            return _refuse("bench", f"there is no bench '{name}'; {nearest(name, self.benches) or f'there are {known}'}")
         os.environ[ROBOT] = str(self.root)  # they measure the robot of the checkout
         self.make_build()
         if name:
@@ -198,6 +212,6 @@ def _handler(said: Mapping[str, Any]) -> Handler:
     return Handler(**{**said, "words": tuple(said.get("words", ()))})
 
 
-def _refuse(why: str) -> int:
-    sys.stderr.write(f"alula bench: {why}\n")
+def _refuse(command: str, why: str) -> int:
+    sys.stderr.write(f"alula {command}: {why}\n")
     return WRONG

@@ -92,7 +92,12 @@ GROUPS: dict[str, Sequence[Command]] = {
         Command("setup", "install and build everything that is missing: Alula, then the robot's own part", None, needs=Needs.NOTHING),
         _models("new", "make a robot, a working repository: model, types, hooks, mission, tests", models.new),
         Command("test", "run the robot's tests, in Alula's checkout its own: [--quick] [pytest arguments]", None, robot=True, open=True),
-        Command("doctor", "say what is installed, what is missing, and how to install it", None, needs=Needs.NOTHING),
+        Command(
+            "doctor",
+            "say what is missing of the installation, or wrong with a deployment, and how to mend it",
+            live.doctor,
+            needs=Needs.NOTHING,
+        ),
     ),
     "Missions": (
         _run("run", "run a mission live, in a ROS graph of its own; with --mock over mocks, in a second"),

@@ -106,6 +106,13 @@ def status(parser: ArgumentParser) -> None:
     parser.add_argument("--json", action="store_true", help="print a JSON object")
 
 
+def doctor(parser: ArgumentParser) -> None:
+    """Add what ``alula doctor`` takes."""
+    words = "look at this one on what runs, instead of at the installation: names, master, nodes, bindings, ROS 2, clocks, disk"
+    completed_by(parser.add_argument("deployment", nargs="?", metavar="DEPLOYMENT", help=words), "deployments")
+    parser.add_argument("--json", action="store_true", help="of a deployment: print a JSON object")
+
+
 def service(parser: ArgumentParser) -> None:
     """Add what ``alula service`` takes."""
     words = parser.add_argument("words", nargs="+", metavar="[install|remove] DEPLOYMENT", help="what is done, and with which deployment")
