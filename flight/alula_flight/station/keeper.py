@@ -27,7 +27,7 @@ import psutil
 
 from alula.common.deployments import Deployment, load_deployment
 from alula.common.errors import AlulaError
-from alula.common.files import write_text
+from alula.common.files import write_json, write_text
 from alula.common.network import DOMAINS, NoFreeDomainError, claim_domain
 from alula.common.processes import end_run
 from alula.common.robots import RobotFolder, find_robot
@@ -46,6 +46,7 @@ LOG_BYTES = 20_000_000
 END_S = ((signal.SIGINT, 15.0), (signal.SIGTERM, 3.0), (signal.SIGKILL, 5.0))
 """How a part is told to end, and how long it may take (wall clock)."""
 CANT_RUN = 2
+RUN = "run.json"
 GRAPH = (
     "ROS_MASTER_URI",
     "ROS_IP",
@@ -215,14 +216,27 @@ class Keeper:
     def end(self) -> None:
         """End all parts."""
         end_all(self._state)
+        (self._places.folder / RUN).unlink(missing_ok=True)
         self._state.keeper = 0
         self._state.save(self._places.folder)
+
+    def _as_a_run(self) -> dict[str, object]:
+        """Return what finds the skillsets here as those of a run: a run without a scenario, as long as the deployment is up."""
+        return {
+            "scenario": "",
+            "deployment": self._deployment.name,
+            "domain": self._deployment.domain,
+            "namespace": self._deployment.namespace,
+            "run_id": self._state.run_id,
+            "robot": str(self._robot.root),
+        }
 
     def _read(self) -> None:
         """Take the parts as the deployment has them; what it has no more is ended."""
         deployment, folder = self._deployment, self._places.folder
         profile = (self._places.root / "bridge" / PROFILE).read_text(encoding="utf-8")
         write_text(folder / PROFILE, network_profile(deployment, profile))
+        write_json(folder / RUN, self._as_a_run())
         parts = {part.name: part for part in parts_of(deployment, self._places, self._state.run_id, os.environ)}
         for name in [name for name in self._state.parts if name not in parts]:
             process = self._state.parts.pop(name).process

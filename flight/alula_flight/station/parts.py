@@ -12,6 +12,7 @@ from pathlib import Path
 from alula.common.deployments import Deployment, DeploymentError, Discovery, PageUsers
 from alula.common.processes import NAMESPACE_VARIABLE, RUN_ID_VARIABLE
 from alula.common.robots import RobotFolder
+from alula.common.runs import up_folder
 
 DEPLOYMENT_VARIABLE = "ALULA_DEPLOYMENT"
 """In the environment of a deployment's parts: its name, which ``alula run`` takes where none is given; so the page's missions fly on it."""
@@ -70,7 +71,7 @@ def places_of(deployment: Deployment, robot: RobotFolder) -> Places:
     """Return where its files lie, by what the entry script has said of the installation."""
     root = Path(os.environ["ALULA_ROOT"])
     state = Path(os.environ.get("ALULA_ROBOT_STATE") or robot.root / ".alula")
-    return Places(root, state, state / "up" / deployment.name)
+    return Places(root, state, up_folder() / deployment.name)
 
 
 def environment_of(deployment: Deployment, places: Places, caller: Mapping[str, str]) -> dict[str, str]:

@@ -3,11 +3,13 @@
 from __future__ import annotations
 
 import json
+import os
 from dataclasses import dataclass
 from pathlib import Path
 
+from alula.common.deployments import load_deployment
 from alula.common.errors import AlulaError
-from alula.common.network import is_claimed
+from alula.common.network import DOMAINS, is_claimed
 from alula.common.processes import processes_of_run
 from alula.common.robots import FILE as ROBOT_FILE
 from alula.common.robots import RobotError, RobotFolder, find_robot, load_robot_folder
@@ -30,8 +32,12 @@ class Run:
 
     @property
     def live(self) -> bool:
-        """Tell whether the domain is held, and by this run: domains are used again, and what is sent there reaches the run that has it."""
-        return is_claimed(self.domain) and (not self.run_id or bool(processes_of_run(self.run_id)))
+        """Tell whether the domain is held, and by this run: domains are used again, and what is sent there reaches the run that has it.
+
+        A domain that no run is given by itself, which a deployment may have, can't be held.
+        """
+        held = is_claimed(self.domain) if self.domain in DOMAINS else bool(self.run_id)
+        return held and (not self.run_id or bool(processes_of_run(self.run_id)))
 
 
 def runs_folder() -> Path:
@@ -40,6 +46,28 @@ def runs_folder() -> Path:
         return find_robot().runs
     except RobotError:
         return Path("runs")
+
+
+def up_folder() -> Path:
+    """Return where each deployment of the robot that is up has a folder, with a ``run.json`` as a run has; raises RobotError."""
+    return Path(os.environ.get("ALULA_ROBOT_STATE") or find_robot().root / ".alula") / "up"
+
+
+def deployments_up() -> list[Run]:
+    """Return the robot's deployments that are up on this computer; none where there is no robot."""
+    try:
+        return live_runs(up_folder())
+    except RobotError:
+        return []
+
+
+def find_deployment(name: str) -> Run:
+    """Return a deployment that is up, as a run is; raises DeploymentError where there is none of that name, NoRunError where it is down."""
+    load_deployment(name)
+    found = next((run for run in deployments_up() if run.folder.name == name), None)
+    if found is None:
+        raise NoRunError(f"{name} is not up on this computer: alula up {name}")
+    return found
 
 
 def robot_of(log: Path) -> RobotFolder | None:

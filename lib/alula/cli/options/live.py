@@ -5,6 +5,7 @@ from __future__ import annotations
 from argparse import ArgumentParser
 from collections.abc import Callable
 from pathlib import Path
+from typing import Any
 
 from alula.cli.options.runs import FAULT
 from alula.cli.parser import completed_by
@@ -41,8 +42,14 @@ def panel(parser: ArgumentParser) -> None:
     parser.add_argument("--namespace", default="", metavar="NS", help="show only the robot in this namespace, such as /robot1")
     place = parser.add_mutually_exclusive_group()
     place.add_argument("--run", metavar="DIR|latest", help="the run of this folder, or the newest one under way")
+    _on(place)
     place.add_argument("--domain", type=int, metavar="N", help="the skillsets in this DDS domain")
     parser.add_argument("--list", action="store_true", help="list the runs under way on this machine, and exit")
+
+
+def _on(place: Any) -> None:
+    """Add the name of a deployment that is up."""
+    completed_by(place.add_argument("--on", metavar="DEPLOYMENT", help="the skillsets of this deployment, which is up here"), "deployments")
 
 
 def mocks(parser: ArgumentParser) -> None:
@@ -75,6 +82,7 @@ def talking(*own: Callable[[ArgumentParser], None]) -> Callable[[ArgumentParser]
             one(parser)
         place = parser.add_mutually_exclusive_group()
         place.add_argument("--run", metavar="DIR|latest", help="the run of this folder, or the newest one under way")
+        _on(place)
         domain = place.add_argument("--domain", type=int, choices=DOMAINS, metavar="N", help="the skillsets in this DDS domain")
         completed_by(domain, "nothing")
         parser.add_argument("--namespace", default="", metavar="NS", help="only the robot in this namespace")

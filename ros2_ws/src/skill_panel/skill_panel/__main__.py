@@ -15,13 +15,15 @@ from pathlib import Path
 
 from alula.cli.options.live import DOMAINS
 from alula.cli.table import parser_of
-from alula.common.runs import NoRunError, Run, find_run, live_runs
+from alula.common.errors import AlulaError
+from alula.common.runs import Run, deployments_up, find_deployment, find_run, live_runs, up_folder
 from skill_panel.memory import Memory
 from skill_panel.watcher import Watcher, all_found, skillsets_in
 from skillset_ros2.session import Session
 
-LIST_S = 3.0
-"""How long (wall clock) `--list` looks into a domain that seems empty."""
+LIST_S = 10.0
+"""How long (wall clock) a domain that seems empty is looked into. What announces a new participant of DDS to the others may be lost; Fast
+DDS announces each again after three seconds, so that this is time for three more."""
 
 
 @dataclass(frozen=True)
@@ -46,10 +48,12 @@ def place_of(options: argparse.Namespace) -> Place:
     """Return where to look; raise NoRunError."""
     if options.run is not None:
         return _of_run(find_run(options.run))
+    if options.on is not None:
+        return _of_run(find_deployment(options.on))
     if options.domain is not None:
         return Place(options.domain, f"in DDS domain {options.domain}", options.namespace)
     own = os.environ.get("ROS_DOMAIN_ID", "")
-    runs = [] if own.isdigit() else live_runs()
+    runs = [] if own.isdigit() else [*live_runs(), *deployments_up()]
     if runs:
         return _of_run(runs[0])
     domain = int(own) if own.isdigit() else 0
@@ -58,6 +62,8 @@ def place_of(options: argparse.Namespace) -> Place:
 
 def _of_run(run: Run) -> Place:
     where = f"DDS domain {run.domain}, {run.namespace}" if run.namespace else f"DDS domain {run.domain}"
+    if run.folder.parent == up_folder():
+        return Place(run.domain, f"on {run.folder.name} ({where})", run.namespace)
     return Place(run.domain, f"in the run {run.folder.name} ({where})", run.namespace)
 
 
@@ -87,7 +93,7 @@ def main(arguments: Sequence[str] | None = None) -> int:
     options = parse(arguments)
     try:
         place = place_of(options)
-    except NoRunError as error:
+    except AlulaError as error:
         sys.stderr.write(f"alula panel: {error}\n")
         return 2
     if options.list:

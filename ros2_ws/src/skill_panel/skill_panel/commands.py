@@ -17,13 +17,12 @@ from typing import Any
 import yaml
 
 from alula.cli.table import parser_of
+from alula.common.errors import AlulaError
 from alula.common.record import EVENTS, FILE, RecordFollower
-from alula.common.runs import LATEST, NoRunError, find_run, load_run
+from alula.common.runs import LATEST, find_run, load_run
 from alula.common.signals import Interrupts, on_end_signal
 from alula.common.suggestions import nearest
-from alula.runtime.core.errors import SkillRuntimeError
 from alula.runtime.core.events import event_record
-from alula.runtime.waiting import NoResponseError
 from skill_panel.__main__ import LIST_S, Place, place_of
 from skill_panel.watcher import all_found, skillsets_in
 
@@ -31,6 +30,8 @@ DONE, NOT_DONE, WRONG = 0, 1, 2
 ANSWER_S = 10.0
 """Wall clock, for an answer of managers that are there."""
 LOOK_S = 0.2
+MORE_S = 3.0
+"""Wall clock, for skillsets that the graph tells of after others."""
 Clients = Mapping[str, Any]
 """The generic client of each skillset (of any middleware) by the skillset's name."""
 Out = Callable[[object, str], None]
@@ -234,7 +235,8 @@ def drive(options: argparse.Namespace, out: Out) -> int:
     session = Session("alula", domain=place.domain)
     try:
         found: list[tuple[str, str]] = []
-        problem = CommandError(f"no skillset runs {place.title}; alula run SCENARIO or alula mock starts some")
+        starts = "alula run SCENARIO, alula up DEPLOYMENT or alula mock"
+        problem = CommandError(f"no skillset was found {place.title} within {LIST_S:g} s; {starts} starts some")
         # What is not there may belong to a skillset that the graph has not told of yet.
         while more := _other_skillsets(session.node, place, found):
             found += more
@@ -255,7 +257,8 @@ def drive(options: argparse.Namespace, out: Out) -> int:
 
 def _other_skillsets(node: Any, place: Place, known: Sequence[tuple[str, str]]) -> list[tuple[str, str]]:
     """Return namespace and name of the skillsets that are not known yet, as soon as there are some and the graph tells of no more."""
-    return all_found(lambda: [one for one in skillsets_in(node, place.namespace) if one not in known], LIST_S)
+    within_s = MORE_S if known else LIST_S
+    return all_found(lambda: [one for one in skillsets_in(node, place.namespace) if one not in known], within_s)
 
 
 def _one_namespace(found: Sequence[tuple[str, str]], place: Place) -> str:
@@ -278,7 +281,7 @@ def main(arguments: Sequence[str] | None = None) -> int:
             folder = find_run(LATEST).folder if options.run in {None, LATEST} else load_run(Path(options.run)).folder
             return recorded_events(folder, options, out)
         return drive(options, out)
-    except (CommandError, NoRunError, NoResponseError, ValueError, SkillRuntimeError) as error:
+    except (CommandError, AlulaError, ValueError) as error:
         sys.stderr.write(f"alula {options.command}: {error}\n")
         return WRONG
 

@@ -12,9 +12,12 @@ import navigation_managers.model as navigation
 import perception_managers.model as perception
 import pytest
 
+from alula.common.network import claim_domain
 from alula.common.record import EVENTS, FILE, RecordWriter
+from alula.generate.scaffold.skeleton import files_of
 from alula.mock import load_behaviour, mock_world
 from skill_panel import commands
+from skill_panel.__main__ import Place, place_of
 from skill_panel.commands import COMMANDS, CommandError, main, parse
 
 
@@ -114,6 +117,46 @@ def test_all_skillsets_are_listed_however_late_the_graph_tells_of_them(
     LateGraph(monkeypatch, navigation=0.1, perception=0.6)
     assert main(["skills", "--domain", "5", "--json"]) == 0
     assert [json.loads(line)["skillset"] for line in capsys.readouterr().out.splitlines()] == ["navigation", "perception"]
+
+
+def test_a_participant_whose_first_announcement_was_lost_is_waited_for(
+    monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> None:
+    """DDS announces it again after three seconds."""
+    LateGraph(monkeypatch, navigation=3.5)
+    assert main(["skills", "--domain", "5", "--json"]) == 0
+    assert json.loads(capsys.readouterr().out)["skillset"] == "navigation"
+
+
+@pytest.fixture
+def deployed(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
+    """A robot with a deployment, lab, and the folder in which its being up would be said."""
+    for path, text in files_of("rover").items():
+        (tmp_path / path).parent.mkdir(parents=True, exist_ok=True)
+        (tmp_path / path).write_text(text, encoding="utf-8")
+    (tmp_path / "deployments/robot.yaml").rename(tmp_path / "deployments/lab.yaml")
+    monkeypatch.setenv("ALULA_ROBOT", str(tmp_path))
+    monkeypatch.setenv("ALULA_ROBOT_STATE", str(tmp_path / ".alula"))
+    monkeypatch.delenv("ROS_DOMAIN_ID", raising=False)
+    return tmp_path / ".alula/up/lab"
+
+
+def test_a_deployment_that_is_up_is_talked_to(deployed: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]) -> None:
+    assert main(["skills", "--on", "lab"]) == 2
+    assert main(["skills", "--on", "lob"]) == 2
+    assert capsys.readouterr().err.splitlines() == [
+        "alula skills: lab is not up on this computer: alula up lab",
+        f"alula skills: there is no deployment 'lob' in {deployed.parents[2] / 'deployments'}; did you mean `lab`?",
+    ]
+    claim = claim_domain()
+    deployed.mkdir(parents=True)
+    (deployed / "run.json").write_text(json.dumps({"deployment": "lab", "domain": claim.domain, "namespace": "/rover"}), encoding="utf-8")
+    place = Place(claim.domain, f"on lab (DDS domain {claim.domain}, /rover)", "/rover")
+    try:
+        assert place_of(parse(["skills", "--on", "lab"])) == place_of(parse(["skills"])) == place
+    finally:
+        claim.release()
+    assert place_of(parse(["skills"])).domain == 0, "it is down by now"
 
 
 def test_a_skill_of_a_skillset_that_the_graph_tells_of_late_is_found(
