@@ -58,12 +58,13 @@ ROOMS = {
     # What stands on it.
     "prove": "common language missions model runtime trees",
     "odds": "check common missions mock model prove records",
+    "repair": "check common language missions model odds prove records trees",
     "campaign": "common missions mock model prove records runtime trees",
     "console": "common model records report runtime",
     "editor": "check common language missions model prove trees",
     # What the public API adds, and on top of it the programs; nobody imports these.
     "api": "campaign check common language missions mock model odds prove records report runtime trees",
-    "cli": "api campaign check common console editor generate language missions mock model odds prove records report runtime trees",
+    "cli": "api campaign check common console editor generate language missions mock model odds prove records repair report runtime trees",
 }
 """The rooms of the library from below, each with those that it may import."""
 WRONG = {

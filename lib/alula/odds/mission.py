@@ -79,6 +79,11 @@ class MissionSteps:
         ended = self._system.outcome(state.state)
         return None if ended is None else OUTCOMES.get(ended)
 
+    def resource(self, state: Place, name: str) -> str | None:
+        """Return the state of ``skillset.resource``; None: the mission has nothing to do with it."""
+        known = any(one.name == name.partition(".")[0] for one in self._system.skillsets)
+        return self._system.resource(state.state, name) if known else None
+
     def steps(self, state: Place) -> Iterator[Step[Place]]:
         """Yield what can happen; nothing where the mission was aborted. Before it begins nothing fails, and it waits for all it needs."""
         if self._system.outcome(state.state) is not None:

@@ -27,8 +27,12 @@ def ignore(_line: str) -> None:
     """Take no notice."""
 
 
-def steps_of(path: Path, world: str = "", others: Figures | None = None, *, tell: Warn = ignore) -> tuple[MissionSteps, Figures]:
+def steps_of(
+    path: Path, world: str = "", others: Figures | None = None, *, tell: Warn = ignore, changed: Path | None = None
+) -> tuple[MissionSteps, Figures]:
     """Return what can happen to a mission's file of this robot, and the figures that it hangs on: the robot's, or others.
+
+    ``changed`` is another file with the same mission, changed, which is looked at with this one's inputs.
 
     Raises:
         AlulaError: a file is missing or wrong, with its place.
@@ -38,7 +42,7 @@ def steps_of(path: Path, world: str = "", others: Figures | None = None, *, tell
     figures, effects = _of_faults(robot, models)
     failures = Failures(refusals=False, hooks=False, aborts=False)
     part = part_of(robot, tell)
-    system = System.read(path, models, part, failures, few=COUNTED, known=_inputs(path, world))
+    system = System.read(changed or path, models, part, failures, few=COUNTED, known=_inputs(path, world))
     known = figures if others is None else others
     return MissionSteps(system, effects, _brought(robot, models), _departure(robot, models), known), known
 

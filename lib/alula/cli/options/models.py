@@ -11,6 +11,7 @@ NOTATIONS = ("paper", "rl")
 FORMAT = "4"
 SHELLS = ("bash", "zsh", "fish")
 PROOFS_S = 30.0
+REPAIR_S = 60.0
 TICKS = 10
 MOST_SITUATIONS = 200_000
 UNLIKELY = 1e-3
@@ -79,6 +80,21 @@ def odds(parser: ArgumentParser) -> None:
     )
     parser.add_argument("--most", type=int, default=MOST_SITUATIONS, metavar="N", help=f"situations looked at ({MOST_SITUATIONS})")
     parser.add_argument("--svg", type=Path, metavar="FILE", help="write a picture there, too")
+    parser.add_argument("--json", action="store_true", help="print one JSON object")
+
+
+def repair(parser: ArgumentParser) -> None:
+    """Add what ``alula repair`` takes."""
+    parser.add_argument("file", type=Path, metavar="FILE", help=MISSION_HELP)
+    completed_by(parser.add_argument("--fault", default="", metavar="NAME", help="the fault that is to be survived"), "faults")
+    parser.add_argument("--finding", type=int, default=0, metavar="N", help="the counterexample of `alula check` that is to be answered")
+    parser.add_argument("--within", default="", metavar="NODE", help="where the branch has to stand (default: anywhere)")
+    parser.add_argument(
+        "--using", action="append", default=[], metavar="SKILLS", help="skills that may stand for the one that fails (default: all)"
+    )
+    parser.add_argument("--most-faults", type=int, default=2, metavar="K", help="how many faults may come, one after another (default 2)")
+    parser.add_argument("--time", type=float, default=REPAIR_S, metavar="SECONDS", help=f"time limit (default {REPAIR_S:g})")
+    parser.add_argument("--out", type=Path, metavar="FILE", help="write the mission with the branch there (default: nothing is written)")
     parser.add_argument("--json", action="store_true", help="print one JSON object")
 
 

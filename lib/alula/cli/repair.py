@@ -1,0 +1,83 @@
+"""``alula repair MISSION.xml --fault F | --finding N``: write the fallback branch that a mission lacks, and prove it.
+
+Ends with 0 when a branch was proved, or none is needed; 1: it is impossible, or none was found; 2: it can't be asked so.
+"""
+
+from __future__ import annotations
+
+import argparse
+import json
+import sys
+from collections.abc import Sequence
+from pathlib import Path
+
+from alula.cli.saying import warner
+from alula.cli.table import parse
+from alula.common.errors import AlulaError
+from alula.common.files import write_text
+from alula.common.garbage import collect_seldom
+from alula.odds.errors import OddsError
+from alula.odds.graph import explore
+from alula.odds.odds import Odds, odds_of
+from alula.odds.robot import steps_of
+from alula.prove.limits import Deadline, OutOfTimeError
+from alula.repair.repairing import Question, Search
+from alula.repair.subject import Subject
+from alula.repair.telling import as_dict, as_text
+
+COMMAND = "alula repair"
+NONE, WRONG = 1, 2
+
+
+def main(words: Sequence[str] | None = None) -> int:
+    """Search; return the exit code."""
+    given = parse("repair", words)
+    collect_seldom()
+    try:
+        return run(given)
+    except OutOfTimeError:
+        sys.stderr.write(f"{COMMAND}: the mission as it is can't be looked at in {given.time:g} s; allow more with `--time`\n")
+        return WRONG
+    except (AlulaError, OSError) as error:
+        sys.stderr.write(f"{COMMAND}: {error}\n")
+        return WRONG
+
+
+def run(given: argparse.Namespace) -> int:
+    """Do what is asked for; raises what ``main`` tells."""
+    tell = warner(COMMAND)
+    subject = Subject.read(given.file, tell)
+    using = tuple(one.strip() for part in given.using for one in part.split(",") if one.strip())
+    question = Question(given.fault, given.finding, given.within, using, given.most_faults)
+    answer = Search(subject, question, Deadline.after(given.time, tell), tell).run()
+    repair = answer.repair
+    odds = None
+    if repair is not None:
+        with subject.copy(repair.text) as changed:
+            odds = _odds(subject.flown_as, given.file, changed)
+    if repair is not None and given.out is not None:
+        write_text(given.out, repair.text)
+        tell(f"{given.out} has it")
+    sys.stdout.write(json.dumps(as_dict(answer, odds)) + "\n" if given.json else as_text(answer, odds))
+    return 0 if repair is not None or answer.survives_already else NONE
+
+
+def _odds(path: Path, before: Path, changed: Path) -> tuple[Odds, Odds] | None:
+    """Return them without and with the branch; None where there is no Storm, or the robot has no figures to compute with."""
+    try:
+        found = [_odds_of(path, one) for one in (before, changed)]
+    except OddsError as error:
+        sys.stderr.write(f"{COMMAND}: no odds: {error}\n")
+        return None
+    return found[0], found[1]
+
+
+def _odds_of(path: Path, changed: Path) -> Odds:
+    steps, figures = steps_of(path, changed=changed)
+    return odds_of(explore(steps, figures, most=MOST, unlikely=UNLIKELY), figures, costs=False)
+
+
+MOST, UNLIKELY = 3_000, 1e-4
+
+if __name__ == "__main__":
+    sys.exit(main())

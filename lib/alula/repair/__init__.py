@@ -1,0 +1,1 @@
+"""Writes the fallback branch that a mission lacks, and has it proved."""

@@ -1,0 +1,148 @@
+"""What becomes of a mission when chosen faults come and nothing else fails: is it accomplished, degraded or not, in every run?
+
+The world's moves are those that the odds are computed from (`MissionSteps`): what a mission's skills bring about, what the functional layer
+does in time, the chosen faults in their order, each at any moment, and whatever a fault that is there may bring about. A fault that has
+come stays. Executions end well; fairness is the prover's: what can happen again and again happens some time. So a mission survives when,
+from every situation that it can come into, it can still be accomplished.
+"""
+
+from __future__ import annotations
+
+from collections import deque
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+
+from alula.model.model import ResultKind, Skillset
+from alula.odds.mission import MissionSteps, Place
+from alula.odds.system import Kind, Outcome, Step
+from alula.prove.limits import Deadline
+from alula.prove.mission.calm import reaching
+
+GOOD = frozenset({Outcome.ACCOMPLISHED, Outcome.DEGRADED})
+Here = tuple[Place, int]
+"""A situation, and how many of the faults have come."""
+
+
+@dataclass(frozen=True)
+class Fate:
+    """What becomes of a mission with these faults.
+
+    Attributes:
+        faults: those that come, in their order.
+        outcomes: how it can end after them; ``none``: it may also wait for ever.
+        survives: it is always accomplished, degraded or not.
+        safe: it always ends, and the robot is at rest, at home or somebody else's then.
+        run: what happens in a run after which it can't be accomplished any more.
+        situations: how many were looked at.
+    """
+
+    faults: tuple[str, ...]
+    outcomes: frozenset[str]
+    survives: bool
+    safe: bool
+    run: tuple[str, ...]
+    situations: int
+
+    def as_dict(self) -> dict[str, object]:
+        """Return it as JSON has it."""
+        return {
+            "faults": list(self.faults),
+            "survives": self.survives,
+            "safe": self.safe,
+            "outcomes": sorted(self.outcomes),
+            "run": list(self.run),
+        }
+
+
+def fate_of(
+    steps: MissionSteps,
+    skillsets: Sequence[Skillset],
+    faults: Sequence[str],
+    deadline: Deadline,
+    rest: Sequence[tuple[str, str]] = (),
+    most: int | None = None,
+) -> Fate | None:
+    """Return it; None: there are more situations than ``most``. ``rest`` are states of resources in which a robot is safe.
+
+    Raises OutOfTimeError.
+    """
+    ends = {f"{of.name}.{one.name}": _good_results(of, one.name) for of in skillsets for one in of.skills}
+    first = [(place, 0) for place in steps.initial()]
+    before: dict[Here, tuple[Here, Step[Place]] | None] = dict.fromkeys(first)
+    leading: dict[Here, list[Here]] = {}
+    good: list[Here] = []
+    ends_at_rest: list[Here] = []
+    safe = True
+    outcomes: set[str] = set()
+    todo = deque(first)
+    while todo:
+        here = todo.popleft()
+        deadline.check()
+        if most is not None and len(before) > most:
+            return None
+        outcome = steps.outcome(here[0])
+        if outcome in GOOD:
+            good.append(here)
+        if outcome is not None:
+            ends_at_rest.append(here)
+            safe = safe and (not rest or any(steps.resource(here[0], name) == state for name, state in rest))
+        following = [] if outcome is not None else list(_following(steps, here, faults, ends))
+        if here[1] == len(faults) and not following:
+            outcomes.add("none" if outcome is None else outcome.value)
+        for step, there in following:
+            leading.setdefault(there, []).append(here)
+            if there not in before:
+                before[there] = (here, step)
+                todo.append(there)
+    hopeful, ending = reaching(good, leading), reaching(ends_at_rest, leading)
+    lost = next((one for one in before if one not in hopeful), None)
+    safe = safe and len(ending) == len(before)
+    return Fate(tuple(faults), frozenset(outcomes), lost is None, safe, () if lost is None else _run(before, lost), len(before))
+
+
+def _good_results(skillset: Skillset, name: str) -> frozenset[str]:
+    skill = skillset.skill(name)
+    return frozenset(one.name for one in skill.results if skill.kind_of(one.name) is ResultKind.SUCCESS)
+
+
+def _following(
+    steps: MissionSteps, here: Here, faults: Sequence[str], ends: Mapping[str, frozenset[str]]
+) -> list[tuple[Step[Place], Here]]:
+    """Return the steps that are taken; while the software is at work, nothing but a fault comes between."""
+    place, come = here
+    found: list[tuple[Step[Place], Here]] = []
+    for step in steps.steps(place):
+        match step.kind:
+            case Kind.FAULT:
+                if come < len(faults) and step.name == faults[come]:
+                    found.append((step, (step.target, come + 1)))
+            case Kind.MENDED:
+                pass
+            case Kind.END if step.result not in ends[step.name]:
+                pass
+            case _:
+                if step.target != place:
+                    found.append((step, (step.target, come)))
+    now = [one for one in found if one[0].kind in {Kind.NOW, Kind.FAULT}]
+    return now if any(step.kind is Kind.NOW for step, _ in now) else found
+
+
+def _run(before: Mapping[Here, tuple[Here, Step[Place]] | None], there: Here) -> tuple[str, ...]:
+    lines: list[str] = []
+    while (step := before[there]) is not None:
+        there, taken = step
+        lines.append(_told(taken))
+    return tuple(line for line in lines[::-1] if line)
+
+
+def _told(step: Step[Place]) -> str:
+    match step.kind:
+        case Kind.FAULT:
+            return f"the fault {step.name} comes"
+        case Kind.END:
+            return f"{step.name} ends with {step.result}"
+        case Kind.NOW if step.uses:
+            return f"{step.name} starts"
+        case Kind.ANY | Kind.SOON if step.name != "tick":
+            return step.name
+    return ""

@@ -1,0 +1,88 @@
+"""Whether any mission at all could have a skill run while a fault is there: a game over the managers of its skillset.
+
+The mission may start and interrupt every skill at any time. The world helps it as well as it can, but the fault that has come stays: no
+state that it shows is left for one that it does not show. Where even so the skill never runs after the fault, no tree can have it run; the
+counterplay is the fault, and each request's refusal. Steps are those of the managers (`ManagersSteps`), as the proofs take them.
+"""
+
+from __future__ import annotations
+
+from collections import deque
+from collections.abc import Collection, Iterator
+from dataclasses import dataclass
+
+from alula.model.model import Skillset
+from alula.prove.limits import Deadline
+from alula.prove.mission.managers import ENDED, RUNNING, SENT, End, Failures, ManagersSteps
+from alula.prove.mission.state import Event, Execution, Kind, Managers
+
+HELPFUL = Failures(refusals=False, hooks=False, aborts=False)
+Here = tuple[Managers, bool]
+"""Managers, and whether the fault has come."""
+
+
+@dataclass(frozen=True)
+class Game:
+    """What came of it.
+
+    Attributes:
+        won: the skill can run while the fault is there.
+        refused: the preconditions by which its requests are refused then.
+        situations: how many were looked at.
+    """
+
+    won: bool
+    refused: tuple[str, ...]
+    situations: int
+
+
+def played(skillset: Skillset, skill: str, states: Collection[tuple[str, str]], deadline: Deadline) -> Game:
+    """Play it for a skill; ``states`` are those that show the fault, each a resource of the skillset and its state.
+
+    Raises OutOfTimeError.
+    """
+    leaves = {number: one.name for number, one in enumerate(skillset.skills)}
+    steps = ManagersSteps(skillset, leaves, HELPFUL, deadline, _as_it_is)
+    number = next(leaf for leaf, name in leaves.items() if name == skill)
+    first: Here = (steps.initial(), False)
+    seen, todo, refused = {first}, deque([first]), dict[str, None]()
+    while todo:
+        here = todo.popleft()
+        deadline.check()
+        for event, there in _moves(steps, here, leaves, states):
+            if there[1] and event is not None and event.leaf == number:
+                if event.kind is Kind.START and any(one.leaf == number and one.phase == RUNNING for one in there[0].executions):
+                    return Game(won=True, refused=(), situations=len(seen))
+                if event.kind is Kind.REFUSE:
+                    refused[event.result] = None
+            if there not in seen:
+                seen.add(there)
+                todo.append(there)
+    return Game(won=False, refused=tuple(refused), situations=len(seen))
+
+
+def _moves(
+    steps: ManagersSteps, here: Here, leaves: Collection[int], states: Collection[tuple[str, str]]
+) -> Iterator[tuple[Event | None, Here]]:
+    managers, come = here
+    known = [one for one in managers.executions if one.phase != ENDED]
+    for leaf in leaves:
+        if all(one.leaf != leaf for one in known):
+            yield None, (_with(managers, [*known, Execution(leaf, SENT)]), come)
+    for one in known:
+        if not one.asked:
+            yield None, (_with(managers, [other if other != one else one._replace(asked=True) for other in known]), come)
+    for event, after in steps.moves(managers):
+        shows = event.kind is Kind.EXTERN and (event.name, event.result) in states
+        leaves_fault = event.kind is Kind.EXTERN and (event.name, event.source) in states and not shows
+        if not (come and leaves_fault):
+            yield event, (_with(after, [one for one in after.executions if one.phase != ENDED]), come or shows)
+
+
+def _with(managers: Managers, executions: Collection[Execution]) -> Managers:
+    running = [one for one in executions if one.phase == RUNNING]
+    return Managers(managers.states, (*running, *sorted(one for one in executions if one.phase != RUNNING)))
+
+
+def _as_it_is(_leaf: int, end: End) -> End:
+    return end

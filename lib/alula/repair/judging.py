@@ -1,0 +1,100 @@
+"""What is to be said of a changed mission: what `check` finds and proves of it, what is new of that, and which faults it survives."""
+
+from __future__ import annotations
+
+import re
+from collections import Counter
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass
+from pathlib import Path
+
+from alula.language.errors import Diagnostic, Severity
+from alula.odds.robot import steps_of
+from alula.prove.limits import Deadline
+from alula.prove.mission.prover import Proved, prove_within
+from alula.prove.mission.run import MissionRun
+from alula.prove.mission.system import System
+from alula.repair.fates import Fate, fate_of
+from alula.repair.subject import Subject
+
+BOUND = "ALU710"
+"""The finding that says that not all runs were looked at."""
+
+
+@dataclass(frozen=True)
+class Judgement:
+    """What was found of a mission.
+
+    Attributes:
+        findings: what `check` tells, without what the file accepts.
+        complete: all runs were looked at.
+    """
+
+    findings: tuple[Diagnostic, ...]
+    complete: bool
+
+    def new(self, before: Judgement) -> list[Diagnostic]:
+        """Return the findings that another mission has not: what says the same of another place counts as often as it is there."""
+        known = Counter(map(_what, before.findings))
+        found = []
+        for one in self.findings:
+            known[_what(one)] -= 1
+            if known[_what(one)] < 0 and one.code != BOUND:
+                found.append(one)
+        return found
+
+
+def _what(finding: Diagnostic) -> tuple[str, str]:
+    return finding.code, re.sub(r"\([^)]*\)", "", finding.message)
+
+
+class Judge:
+    """Looks at a mission, and at what is made of it."""
+
+    def __init__(self, subject: Subject, deadline: Deadline) -> None:
+        self._subject = subject
+        self._deadline = deadline
+
+    def check(self, text: str, *, prove: bool = True) -> Judgement:
+        """Return what `check` tells of a text of the mission's file; raises OutOfTimeError."""
+        found = self._subject.findings(text)
+        if any(one.severity is Severity.ERROR for one in found) or not prove:
+            return Judgement(tuple(found), complete=False)
+        with self._subject.copy(text) as path:
+            proved = self._prove(path)
+        return Judgement((*found, *proved.findings), proved.complete)
+
+    def _prove(self, path: Path) -> Proved:
+        self._deadline.check()
+        subject = self._subject
+        given = f"{self._deadline.left_s():.3g} s"
+        return prove_within(self._deadline, path, subject.skillsets, subject.part, faults=subject.shown, given=given)
+
+    def skills(self, text: str) -> list[str]:
+        """Return the skills of the leaves of a text of the mission's file, by the leaves' numbers."""
+        with self._subject.copy(text) as path:
+            leaves = System.read(path, self._subject.skillsets, self._subject.part).leaves
+        return [f"{one.skillset}.{one.model.name}" for one in leaves]
+
+    def fate(self, text: str, faults: Sequence[str]) -> Fate:
+        """Return what becomes of a text of the mission's file with these faults; raises OutOfTimeError."""
+        found = self.fates(text)(faults, None)
+        assert found is not None  # noqa: S101 - it has no bound
+        return found
+
+    def fates(self, text: str) -> Callable[[Sequence[str], int | None], Fate | None]:
+        """Return what tells it of a text, of at most so many situations: of several faults that is quicker than one by one."""
+        with self._subject.copy(text) as path:
+            steps, _ = steps_of(self._subject.flown_as, changed=path)
+
+        def fate(faults: Sequence[str], most: int | None) -> Fate | None:
+            self._deadline.doing = f"looking at the runs with {' and then '.join(faults) or 'no fault'}"
+            return fate_of(steps, self._subject.skillsets, faults, self._deadline, self._subject.at_rest, most)
+
+        return fate
+
+
+def run_of(finding: Diagnostic) -> MissionRun | None:
+    """Return the run that shows a finding; None: it has none."""
+    run = getattr(finding, "run", None)
+    return run if isinstance(run, MissionRun) else None

@@ -1,0 +1,142 @@
+"""What skills are for, as far as models and mocks tell it already.
+
+- A skill that has a successful result achieves something; one that has none is there to run: it watches, or holds something.
+- What a skill takes when it starts, it holds while it runs.
+- Skills of one kind with the same inputs stand for one another: they achieve the same result with the same resource, or they watch for the
+  same skillset. Each may need what the other does not.
+- What one of them holds and its stand-in does not has to be held by another skill beside it.
+- What a skill brings about in the functional layer is what its mock says (``then`` of ``mock.yaml``).
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Mapping, Sequence
+from dataclasses import dataclass
+
+from alula.model.expressions import And, Constant, Expression, Implies, Not, Or, ResourceIs
+from alula.model.model import Resource, ResultKind, Skill, Skillset
+
+
+@dataclass(frozen=True)
+class Purpose:
+    """A skill, and what it is for.
+
+    Attributes:
+        skillset: the one that has it.
+        skill: its model.
+        achieves: its successful results; none: it is there to run.
+        holds: the resources that its start changes, each with the state that it takes it to.
+    """
+
+    skillset: Skillset
+    skill: Skill
+    achieves: frozenset[str]
+    holds: Mapping[str, str]
+
+    @property
+    def name(self) -> str:
+        """``skillset.skill``."""
+        return f"{self.skillset.name}.{self.skill.name}"
+
+    @property
+    def inputs(self) -> Mapping[str, str]:
+        """The types of its inputs, by their names."""
+        return {one.name: one.type for one in self.skill.inputs}
+
+
+class Purposes:
+    """What the skills of a robot are for."""
+
+    def __init__(self, skillsets: Sequence[Skillset]) -> None:
+        self.known = {f"{of.name}.{one.name}": _purpose(of, one) for of in skillsets for one in of.skills}
+
+    def stand_ins(self, name: str) -> list[Purpose]:
+        """Return the skills that may stand for this one, those first that are most like it."""
+        mine = self.known[name]
+        found = [one for one in self.known.values() if one.name != name and _stands_for(one, mine)]
+        return sorted(found, key=lambda one: (len(_words(one) ^ _words(mine)), one.name))
+
+    def holders(self, needed: Purpose, instead: Purpose) -> list[Purpose] | None:
+        """Return skills that hold what ``needed`` holds and ``instead`` does not, one for each resource; None: nothing holds one."""
+        found: list[Purpose] = []
+        for resource, state in needed.holds.items():
+            if resource in instead.holds:
+                continue
+            holders = [one for one in self._of(needed) if not one.achieves and dict(one.holds) == {resource: state}]
+            if not holders:
+                return None
+            found += holders[:1]
+        return found
+
+    def bringers(self, holder: Purpose) -> list[Purpose]:
+        """Return the skills that bring about what this one holds: they take the same, have its inputs, and come to an end."""
+        same = (one for one in self._of(holder) if one.achieves and one.holds == holder.holds)
+        return [one for one in same if holder.inputs.items() <= one.inputs.items()]
+
+    def _of(self, other: Purpose) -> Iterator[Purpose]:
+        return (one for one in self.known.values() if one.skillset.name == other.skillset.name)
+
+
+def _purpose(skillset: Skillset, skill: Skill) -> Purpose:
+    achieves = frozenset(one.name for one in skill.results if skill.kind_of(one.name) is ResultKind.SUCCESS)
+    return Purpose(skillset, skill, achieves, {one.resource: one.target for one in skill.start.assignments})
+
+
+def _stands_for(one: Purpose, other: Purpose) -> bool:
+    if one.skillset.name != other.skillset.name or bool(one.achieves) != bool(other.achieves) or one.inputs != other.inputs:
+        return False
+    if not other.achieves:
+        return bool(one.skill.invariants) and not one.holds and not other.holds
+    return bool(one.inputs) and one.achieves == other.achieves and bool(set(one.holds) & set(other.holds) or not other.holds)
+
+
+def _words(one: Purpose) -> set[str]:
+    return set(one.skill.name.split("_"))
+
+
+# --- conditions ---------------------------------------------------------------------------------------------------------
+
+
+def decided(condition: Expression, resource: str, state: str) -> bool | None:
+    """Tell what a condition is while a resource is in a state, whatever the others and the data are; None: that depends on them."""
+    match condition:
+        case Constant(value=value):
+            return value
+        case ResourceIs(resource=name, state=other, negated=negated):
+            return (state == other) != negated if name == resource else None
+        case Not(operand=operand):
+            inner = decided(operand, resource, state)
+            return None if inner is None else not inner
+        case And(operands=operands):
+            return _all([decided(one, resource, state) for one in operands])
+        case Or(operands=operands):
+            inner = _all([decided(Not(one), resource, state) for one in operands])
+            return None if inner is None else not inner
+        case Implies(premise=premise, conclusion=conclusion):
+            return decided(Or((Not(premise), conclusion)), resource, state)
+        case _:
+            return None
+
+
+def _all(values: Sequence[bool | None]) -> bool | None:
+    if False in values:
+        return False
+    return None if None in values else True
+
+
+def broken_by(skill: Skill, resource: str, state: str) -> str | None:
+    """Return the invariant that is false in a state, else the precondition; None: the skill can start and run."""
+    conditions = [(one.name, one.condition) for one in skill.invariants] + [(one.name, one.condition) for one in skill.preconditions]
+    return next((name for name, condition in conditions if decided(condition, resource, state) is False), None)
+
+
+def asked_of_others(purpose: Purpose) -> list[tuple[Resource, str]]:
+    """Return what a skill needs that only the functional layer decides: each resource with the state, where it needs exactly one."""
+    found: dict[str, tuple[Resource, str]] = {}
+    for precondition in purpose.skill.preconditions:
+        condition = precondition.condition
+        if isinstance(condition, ResourceIs) and not condition.negated:
+            resource = purpose.skillset.resource(condition.resource)
+            if all(one.extern for one in resource.transitions):
+                found.setdefault(resource.name, (resource, condition.state))
+    return list(found.values())

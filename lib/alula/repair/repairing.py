@@ -1,0 +1,319 @@
+"""Finds a branch by which a mission answers what it gives up for now, and has `check` prove the mission with it.
+
+1. The mission is looked at as it is: what `check` tells, and what becomes of it with the fault.
+2. Branches are made of what its files and the robot's skills have (`Patterns`), the smallest first.
+3. Each is judged: what `check` finds in the file, what becomes of the mission with the fault, then all runs, with all failures. A branch is
+   a repair when the fault is survived, every property of the mission is proved, and nothing new is left open.
+4. A counterexample goes back: branches that would run the same skills side by side again are not tried.
+5. Of a repair it is told which faults are survived before and after it.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterator, Sequence
+from contextlib import suppress
+from dataclasses import dataclass, field, replace
+
+from alula.language.errors import Diagnostic, Severity
+from alula.prove.limits import Deadline, OutOfTimeError
+from alula.prove.mission.run import MissionRun
+from alula.prove.mission.system import System
+from alula.repair.branches import Branch
+from alula.repair.errors import RepairError
+from alula.repair.fates import Fate
+from alula.repair.game import played
+from alula.repair.judging import Judge, Judgement, run_of
+from alula.repair.patterns import Failing, Patterns, failing_by
+from alula.repair.subject import Subject, without_properties_of
+from alula.trees.document import Element
+from alula.trees.node import Node
+from alula.trees.reading import node_name, type_name
+
+Tell = Callable[[str], None]
+TOGETHER = "Parallel"
+UNDECIDED = "not all its runs were looked at"
+MOST_SITUATIONS = 2_000
+"""Of a mission with another fault than the one that is answered; where there are more, nothing is told of it."""
+SHARE = 0.3
+"""Which part of the time that is left is spent on the other faults, once there is a repair."""
+
+
+@dataclass(frozen=True)
+class Question:
+    """What is asked for.
+
+    Attributes:
+        fault: the fault that is to be answered; empty: a finding is.
+        finding: the number of a counterexample of `check`; 0: a fault is.
+        within: the node that the branch has to stand in; empty: anywhere.
+        using: the skills that a branch may add, ``skillset.skill``; empty: all.
+        most_faults: how many faults may come, the first one included.
+    """
+
+    fault: str = ""
+    finding: int = 0
+    within: str = ""
+    using: tuple[str, ...] = ()
+    most_faults: int = 2
+
+
+@dataclass(frozen=True)
+class Repair:
+    """A branch that was proved.
+
+    Attributes:
+        branch: what is put into the mission.
+        text: the mission's file with it.
+        tried: how many branches were judged before it.
+        not_asked: properties of the mission that ask for nodes which it has not.
+        before, after: what becomes of the mission by faults, without and with it.
+    """
+
+    branch: Branch
+    text: str
+    tried: int
+    not_asked: tuple[str, ...]
+    before: dict[tuple[str, ...], Fate] = field(default_factory=dict)
+    after: dict[tuple[str, ...], Fate] = field(default_factory=dict)
+
+
+@dataclass(frozen=True)
+class Answer:
+    """What came of the search: a repair, or why there is none.
+
+    ``impossible``: no skill of the robot can do it, as ``reasons`` show; otherwise nobody knows.
+    """
+
+    failing: tuple[Failing, ...]
+    fate: Fate | None
+    repair: Repair | None = None
+    impossible: bool = False
+    reasons: tuple[str, ...] = ()
+    tried: int = 0
+
+    @property
+    def survives_already(self) -> bool:
+        """Tell whether there is nothing to repair."""
+        return self.fate is not None and self.fate.survives
+
+
+class Search:
+    """Looks for a repair of one mission."""
+
+    def __init__(self, subject: Subject, question: Question, deadline: Deadline, tell: Tell) -> None:
+        if bool(question.fault) == bool(question.finding):
+            raise RepairError("name what is to be answered: --fault NAME, or --finding N of `alula check`")
+        if question.fault and question.fault not in subject.faults:
+            raise RepairError(f"--fault {question.fault}: there is no such fault; there are {', '.join(sorted(subject.faults))}")
+        known = {f"{of.name}.{one.name}" for of in subject.skillsets for one in of.skills}
+        wrong = [one for one in question.using if one not in known]
+        if wrong:
+            raise RepairError(f"--using {wrong[0]}: there is no such skill; there are {', '.join(sorted(known))}")
+        self._subject = subject
+        self._question = question
+        self._deadline = deadline
+        self._tell = tell
+        self._judge = Judge(subject, deadline)
+        self._patterns = Patterns(subject, question.using)
+        self._refuted: set[frozenset[str]] = set()
+        self._missing = tuple(subject.names_asked())
+
+    def run(self) -> Answer:
+        """Search; raises AlulaError where the mission can't be looked at."""
+        text, _ = self._without_branch(self._missing)
+        before = self._judge.check(text)
+        errors = [one for one in before.findings if one.severity is Severity.ERROR and one.code < "ALU7"]
+        if errors:
+            raise RepairError(f"the mission has errors, which come first: {errors[0].render()}")
+        system = System.read(self._subject.path, self._subject.skillsets, self._subject.part)
+        finding = self._finding(before)
+        failing = self._failing(system, finding)
+        fault = (self._question.fault,) if self._question.fault else ()
+        fate = self._judge.fate(text, fault) if fault else None
+        if fate is not None and fate.survives:
+            return Answer(tuple(failing), fate)
+        self._tell(f"{'; '.join(one.words for one in failing)}: {_told(fate)}")
+        repair, tried, open_ = self._first_proved(before, failing, fate, finding)
+        if repair is None:
+            reasons = [self._why_impossible(one) for one in failing] if not open_ else []
+            impossible = any(reasons)
+            return Answer(tuple(failing), fate, None, impossible, tuple(line for several in reasons for line in several), tried)
+        return Answer(tuple(failing), fate, self._with_fates(text, repair), tried=tried)
+
+    def _without_branch(self, leave_out: Sequence[str]) -> tuple[str, list[str]]:
+        document = self._subject.document()
+        taken = without_properties_of(document.root, leave_out)
+        return document.text(), taken
+
+    def _finding(self, before: Judgement) -> Diagnostic | None:
+        number = self._question.finding
+        if not number:
+            return None
+        playable = [one for one in before.findings if run_of(one) is not None]
+        if not 1 <= number <= len(playable):
+            raise RepairError(f"--finding {number}: the mission has {len(playable)} counterexamples that are not accepted in its file")
+        return playable[number - 1]
+
+    def _failing(self, system: System, finding: Diagnostic | None) -> list[Failing]:
+        if finding is None:
+            found = failing_by(self._question.fault, self._subject, system)
+            if not found:
+                raise RepairError(f"--fault {self._question.fault}: no skill of the mission ends by it")
+        else:
+            run = run_of(finding)
+            found = [_last_failing(run, system)] if run is not None else []
+        within = self._question.within
+        if within:
+            names = {node.name for node in system.nodes}
+            if within not in names:
+                raise RepairError(f"--within {within}: there is no such node")
+            found = [one for one in found if any(place.name == within for place in _above(one))]
+            if not found:
+                raise RepairError(f"--within {within}: nothing fails in there by that")
+        return found
+
+    def _first_proved(
+        self, before: Judgement, failing: Sequence[Failing], fate: Fate | None, finding: Diagnostic | None
+    ) -> tuple[Repair | None, int, bool]:
+        """Return the first branch that is proved, how many were tried, and whether some could not be judged."""
+        tried, undecided = 0, False
+        branches = [one for leaf in failing for one in self._patterns.branches(leaf, within=self._question.within)]
+        for branch in sorted(branches, key=lambda one: one.size + one.wraps):
+            if self._is_refuted(branch):
+                continue
+            tried += 1
+            try:
+                found = self._judged(branch, before, fate, finding)
+            except (OutOfTimeError, KeyboardInterrupt):
+                return None, tried, True
+            if isinstance(found, Repair):
+                return replace(found, tried=tried), tried, undecided
+            undecided = undecided or found == UNDECIDED
+            self._tell(f"{branch.size} nodes, '{branch.name}': no: {found}")
+        return None, tried, undecided
+
+    def _judged(self, branch: Branch, before: Judgement, fate: Fate | None, finding: Diagnostic | None) -> Repair | str:
+        """Return the repair, or why it is none."""
+        names = {node_name(one) for one in (branch.tree.iterate() if branch.tree is not None else ())}
+        leave_out = tuple(one for one in self._missing if one not in names)
+        text, not_asked = branch.written(self._subject, leave_out)
+        if errors := [one for one in self._judge.check(text, prove=False).new(before) if one.severity is Severity.ERROR]:
+            return errors[0].message
+        if fate is not None:
+            now = self._judge.fate(text, fate.faults)
+            if not now.survives and (fate.safe or not now.safe):
+                return f"with {' and '.join(fate.faults)} it {_told(now)}"
+        judgement = self._judge.check(text)
+        new = judgement.new(before)
+        if new:
+            self._learn(branch, text, new[0])
+            return new[0].message
+        if not judgement.complete:
+            return UNDECIDED
+        if finding is not None and _is_left(judgement, before, finding):
+            return "the counterexample is still there"
+        written, _ = branch.written(self._subject)
+        return Repair(branch, written, 0, tuple(not_asked))
+
+    def _why_impossible(self, failing: Failing) -> list[str]:
+        """Return why no tree can have done what a skill is for; empty where one might."""
+        lines: list[str] = []
+        for purpose in self._patterns.all_stand_ins(failing):
+            own = [(at.partition(".")[2], state) for at, state in failing.states if at.partition(".")[0] == purpose.skillset.name]
+            try:
+                game = played(purpose.skillset, purpose.skill.name, own, self._deadline) if own else None
+            except (OutOfTimeError, KeyboardInterrupt):
+                return []
+            if game is None or game.won:
+                return []
+            refused = ", ".join(f"`{one}`" for one in game.refused)
+            cure = " or ".join(dict.fromkeys(at for at, _ in own))
+            lines.append(
+                f"{purpose.name} can't start any more: it is refused by {refused}, in each of {game.situations} situations; "
+                f"it could if {purpose.skillset.name}.{cure} left what the fault shows"
+            )
+        return [*lines, f"no other skill is for what {failing.skill} is for"] if lines else []
+
+    # --- counterexamples ---------------------------------------------------------------------------------------------
+
+    def _learn(self, branch: Branch, text: str, finding: Diagnostic) -> None:
+        """Remember which skills of a branch ran side by side where a property was broken."""
+        run = run_of(finding)
+        if run is None or finding.severity is not Severity.ERROR or branch.tree is None:
+            return
+        skills = self._judge.skills(text)
+        running = frozenset(skills[leaf] for leaf in _asked(run))
+        mine = [one for one in _together(branch.tree) if one <= running]
+        if mine:
+            self._refuted.add(max(mine, key=len))
+
+    def _is_refuted(self, branch: Branch) -> bool:
+        return branch.tree is not None and any(one in self._refuted for one in _together(branch.tree))
+
+    # --- afterwards --------------------------------------------------------------------------------------------------
+
+    def _with_fates(self, text: str, repair: Repair) -> Repair:
+        """Add what becomes of the mission by each fault, and by each after the one that is answered, as far as time goes."""
+        fault, names = self._question.fault, sorted(self._subject.faults)
+        singles = [(fault,), *((one,) for one in names if one != fault)] if fault else [(one,) for one in names]
+        pairs = [(fault, one) for one in names if one != fault] if fault and self._question.most_faults > 1 else []
+        stripped, _ = repair.branch.written(self._subject, self._missing)
+        before: dict[tuple[str, ...], Fate] = {}
+        after: dict[tuple[str, ...], Fate] = {}
+        judge = Judge(self._subject, Deadline.after(self._deadline.left_s() * SHARE, self._deadline.tell))
+        with suppress(OutOfTimeError, KeyboardInterrupt):
+            was, now = judge.fates(text), judge.fates(stripped)
+            for faults in (*singles, *pairs):
+                fates = was(faults, MOST_SITUATIONS), now(faults, MOST_SITUATIONS)
+                if fates[0] is not None and fates[1] is not None:
+                    before[faults], after[faults] = fates[0], fates[1]
+        return replace(repair, before=before, after=after)
+
+
+def _told(fate: Fate | None) -> str:
+    if fate is None:
+        return "nothing answers"
+    return "may not be accomplished" + ("" if fate.safe else ", and may end in no safe state")
+
+
+def _above(failing: Failing) -> Iterator[Node]:
+    at: Node | None = failing.leaf
+    while at is not None:
+        yield at
+        at = at.parent
+
+
+def _last_failing(run: MissionRun, system: System) -> Failing:
+    leaves = [one.leaf for event in run.events for one in event.ended if event.failure or one.state != "TERMINATED"]
+    if not leaves:
+        raise RepairError("no skill fails in this counterexample: there is nothing that a branch could answer")
+    node = system.leaves[leaves[-1]]
+    return Failing(node, f"{node.skillset}.{node.model.name}")
+
+
+def _is_left(after: Judgement, before: Judgement, finding: Diagnostic) -> bool:
+    same = [one for one in after.findings if (one.code, one.message) == (finding.code, finding.message)]
+    return len(same) >= len([one for one in before.findings if (one.code, one.message) == (finding.code, finding.message)])
+
+
+def _asked(run: MissionRun) -> set[int]:
+    """Return the leaves whose skills run, or were asked for, at the end of a run."""
+    asked: set[int] = set()
+    for event in run.events:
+        asked -= {one.leaf for one in event.ended}
+        asked |= set(event.started)
+    return asked
+
+
+def _together(element: Element) -> list[frozenset[str]]:
+    """Return the sets of skills that may run side by side below a node."""
+    if not element.children:
+        name = type_name(element)
+        return [frozenset({name})] if "." in name else [frozenset()]
+    several = [_together(one) for one in element.children]
+    if element.tag != TOGETHER:
+        return [one for found in several for one in found]
+    sets: list[frozenset[str]] = [frozenset()]
+    for found in several:
+        sets = [one | other for one in sets for other in found]
+    return sets

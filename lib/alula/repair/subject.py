@@ -1,0 +1,136 @@
+"""The mission that is to be repaired: its file, its robot, and copies of the file with changes, which can be looked at as it can."""
+
+from __future__ import annotations
+
+import os
+import re
+import shutil
+import tempfile
+from collections.abc import Collection, Iterator, Mapping, Sequence
+from contextlib import contextmanager
+from dataclasses import dataclass
+from functools import cached_property
+from pathlib import Path
+
+from alula.check.findings import findings_of
+from alula.check.robot import Warn, models_of, part_of
+from alula.common.robots import FAULTS, RobotFolder, find_robot
+from alula.common.scenarios import load_scenario, scenario_names
+from alula.language.errors import Diagnostic
+from alula.language.messages import Messages, messages_of
+from alula.missions.part import MissionPart
+from alula.model.model import Skillset
+from alula.records.causes.effects import FaultEffects
+from alula.records.causes.fault_file import load_effects
+from alula.repair.errors import RepairError
+from alula.trees.document import Document, Element, parse_document, read_source
+from alula.trees.reading import TreeFiles, node_name, read_files
+
+DESCRIPTION = "_description"
+_ACTIVE = re.compile(r"active\(\s*['\"](?P<node>[^'\"]+)['\"]\s*\)")
+_PROPERTY = re.compile(r"\s*\bproperty (?P<name>\w+):(?:(?!\bproperty \w+:|\baccepted ALU7)[^;])*;?", re.DOTALL)
+
+
+@dataclass(frozen=True)
+class Subject:
+    """A mission's file and what it is read with.
+
+    Attributes:
+        faults: what each fault of the robot brings about.
+    """
+
+    path: Path
+    source: bytes
+    files: TreeFiles
+    robot: RobotFolder
+    skillsets: tuple[Skillset, ...]
+    part: MissionPart
+    messages: Messages
+    faults: Mapping[str, FaultEffects]
+
+    @classmethod
+    def read(cls, path: Path, tell: Warn) -> Subject:
+        """Read it, of the robot of the current folder; raises AlulaError where a file can't be read."""
+        robot = find_robot()
+        models = models_of(robot, tell)
+        if not models:
+            raise RepairError(f"{path}: the robot in {robot.root} has no skills to repair it with")
+        file = robot.file(FAULTS)
+        faults = {} if file is None else load_effects(file, models).known
+        return cls(path, read_source(path), read_files(path), robot, models, part_of(robot, tell), messages_of(robot), faults)
+
+    @property
+    def shown(self) -> Mapping[str, frozenset[str]]:
+        """The states in which faults show, as properties ask for them."""
+        return {name: one.states for name, one in self.faults.items() if one.states}
+
+    @cached_property
+    def flown_as(self) -> Path:
+        """The mission's file that a scenario has inputs for: this one, else the one with a main tree of the same name; else this one."""
+        missions = [self.robot.root / load_scenario(name).mission for name in scenario_names()]
+        files = [one for one in missions if one.suffix == ".xml" and one.is_file()]
+        if any(one.samefile(self.path) for one in files):
+            return self.path
+        return next((one for one in files if read_files(one).main == self.files.main), self.path)
+
+    @property
+    def at_rest(self) -> list[tuple[str, str]]:
+        """The states of resources in which the robot need not be brought anywhere, as its file has them."""
+        said = (self.robot.departure, self.robot.rest, self.robot.taken)
+        names = {resource: of.name for of in self.skillsets for resource in of.resource_index}
+        return [(f"{names[one[0]]}.{one[0]}", one[1]) for one in said if one is not None and one[0] in names]
+
+    def document(self) -> Document:
+        """Return the file as data that may be changed."""
+        return parse_document(self.source, str(self.path))
+
+    def findings(self, text: str) -> list[Diagnostic]:
+        """Return what `check` finds in another text of the file without looking at its runs."""
+        return findings_of(str(self.path), text.encode(), self.skillsets, (), self.part, self.messages)
+
+    @contextmanager
+    def copy(self, text: str) -> Iterator[Path]:
+        """Give the path of a file with this text, beside copies of what it includes, as long as the context lasts."""
+        documents = [Path(one.path).resolve() for one in self.files.documents]
+        top = Path(os.path.commonpath([one.parent for one in documents]))
+        with tempfile.TemporaryDirectory(prefix="alula-repair-") as folder:
+            for one in documents:
+                place = Path(folder) / one.relative_to(top)
+                place.parent.mkdir(parents=True, exist_ok=True)
+                shutil.copyfile(one, place)
+            changed = Path(folder) / documents[0].relative_to(top)
+            changed.write_bytes(text.encode())
+            yield changed
+
+    # --- properties --------------------------------------------------------------------------------------------------
+
+    def names_asked(self) -> dict[str, None]:
+        """Return the names of nodes that the mission's properties ask for and no tree has, in the order of the file."""
+        elements = [one for tree in self.files.trees.values() for one in tree.iterate()]
+        there = {node_name(one) for one in elements}
+        asked = (match["node"] for one in elements for match in _ACTIVE.finditer(one.get(DESCRIPTION)))
+        return {name: None for name in asked if name not in there}
+
+
+def without_properties_of(root: Element, missing: Collection[str]) -> list[str]:
+    """Take the properties that ask for nodes of these names out of a file's descriptions; return the properties' names."""
+    taken: list[str] = []
+    for element in root.iterate():
+        text = element.get(DESCRIPTION)
+
+        def without(match: re.Match[str]) -> str:
+            if not any(one["node"] in missing for one in _ACTIVE.finditer(match[0])):
+                return match[0]
+            taken.append(match["name"])
+            return ""
+
+        left = _PROPERTY.sub(without, text) if text and missing else text
+        if left != text:
+            element.set(DESCRIPTION, left)
+    return taken
+
+
+def texts_of(root: Element) -> Sequence[str]:
+    """Return all that a file says in names, comments and attributes: how its author spells words."""
+    parts = [part for one in root.iterate() for part in one.content if isinstance(part, str)]
+    return [*parts, *(one.value for element in root.iterate() for one in element.attributes.values())]

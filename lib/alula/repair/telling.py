@@ -1,0 +1,77 @@
+"""An answer as text and as JSON."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+
+from alula.odds.odds import Odds
+from alula.odds.telling import WORDS
+from alula.repair.fates import Fate
+from alula.repair.repairing import Answer, Repair
+
+Both = tuple[Odds, Odds]
+"""The odds without the branch, and with it."""
+
+
+def as_text(answer: Answer, odds: Both | None) -> str:
+    """Return lines for a terminal."""
+    what = "; ".join(one.words for one in answer.failing)
+    if answer.survives_already:
+        return f"nothing to repair: {what}, and the mission survives it\n"
+    if answer.repair is None:
+        head = "impossible" if answer.impossible else "unknown: no branch was proved"
+        lines = [f"{head}: {what} ({answer.tried} branches tried)", *(f"  {one}" for one in answer.reasons)]
+        return "\n".join(lines) + "\n"
+    return "\n".join(_of_repair(answer.repair, what, odds)) + "\n"
+
+
+def _of_repair(repair: Repair, what: str, odds: Both | None) -> list[str]:
+    branch = repair.branch
+    where = "in a Fallback around" if branch.wraps else "behind"
+    lines = [f"repaired, proved by check: {what}", f"  '{branch.name}', {branch.size} nodes, {where} the node at {branch.at}"]
+    lines += ["", branch.as_xml(), ""] if branch.tree is not None else []
+    lines += [f"  not proved: the property `{one}` asks for a node that the mission has not" for one in repair.not_asked]
+    for faults, after in repair.after.items():
+        before = repair.before[faults]
+        if len(faults) == 1 or after.survives or not after.safe:
+            lines.append(f"  {' and then '.join(faults):<34} {_fate(before)} -> {_fate(after)}")
+    if odds is not None:
+        lines.append("odds, without and with it:")
+        lines += [f"  {WORDS[name]:<18} {_range(odds[0], name)} -> {_range(odds[1], name)}" for name in odds[0].outcomes]
+    return lines
+
+
+def as_dict(answer: Answer, odds: Both | None) -> dict[str, object]:
+    """Return what `--json` prints."""
+    repair = answer.repair
+    kind = "nothing to repair" if answer.survives_already else "repaired" if repair else "impossible" if answer.impossible else "unknown"
+    found: dict[str, object] = {
+        "answer": kind,
+        "failing": [{"skill": one.skill, "node": one.leaf.name, "fault": one.fault} for one in answer.failing],
+        "tried": answer.tried,
+        "reasons": list(answer.reasons),
+    }
+    if repair is None:
+        return found
+    places = {"file": repair.branch.at.path, "line": repair.branch.at.line, "column": repair.branch.at.column}
+    branch = {"name": repair.branch.name, "nodes": repair.branch.size, "at": places, "wraps": repair.branch.wraps}
+    found["repair"] = {**branch, "xml": repair.branch.as_xml(), "use": "".join(repair.branch.use.pieces())}
+    found["not_asked"] = list(repair.not_asked)
+    found["fates"] = [{"before": repair.before[one].as_dict(), "after": fate.as_dict()} for one, fate in repair.after.items()]
+    if odds is not None:
+        found["odds"] = {name: _pairs(odds, name) for name in odds[0].outcomes}
+    return found
+
+
+def _pairs(odds: Sequence[Odds], name: str) -> dict[str, list[float]]:
+    words = ("before", "after")
+    return {word: [one.outcomes[name].least.value, one.outcomes[name].most.value] for word, one in zip(words, odds, strict=True)}
+
+
+def _range(odds: Odds, name: str) -> str:
+    one = odds.outcomes[name]
+    return f"{one.least.value:.6g} to {one.most.value:.6g}"
+
+
+def _fate(fate: Fate) -> str:
+    return "survives" if fate.survives else "ends safely" if fate.safe else "unsafe"

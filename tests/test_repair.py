@@ -1,0 +1,136 @@
+"""The branches that missions have by hand are deleted; the tool writes others, which `check` proves and mocks fly."""
+
+from __future__ import annotations
+
+import io
+import json
+import re
+from contextlib import redirect_stderr, redirect_stdout
+from pathlib import Path
+from typing import Any, NamedTuple
+
+import pytest
+
+from alula.cli.check import main as check
+from alula.cli.repair import main as repair
+
+ALULA_ROOT = Path(__file__).resolve().parents[1]
+TIME_S = "600"
+"""What a search may take here: it ends by its result, also on a busy machine."""
+
+
+@pytest.fixture
+def missions(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
+    """Return a folder with the drone's missions, to be changed."""
+    monkeypatch.setenv("ALULA_ROBOT", str(ALULA_ROOT))
+    for one in (ALULA_ROOT / "missions").glob("*.xml"):
+        (tmp_path / one.name).write_bytes(one.read_bytes())
+    return tmp_path
+
+
+def without_tree(path: Path, name: str) -> str:
+    """Take a tree and its use out of a file; return what is left."""
+    text = path.read_text()
+    text, uses = re.subn(rf' *<SubTree ID="{name}"[^>]*/>\n', "", text)
+    text, trees = re.subn(rf' *<BehaviorTree ID="{name}">.*?</BehaviorTree>\n\n', "", text, flags=re.DOTALL)
+    assert (uses, trees) == (1, 1)
+    path.write_text(text)
+    return text
+
+
+def answer(capsys: pytest.CaptureFixture[str], *words: str | Path, code: int = 0) -> dict[str, object]:
+    assert repair([*map(str, words), "--time", TIME_S, "--json"]) == code, capsys.readouterr().err
+    found: dict[str, object] = json.loads(capsys.readouterr().out)
+    return found
+
+
+@pytest.fixture
+def no_lidar(missions: Path) -> Path:
+    without_tree(missions / "mapping.xml", "lidar_navigation")
+    return missions / "mapping.xml"
+
+
+class Repaired(NamedTuple):
+    """What the command has said and written of a mission without its LiDAR branch."""
+
+    before: str
+    found: dict[str, Any]
+    progress: str
+    out: Path
+
+
+@pytest.fixture(scope="module")
+def repaired(tmp_path_factory: pytest.TempPathFactory) -> Repaired:
+    folder = tmp_path_factory.mktemp("missions")
+    for one in (ALULA_ROOT / "missions").glob("*.xml"):
+        (folder / one.name).write_bytes(one.read_bytes())
+    mission, out = folder / "mapping.xml", folder / "repaired.xml"
+    before = without_tree(mission, "lidar_navigation")
+    said, progress = io.StringIO(), io.StringIO()
+    with pytest.MonkeyPatch.context() as patch, redirect_stdout(said), redirect_stderr(progress):
+        patch.setenv("ALULA_ROBOT", str(ALULA_ROOT))
+        code = repair([str(mission), "--fault", "zed", "--most-faults", "1", "--time", TIME_S, "--out", str(out), "--json"])
+    assert code == 0, progress.getvalue()
+    assert mission.read_text() == before  # only --out is written
+    return Repaired(before, json.loads(said.getvalue()), progress.getvalue(), out)
+
+
+def test_the_flight_goes_on_with_the_lidar_as_in_figure_10(repaired: Repaired) -> None:
+    assert repaired.found["answer"] == "repaired"
+    one = repaired.found["repair"]
+    assert one["nodes"] <= 15
+    skills = re.findall(r"<(\w+\.\w+) ", one["xml"])
+    others = ["navigation.rotate_head", "navigation.lock_head", "navigation.goto"]
+    assert skills == ["perception.lidar_depthmap", "uav.NextWaypoint", *others]
+    assert 'heading="{sideways}"' in one["xml"]
+    assert repaired.found["not_asked"] == []  # the names that the properties ask for are there again
+    (zed,) = [one for one in repaired.found["fates"] if one["after"]["faults"] == ["zed"]]
+    assert (zed["before"]["survives"], zed["after"]["survives"]) == (False, True)
+
+
+def test_what_is_written_is_proved_by_check(
+    repaired: Repaired, capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setenv("ALULA_ROBOT", str(ALULA_ROOT))
+    assert check([str(repaired.out), "--json", "--time", TIME_S]) == 0
+    (file,) = json.loads(capsys.readouterr().out)["files"]
+    assert [finding["severity"] for finding in file["findings"]] == ["note"]  # what the file accepts, as before
+
+
+def test_the_file_keeps_all_that_stood_in_it(repaired: Repaired) -> None:
+    left = iter(repaired.out.read_text().split("\n"))
+    assert all(line in left for line in repaired.before.split("\n"))  # in its order
+
+
+def test_progress_shows_what_counterexamples_rule_out(repaired: Repaired) -> None:
+    assert repaired.progress.count("no: the property `eyes` (always) does not hold") == 1  # what would run the same again is not tried
+
+
+def test_a_mission_that_survives_needs_nothing(missions: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    assert answer(capsys, missions / "mapping.xml", "--fault", "zed")["answer"] == "nothing to repair"
+
+
+def test_without_another_sensor_it_is_impossible_and_says_why(no_lidar: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    found = answer(capsys, no_lidar, "--fault", "zed", "--using", "navigation.goto", code=1)
+    assert found["answer"] == "impossible"
+    reasons = found["reasons"]
+    assert isinstance(reasons, list)
+    assert "perception.zed_depthmap can't start any more: it is refused by `zed_ready`" in reasons[0]
+    assert "perception.zed_status" in reasons[0]
+
+
+@pytest.mark.parametrize(
+    ("words", "message"),
+    [
+        (["--fault", "zedd"], "--fault zedd: there is no such fault"),
+        ([], "name what is to be answered: --fault NAME, or --finding N"),
+        (["--fault", "zed", "--using", "navigation.gota"], "--using navigation.gota: there is no such skill"),
+        (["--fault", "zed", "--within", "nowhere"], "--within nowhere: there is no such node"),
+        (["--finding", "7"], "--finding 7: the mission has"),
+    ],
+)
+def test_what_can_not_be_asked_is_one_line(no_lidar: Path, capsys: pytest.CaptureFixture[str], words: list[str], message: str) -> None:
+    assert repair([str(no_lidar), *words]) == 2
+    said = capsys.readouterr()
+    assert said.out == ""
+    assert message in said.err.splitlines()[-1]
