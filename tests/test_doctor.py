@@ -35,6 +35,7 @@ from alula_flight.doctor.base import look_at_way_back, read_base
 from alula_flight.doctor.disk import look_at_disk
 from alula_flight.doctor.findings import Level
 from alula_flight.doctor.names import look_at_names
+from alula_flight.station.master import offset_of
 from alula_flight.station.parts import Places, network_profile
 from alula_testing.networks import Computer, Network
 from alula_testing.ros1 import END_WITH_PARENT, end_process
@@ -320,7 +321,7 @@ def test_the_offset_of_a_clock_of_whole_seconds(ahead_s: float, call_s: float, s
         nonlocal now_s
         now_s += for_s
 
-    offset = clock.offset_of(second, lambda: now_s, pause)
+    offset = offset_of(second, lambda: now_s, pause)
     assert offset is not None
     assert abs(offset.ahead_s - ahead_s) <= offset.within_s + 1e-6
     assert offset.within_s <= 2.0 * call_s + 0.021

@@ -14,8 +14,9 @@ from alula.common.run_log import account
 from alula.common.scenarios import load_scenario
 from alula.runtime.live.spec import RequestError, RunSpec
 from alula_flight.station import state as states
+from alula_flight.station.master import why_no_master
 from alula_flight.station.parts import environment_of
-from alula_flight.station.station import Station, why_no_master
+from alula_flight.station.station import Station
 
 AT_REST_S = 90.0  # wall clock
 STILL_RUNNING = "running"

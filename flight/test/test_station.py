@@ -36,10 +36,11 @@ from alula_flight.station.__main__ import main as commands
 from alula_flight.station.disk import GB, Kept, beyond, tidy
 from alula_flight.station.keeper import Kept as KeptPart
 from alula_flight.station.keeper import end_all
+from alula_flight.station.master import why_no_master
 from alula_flight.station.notify import VARIABLE, notify
 from alula_flight.station.parts import Part, Places, bridge_file, environment_of, network_profile, parts_of
 from alula_flight.station.state import PartState, StationState, living
-from alula_flight.station.station import Station, why_no_master
+from alula_flight.station.station import Station
 from alula_testing.waits import until
 
 ROOT = Path(__file__).resolve().parents[2]

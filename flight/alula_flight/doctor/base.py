@@ -16,7 +16,7 @@ from xmlrpc.server import SimpleXMLRPCServer
 from alula.common.deployments import Deployment, is_loopback
 from alula_flight.doctor.findings import MASTER, NODES, Finding, listed, ok, problem
 from alula_flight.doctor.names import own_addresses, resolved
-from alula_flight.station.station import why_no_master
+from alula_flight.station.master import why_no_master
 from ros_bridge.addresses import bind_address, in_uri
 from ros_bridge.graph import is_bridge
 from ros_bridge.master import Connection, RefusedError

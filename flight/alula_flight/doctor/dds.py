@@ -26,7 +26,9 @@ if TYPE_CHECKING:
 PROFILE_VARIABLES = ("FASTRTPS_DEFAULT_PROFILES_FILE", "FASTDDS_DEFAULT_PROFILES_FILE")
 GROUP, PORT = "239.255.0.1", 7399
 """DDS's own group (RTPS 2.5, 9.6.2.4), and a port that no domain has."""
-MULTICAST_S, QUIET_S, FOUND_S = 1.0, 1.0, 6.0
+MULTICAST_S, QUIET_S, FOUND_S, MOST_S = 1.0, 1.0, 5.0, 10.0
+"""Others are looked for until none has come for a moment, and at least so long: what announces us may be lost, and Fast DDS announces
+us again after three seconds."""
 SHARED, SEGMENT = Path("/dev/shm"), 64 << 20  # noqa: S108 - where shared memory lies
 INTERFACE_FLAGS, MULTICAST_FLAG = 0x8913, 0x1000
 """Of Linux: SIOCGIFFLAGS, IFF_MULTICAST."""
@@ -168,8 +170,8 @@ def look_at_servers(servers: Mapping[str, list[str]], running: set[str], domain:
 
 def _nodes_when_quiet(node: Node) -> list[str]:
     """Return the other nodes' names when none has come for a moment."""
-    end_s, seen, since_s = time.monotonic() + FOUND_S, -1, time.monotonic()
-    while time.monotonic() < min(end_s, since_s + 2.0 * QUIET_S):
+    begun_s, seen, since_s = time.monotonic(), -1, time.monotonic()
+    while time.monotonic() < min(begun_s + MOST_S, max(begun_s + FOUND_S, since_s + QUIET_S)):
         count = len(node.get_topic_names_and_types()) + len(node.get_node_names())
         if count != seen:
             seen, since_s = count, time.monotonic()

@@ -17,9 +17,10 @@ from alula.common.deployments import DeploymentError, deployment_names
 from alula.common.errors import AlulaError
 from alula.common.suggestions import nearest
 from alula_flight.station import state as states
+from alula_flight.station.master import why_no_master
 from alula_flight.station.service import service
 from alula_flight.station.state import StationState
-from alula_flight.station.station import Station, StationError, why_no_master
+from alula_flight.station.station import Station, StationError
 
 DONE, DOWN, WRONG = 0, 1, 2
 
@@ -97,6 +98,7 @@ def told(station: Station, state: StationState) -> dict[str, object]:
         "mission": station.mission,
         "page": page_address(station),
         "disk": state.disk,
+        "clock_ahead_s": state.master.get("ahead_s") if station.is_up else None,
         "logs": str(station.places.logs),
         "parts": parts,
     }
@@ -117,6 +119,7 @@ def lines_of(station: Station, state: StationState) -> list[str]:
     lines += [f"  mission: {said['mission'] or 'none'}"] if said["up"] else []
     lines += [f"  page: {said['page']}"] if said["page"] else []
     lines += [f"  disk: {said['disk']}"] if said["disk"] else []
+    lines += [f"  clock of the master's computer: {said['clock_ahead_s']:+.3f} s from ours"] if said["clock_ahead_s"] is not None else []
     return [*lines, f"  logs: {said['logs']}"]
 
 

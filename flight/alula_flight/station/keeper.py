@@ -35,6 +35,7 @@ from alula.common.signals import StopEvent
 from alula.report.deaths import describe_exit
 from alula_flight.station import state as states
 from alula_flight.station.disk import tidy
+from alula_flight.station.master import MasterWatch
 from alula_flight.station.notify import notify
 from alula_flight.station.parts import PROFILE, Part, Places, network_profile, parts_of, places_of
 from alula_flight.station.state import PartState, StationState
@@ -190,6 +191,7 @@ class Keeper:
         self._state.run_id = self._state.run_id or uuid.uuid4().hex
         self._state.keeper, self._state.keeper_started_s = os.getpid(), psutil.Process().create_time()
         self._kept: dict[str, Kept] = {}
+        self._master = MasterWatch(deployment.master)
         self._tidy_s = 0.0
         self.hung_up = False
         for folder in (places.logs, places.bags):
@@ -206,6 +208,9 @@ class Keeper:
             self._do_wanted()
         for one in list(self._kept.values()):
             changed |= one.look()
+        known = self._master.told()
+        if known != self._state.master:
+            self._state.master, changed = known, True
         if time.monotonic() >= self._tidy_s:
             self._tidy_s = time.monotonic() + TIDY_S
             self._tidy()
@@ -216,6 +221,7 @@ class Keeper:
     def end(self) -> None:
         """End all parts."""
         end_all(self._state)
+        self._master.close()
         (self._places.folder / RUN).unlink(missing_ok=True)
         self._state.keeper = 0
         self._state.save(self._places.folder)
@@ -256,6 +262,9 @@ class Keeper:
         try:
             self._deployment = load_deployment(self._deployment.name, self._robot)
             self._read()
+            if self._master.uri != self._deployment.master:
+                self._master.close()
+                self._master = MasterWatch(self._deployment.master)
         except AlulaError as error:
             log.error("the deployment stays as it was: %s", error)
         for name, one in self._kept.items():

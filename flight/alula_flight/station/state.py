@@ -58,6 +58,7 @@ class StationState:
         keeper: process id of what keeps them up; ``keeper_started_s``: when it was started.
         answered: the number of the last request that the keeper has done.
         disk: what is to be said of the disk; empty: nothing.
+        master: of the ROS 1 master, see `MasterWatch.told`.
     """
 
     run_id: str = ""
@@ -66,6 +67,7 @@ class StationState:
     answered: int = 0
     disk: str = ""
     parts: dict[str, PartState] = field(default_factory=dict)
+    master: Mapping[str, object] = field(default_factory=dict)
 
     def save(self, folder: Path) -> None:
         """Write it in one step; a full disk ends nothing."""

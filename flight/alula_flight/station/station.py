@@ -4,15 +4,11 @@ from __future__ import annotations
 
 import os
 import signal
-import socket
 import subprocess
 import sys
 import time
 from collections.abc import Callable, Iterable
 from pathlib import Path
-from typing import Any
-from xmlrpc.client import Error as XmlRpcError
-from xmlrpc.client import ServerProxy, Transport
 
 from alula.common.deployments import Deployment, load_deployment
 from alula.common.errors import AlulaError
@@ -23,7 +19,6 @@ from alula_flight.station.keeper import end_all, read_wanted
 from alula_flight.station.parts import Places, places_of
 from alula_flight.station.state import StationState, living
 
-MASTER_S = 3.0  # wall clock, for the ROS master to answer
 UP_S, DOWN_S = 60.0, 120.0  # wall clock, until all parts have lived for a moment, and until all have ended
 LOOK_S = 0.1
 KEEPER_LOG = "keeper.log"
@@ -32,28 +27,6 @@ SETTLED = (states.RUNNING, states.REFUSED, states.GIVEN_UP)
 
 class StationError(AlulaError):
     """What was asked for can't be done; the message says why, and what to do."""
-
-
-class _Impatient(Transport):
-    """Gives up a silent peer: a computer that is off answers nothing at all."""
-
-    def make_connection(self, host: Any) -> Any:
-        connection = super().make_connection(host)
-        connection.timeout = MASTER_S
-        return connection
-
-
-def why_no_master(uri: str) -> str:
-    """Return why a ROS master can't be talked to; empty where it answers."""
-    try:
-        ServerProxy(uri, transport=_Impatient()).getPid("/alula")
-    except TimeoutError:
-        return f"nothing answers within {MASTER_S:g} s"
-    except socket.gaierror:
-        return "the name of its computer is not known here"
-    except (OSError, XmlRpcError) as error:
-        return getattr(error, "strerror", None) or str(error)
-    return ""
 
 
 class Station:

@@ -19,9 +19,10 @@ from pathlib import Path
 
 from alula.cli.options.live import DOMAINS, PORT
 from alula.cli.table import parser_of
+from alula.common.errors import AlulaError
 from alula.common.network import free_port
-from alula.common.robots import RobotError, RobotFolder, load_robot_folder
-from alula.common.runs import LATEST, Run, live_runs
+from alula.common.robots import RobotFolder, load_robot_folder
+from alula.common.runs import LATEST, Run, find_deployment, live_runs
 from alula.console.admission import Admission, is_loopback
 from alula.console.certificates import fingerprint, own_certificate, server_context
 from alula.console.link import ActError, Link, Mission, Skillsets
@@ -63,12 +64,15 @@ def first_run(options: argparse.Namespace) -> Path | None:
 
     Raises:
         ValueError: there is no such run.
+        AlulaError: there is no such deployment, or it is down.
     """
     if options.domain is not None:
         found = next((run.folder for run in live_runs() if run.domain == options.domain), None)
         if found is None:
             raise ValueError(f"--domain {options.domain}: no run is under way there; start one (alula run SCENARIO), or leave it out")
         return found
+    if options.on is not None:
+        return find_deployment(options.on).folder
     if options.run == LATEST:
         return None
     folder = Path(options.run).expanduser().absolute()
@@ -148,7 +152,7 @@ def main(arguments: Sequence[str] | None = None, make_link: Callable[[], Link] =
         admission = Admission(options.host, port_of(options), token, tls)
         console = Console(admission, LateLink(make_link), fixed=fixed, beside=robots_beside(options), ask_offer=ask_offer)
         asyncio.run(serve_until_told(console, admission, known_by))
-    except (ValueError, OSError, RobotError) as error:
+    except (ValueError, OSError, AlulaError) as error:
         sys.stderr.write(f"alula console: {error}\n")
         return 2
     return 0

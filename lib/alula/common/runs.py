@@ -53,6 +53,14 @@ def up_folder() -> Path:
     return Path(os.environ.get("ALULA_ROBOT_STATE") or find_robot().root / ".alula") / "up"
 
 
+def is_deployment(folder: Path) -> bool:
+    """Tell whether a folder that is shown as a run is that of a deployment."""
+    try:
+        return folder.parent == up_folder()
+    except RobotError:
+        return False
+
+
 def deployments_up() -> list[Run]:
     """Return the robot's deployments that are up on this computer; none where there is no robot."""
     try:

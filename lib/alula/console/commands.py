@@ -8,7 +8,7 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
-from alula.common.runs import NoRunError, Run, load_run
+from alula.common.runs import NoRunError, Run, is_deployment, load_run
 from alula.console import acts
 from alula.console.link import ActError, Link, Mission, PerRun
 from alula.console.manual_control import QUESTIONS, ManualControl
@@ -78,11 +78,11 @@ class Commands:
         return Done(folder, "start", f"{folder.name} is started")
 
     def _told(self, what: str, asked: Asked, run: Path | None, act: Callable[[Mission], str]) -> Done:
-        folder = self._confirmed(asked, run)
+        folder = self._confirmed(asked, run, mission=True)
         return Done(folder, what, act(self._missions.of(load_run(folder))))
 
     def _off(self, asked: Asked, run: Path | None) -> Done:
-        folder = self._confirmed(asked, run)
+        folder = self._confirmed(asked, run, mission=True)
         return Done(folder, "off", acts.everything_off(folder))
 
     def _skill(self, asked: Asked, run: Path | None) -> Done:
@@ -90,12 +90,14 @@ class Commands:
         what, answer = self.manual_control_of(folder).do(asked)
         return Done(folder, what, answer, noted=asked.get("act") not in QUESTIONS)
 
-    def _confirmed(self, asked: Asked, run: Path | None) -> Path:
-        """Return the run that a command means; raise ActError unless the request names the very run that is shown."""
+    def _confirmed(self, asked: Asked, run: Path | None, *, mission: bool = False) -> Path:
+        """Return the run that a command means; raise ActError unless the request names the very run that is shown; ``mission``: one's."""
         if run is None or asked.get("run") != self._name_of(run):
             raise ActError("the run that is shown is another one by now; look again")
         if not is_live(run):
             raise ActError("this run is over")
+        if mission and is_deployment(run):
+            raise ActError("this is what stays up between missions: choose the mission's run; alula down ends what stays up")
         return run
 
 

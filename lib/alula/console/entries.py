@@ -34,6 +34,9 @@ MAP = "/map"
 """Points of the map, see ``clouds.packed``."""
 WORLD = "/world"
 """Edges of the true surfaces: ``[[x, y, z, x, y, z], ...]``, frame map, metres."""
+PARTS = "/parts"
+"""Of a deployment that is up, which is shown as a run without a scenario: ``{parts, master: {uri, problem, ahead_s, within_s}, disk}``.
+A part is ``{name, state, started_s, deaths, why}``, with seconds since 1970."""
 SUMMARY = "/summary"
 """The values of ``summary.json``."""
 PATH = "/path"
@@ -44,7 +47,7 @@ HEALTH = "/health"
 """A watch changed its mind about a sensor: ``{sensor, ok, fault, reason}``."""
 CAUSES = "/causes"
 """Faults, failures with their chains of causes, and what the mission did about them, see ``causes.Causes``."""
-FACTS = frozenset({RUN, ROUTE, AREAS, MAP, WORLD, SUMMARY, CAUSES})
+FACTS = frozenset({RUN, ROUTE, AREAS, MAP, WORLD, SUMMARY, CAUSES, PARTS})
 """Topics of which the last entry counts."""
 NODES = "/nodes"
 """Nodes of the tree that changed: ``[[index, status, message], ...]``; index as in the last tree."""

@@ -14,9 +14,10 @@ from alula.console.areas import areas_of
 from alula.console.causes import Causes
 from alula.console.clouds import CloudError, packed, read_points
 from alula.console.embedded import REPORT, read_report
-from alula.console.entries import AREAS, CAUSES, MAP, OF_RECORDINGS, PICTURE, RUN, SUMMARY, Converter, Wire
+from alula.console.entries import AREAS, CAUSES, MAP, OF_RECORDINGS, PARTS, PICTURE, RUN, SUMMARY, Converter, Wire
 from alula.console.lines import LinesFollower
 
+OF_A_PART = ("state", "started_s", "deaths", "why")
 OF_THE_MACHINE = ("out_dir", "run_id")
 """Of ``run.json``, what a reader of the page can't use."""
 
@@ -44,6 +45,7 @@ class RunFollower:
             (folder / "run.json", AREAS, lambda path: areas_of(str(_json(path).get("world") or ""))),
             (folder / "map.ply", MAP, lambda path: packed(read_points(path))),
             (folder / "summary.json", SUMMARY, _json),
+            (folder / "state.json", PARTS, _parts),
         ]
         self._seen: dict[str, tuple[int, int]] = {}
         self._told = False
@@ -115,6 +117,13 @@ class RunFollower:
             "name": self.folder.name,
             "words": page_words(),
         }
+
+
+def _parts(path: Path) -> Any:
+    """Return what runs of a deployment, as its keeper has written it."""
+    state = _json(path)
+    parts = [{"name": name, **{key: part.get(key) for key in OF_A_PART}} for name, part in state["parts"].items()]
+    return {"parts": parts, "master": state.get("master", {}), "disk": state.get("disk", "")}
 
 
 def _json(path: Path) -> Any:

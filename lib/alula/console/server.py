@@ -25,9 +25,9 @@ from websockets.exceptions import ConnectionClosed
 from websockets.http11 import Request, Response
 from websockets.protocol import State
 
-from alula.common.robots import RobotFolder, robots_of_fleet
+from alula.common.robots import RobotError, RobotFolder, robots_of_fleet
 from alula.common.run_log import note_act
-from alula.common.runs import runs_folder
+from alula.common.runs import is_deployment, runs_folder, up_folder
 from alula.common.scenarios import scenario_names
 from alula.console import acts, commands
 from alula.console.admission import Admission
@@ -51,6 +51,8 @@ MAX_MESSAGE_BYTES = 1 << 14
 MAX_COMMANDS_PER_S = 10
 LOOK_S = 0.5
 SHOWN_RUNS = 20
+DEPLOYMENT = "deployment "
+"""Begins the name of what is shown of a deployment that is up."""
 WAITING = 16
 """So many acts may wait for their answers at once. Those of manual control have threads of their own: none keeps a vehicle from landing."""
 
@@ -214,7 +216,8 @@ class Console:
         self._offers |= {"over": [acts.LIVE, acts.MOCKS], "options": [asdict(option) for option in self._options]}
 
     def _folders(self) -> list[Path]:
-        return [runs_folder(), *(robot.runs for robot in self._beside), *(runs_folder().glob("*") if self._fleet else ())]
+        beside = [robot.runs for robot in self._beside]
+        return [runs_folder(), *_up_folders(), *beside, *(runs_folder().glob("*") if self._fleet else ())]
 
     def _robot_of(self, run: Path) -> RobotFolder | None:
         """Return the robot beside the console's own, or of its fleet, that a run is of; None for one of its own."""
@@ -228,14 +231,23 @@ class Console:
     def _name_of(self, run: Path) -> str:
         if self._of_fleet(run):
             return f"{run.parent.name}/{run.name}"
+        if is_deployment(run):
+            return f"{DEPLOYMENT}{run.name}"
         robot = self._robot_of(run)
         return run.name if robot is None else f"{robot.name}/{run.name}"
 
     async def _look_for_runs(self) -> None:
         while True:
-            self._runs = await asyncio.to_thread(commands.runs_in, self._folders(), self._fixed)
-            self._live = await asyncio.to_thread(lambda: {run for run in self._runs[:SHOWN_RUNS] if commands.is_live(run)})
+            self._runs, self._live = await asyncio.to_thread(self._found)
             await asyncio.sleep(LOOK_S)
+
+    def _found(self) -> tuple[list[Path], set[Path]]:
+        """Return what can be shown, and what of it is under way: a deployment only while it is up, however many missions it has had."""
+        found = commands.runs_in(self._folders(), self._fixed)
+        up = [one for one in found if is_deployment(one) and commands.is_live(one)]
+        runs = [one for one in found if not is_deployment(one)]
+        shown = [*runs[: SHOWN_RUNS - len(up)], *up]
+        return [*shown, *runs[SHOWN_RUNS - len(up) :]], {one for one in shown if one in up or commands.is_live(one)}
 
     async def _look_at_skills(self) -> None:
         """Keep an eye on the skillsets of the runs whose viewers look at them."""
@@ -272,7 +284,8 @@ class Console:
         return chosen or self._shown_first()
 
     def _shown_first(self) -> Path | None:
-        return self._fixed or (self._runs[0] if self._runs else None)
+        """Return what is shown to who has chosen nothing: the newest that is under way, a mission before a deployment; else the newest."""
+        return self._fixed or next((run for run in self._runs if run in self._live), self._runs[0] if self._runs else None)
 
     def _feed(self, folder: Path) -> Feed:
         if folder not in self._feeds:
@@ -329,6 +342,7 @@ class Console:
         return {
             "run": "" if run is None else self._name_of(run),
             "live": run in self._live,
+            "deployment": run is not None and is_deployment(run),
             "report": run is not None and (run / REPORT).is_file(),
             "runs": [self._name_of(folder) for folder in self._runs[:SHOWN_RUNS]],
             "underWay": [self._name_of(folder) for folder in self._runs[:SHOWN_RUNS] if folder in self._live],
@@ -407,6 +421,12 @@ class Console:
             return
         stamp_s = self._feed(run).last_s
         note_act(run, stamp_s, {"command": command, "by": viewer.name, "answer": answer})
+
+
+def _up_folders() -> list[Path]:
+    with contextlib.suppress(RobotError):
+        return [up_folder()]
+    return []
 
 
 def _object(message: str | bytes) -> dict[str, Any]:

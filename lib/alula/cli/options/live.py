@@ -20,6 +20,8 @@ def console(parser: ArgumentParser) -> None:
     which = parser.add_mutually_exclusive_group()
     which.add_argument("--run", metavar="DIR|latest", default=LATEST, help="show this run's folder first (default: the newest)")
     which.add_argument("--domain", type=int, metavar="N", help="show the run under way in this DDS domain first")
+    on = which.add_argument("--on", metavar="DEPLOYMENT", help="show this deployment first, which is up here")
+    completed_by(on, "deployments")
     parser.add_argument(
         "--beside", type=Path, action="append", default=[], metavar="DIR", help="show the runs of the robot in this folder, too; repeatable"
     )

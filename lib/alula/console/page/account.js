@@ -21,7 +21,16 @@ const causesOf = (run) => run.facts["/causes"] ?? NO_CAUSES;
 const faultsOf = (run) => causesOf(run).faults;
 const failures = (run) => causesOf(run).failures;
 
+/** What stays up between missions, {parts, master, disk}, where this is no mission's run but that of a deployment; else null. */
+const deploymentOf = (run) => (run.facts["/run"]?.deployment && !run.facts["/run"].scenario ? { name: run.facts["/run"].deployment, parts: [], master: {}, disk: "", ...run.facts["/parts"] } : null);
+
 function headline(run) {
+  const deployment = deploymentOf(run);
+  if (deployment && run.over) return { text: `${deployment.name} is down`, tone: "bad", reason: "" };
+  if (deployment) {
+    const bad = deployment.parts.filter(({ state }) => state !== "running").length;
+    return { text: `${deployment.name} is up${bad ? `, but for ${bad} of ${deployment.parts.length} parts` : ""}`, tone: bad ? "bad" : "good", reason: "Between missions: skills can be started one by one, under Manual control; a mission by the form above." };
+  }
   const mission = last(run.mission.v) ?? {};
   const summary = run.facts["/summary"];
   if (run.begin === null && run.mission.v.length) return { text: "The mission waits for its clock", tone: "now", reason: "" };

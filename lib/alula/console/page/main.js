@@ -42,7 +42,8 @@ function showAccount() {
   setText(byId("reason"), reason);
   byId("state").style.setProperty("--tone", `var(--${tone})`);
   const asked = run.facts["/run"] ?? {};
-  const parts = [asked.scenario, asked.world && `world ${asked.world}`, asked.seed != null && `seed ${asked.seed}`, asked.faults?.length && `failing ${asked.faults.join(", ")}`, onWhat(run)];
+  document.body.classList.toggle("between", Boolean(deploymentOf(run))); // there is no mission whose map, tree and times could be shown
+  const parts = [asked.scenario, asked.world && `world ${asked.world}`, asked.seed != null && `seed ${asked.seed}`, asked.faults?.length && `failing ${asked.faults.join(", ")}`, deploymentOf(run) ? "between missions" : onWhat(run)];
   setText(byId("title"), asked.name ? `Alula · ${asked.name}` : "Alula");
   for (const node of document.querySelectorAll("[data-word]")) setText(node, run.departure === null ? "the first event" : robotWords(run)[node.dataset.word]);
   byId("slider").setAttribute("aria-label", `moment of the run, seconds since ${robotWords(run).departure}`);
@@ -268,6 +269,7 @@ class Link {
       if (this.run && said.status.run !== this.run && !said.status.runs.includes(this.run)) this.run = "";
       if (run.over === said.status.live) draw();
       run.over = !said.status.live;
+      if (said.status.deployment && this.opened !== said.status.run) [this.opened, this.manual.box.open] = [said.status.run, true]; // once: it is what there is to see
       this.bar.show(said.status, last(run.start.v), last(run.held.v) ?? null, run.departure !== null);
     }
     if (said.status && (!said.status.live || this.manual.run !== said.status.run)) this.manual.forget();
@@ -283,7 +285,7 @@ class Link {
     const state = stale ? "stale" : this.behind > 0 ? "catching up" : this.status?.live ? "live" : "over";
     const since = this.heard ? `disconnected: what is shown is ${seconds(age / 1000, 0)} old` : "connecting …";
     const problems = this.status?.problems ?? [];
-    setText(byId("link"), stale ? since : { live: "live", over: this.status?.run ? "this run is over" : "no run yet", "catching up": "catching up" }[state] + (problems.length ? ` (${problems.join("; ")})` : ""));
+    setText(byId("link"), stale ? since : { live: "live", over: this.status?.run ? "this run is over" : "no run yet; alula up starts what stays up between missions", "catching up": "catching up" }[state] + (problems.length ? ` (${problems.join("; ")})` : ""));
     byId("link").dataset.state = live.state = state;
     this.bar.enable();
     this.bar.showWaiting();

@@ -182,7 +182,7 @@ class OperatorBar {
     const may = Boolean(this.status?.commands) && live.state !== "stale";
     this.abort.rename(robotWords(run).stop);
     this.begin.disabled = !may;
-    this.abort.disabled = this.pause.disabled = this.resume.disabled = !may || !this.status.live;
+    this.abort.disabled = this.pause.disabled = this.resume.disabled = !may || !this.status.live || this.status.deployment;
     [this.pause.hidden, this.resume.hidden] = [this.paused, !this.paused];
     this.own.hidden = this.over.value === "mocks";
     this.off.disabled = this.abort.disabled || this.word.value.trim().toUpperCase() !== "OFF";

@@ -2,6 +2,7 @@
 // At the end of a run that is over the figures are those of the whole run.
 
 const RECENT = 6;
+const FAR_CLOCK_S = 0.05;
 
 /** What runs at t: [{name, since, inputs}], in the order of their starts. */
 function activeAt(run, t) {
@@ -31,6 +32,8 @@ function fieldAt(run, t, pattern) {
 
 /** The robot's figures at t: [{label, text, tone}]; what nothing measures says so. */
 function readings(run, t) {
+  const deployment = deploymentOf(run);
+  if (deployment) return deploymentReadings(deployment);
   const numbers = (patterns) => patterns.map((pattern) => fieldAt(run, t, pattern));
   const told = (label, fields, write) => {
     if (fields.some((field) => field === undefined)) return null; // the robot has no such data
@@ -54,6 +57,24 @@ function readings(run, t) {
     told(`${robotWords(run).controller}'s mode`, [namedFieldAt(run, t, robotWords(run).mode)], (mode) => ({ text: String(mode), tone: modesOf(run)[mode] ? "fair" : "" })),
   ];
   return shown.filter(Boolean);
+}
+
+/** What runs of a deployment, whether the other computer's master answers, and how far its clock is from this computer's. */
+function deploymentReadings({ parts, master }) {
+  const shown = parts.map(({ name, state }) => ({ label: name, text: state, tone: state === "running" ? "" : "bad" }));
+  if (master.uri) shown.push({ label: "link to the ROS master", text: master.problem ? "lost" : "up", tone: master.problem ? "bad" : "" });
+  const { ahead_s: ahead } = master;
+  if (ahead !== undefined) shown.push({ label: "clock of its computer", text: `${ahead > 0 ? "+" : "−"}${fixed(Math.abs(ahead), 3)} s`, tone: Math.abs(ahead) > FAR_CLOCK_S ? "fair" : "" });
+  return shown;
+}
+
+/** What is wrong with it: [{text, tone, since}]. */
+function deploymentWrong({ parts, master, disk }) {
+  const found = parts.filter(({ state }) => state !== "running").map(({ name, state, why }) => ({ text: `${name} does not run (${state})${why ? `: ${why}` : ""}`, tone: "bad", since: null }));
+  if (master.problem) found.push({ text: `the ROS master at ${master.uri}: ${master.problem}`, tone: "bad", since: null });
+  if (Math.abs(master.ahead_s ?? 0) > FAR_CLOCK_S) found.push({ text: `the clocks of the two computers are ${fixed(Math.abs(master.ahead_s), 3)} s apart`, tone: "fair", since: null });
+  if (disk) found.push({ text: disk, tone: "fair", since: null });
+  return found;
 }
 
 function awayTold(run, t) {
@@ -86,6 +107,8 @@ function linkAt(run, t, told) {
 
 /** What is wrong at t: [{text, tone, since}]. */
 function wrongAt(run, t) {
+  const deployment = deploymentOf(run);
+  if (deployment) return deploymentWrong(deployment);
   const found = [];
   const left = run.departure !== null && t >= run.departure;
   if (!left && !run.over) for (const [needed, otherwise] of valueAt(run.start, t) ?? []) if (otherwise) found.push({ text: `before the start: ${otherwise || needed}`, tone: "fair", since: null });
@@ -122,13 +145,20 @@ function endedBadly(run, t) {
   return ended.map((one) => ({ text: `${one.skill}: ${endingOf(one) === "violated" ? `invariant ${one.result} violated` : `${words(one.state)} ${one.result}`.trim()}`, tone: "fair", since: one.end }));
 }
 
+/** Why nothing is active: a mission that has not begun says what it waits for. */
+function nothingTold(run, t) {
+  if (deploymentOf(run)) return "no mission";
+  if (run.mission.v.length && last(run.mission.v).outcome !== "running") return "nothing any more";
+  const unmet = (valueAt(run.start, t) ?? []).filter(([, otherwise]) => otherwise).map(([, otherwise]) => otherwise);
+  return unmet.length ? `nothing yet: the mission waits, ${unmet.join(", ")}` : "nothing yet";
+}
+
 /** Shows all of that. */
 function showState(t) {
   const zero = origin(run);
   const ago = (since) => (Number.isFinite(since) ? ` since ${seconds(since - zero)}` : "");
   const active = activeAt(run, t);
-  const none = run.mission.v.length && last(run.mission.v).outcome !== "running" ? "nothing any more" : "nothing yet";
-  rewrite(byId("active"), active.length ? active : [null], (one) => (one ? el("li", { title: one.inputs }, el("b", {}, one.name), el("span", {}, `since ${seconds(one.since - zero)}`)) : el("li", { class: "hint" }, none)));
+  rewrite(byId("active"), active.length ? active : [nothingTold(run, t)], (one) => (one.name ? el("li", { title: one.inputs }, el("b", {}, one.name), el("span", {}, `since ${seconds(one.since - zero)}`)) : el("li", { class: "hint" }, one)));
   rewrite(byId("readings"), readings(run, t), ({ label, text, tone }) => el("div", { class: tone ?? "" }, el("dt", {}, label), el("dd", {}, text)));
   const whole = Boolean(run.facts["/summary"]) && cursor === null; // at the end of a run that is over, what it came to
   [byId("readings").hidden, byId("figures-row").hidden] = [whole, !whole];

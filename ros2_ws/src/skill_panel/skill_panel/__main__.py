@@ -16,7 +16,7 @@ from pathlib import Path
 from alula.cli.options.live import DOMAINS
 from alula.cli.table import parser_of
 from alula.common.errors import AlulaError
-from alula.common.runs import Run, deployments_up, find_deployment, find_run, live_runs, up_folder
+from alula.common.runs import Run, deployments_up, find_deployment, find_run, is_deployment, live_runs
 from skill_panel.memory import Memory
 from skill_panel.watcher import Watcher, all_found, skillsets_in
 from skillset_ros2.session import Session
@@ -62,7 +62,7 @@ def place_of(options: argparse.Namespace) -> Place:
 
 def _of_run(run: Run) -> Place:
     where = f"DDS domain {run.domain}, {run.namespace}" if run.namespace else f"DDS domain {run.domain}"
-    if run.folder.parent == up_folder():
+    if is_deployment(run.folder):
         return Place(run.domain, f"on {run.folder.name} ({where})", run.namespace)
     return Place(run.domain, f"in the run {run.folder.name} ({where})", run.namespace)
 
