@@ -12,7 +12,7 @@ distribution = setup(
     package_dir={"": "."},  # so that an editable installation is a path, not an import hook
     package_data={
         "alula": ["py.typed"],
-        "alula.console": ["page/*"],
+        "alula.report.page": ["program/*"],
         "alula.generate.scaffold": ["robot/**/*.in"],
     },
     data_files=[("share/ament_index/resource_index/packages", ["resource/alula"]), ("share/alula", ["package.xml"])],

@@ -20,7 +20,7 @@ DRONE = rf"uav_\w+|{DRONE_PACKAGES}|navigation_\w+|perception_managers|mapping_m
 DRONE_WORDS = r"ardupilot|autopilots?|drones?|guidance|imu|lidar|lift[-_ ]?off|mavlink|radio\w*|take[-_ ]?off|telepilot|vehicles?|video|zed"
 CONTRACT = {"lift_off", "landed"}
 """What files of a run have been called since there is but the drone (`summary.json`)."""
-PAGE = ("lib/alula/console/page", "lib/alula/editor")
+PAGE = ("lib/alula/report/page/program", "lib/alula/editor")
 """Programs of pages: every word counts, as no reader can tell which of them are shown."""
 GENERATED = {"lib/alula/generate"}
 """Texts of the library that become code of a robot, which imports ROS."""
@@ -71,8 +71,6 @@ WRONG = {
     "alula.missions.scenario -> alula.language.errors",
     "alula.missions.scenario -> alula.language.fleet",
     "alula.missions.skill_types -> alula.language.syntax.elements",
-    "alula.report.making -> alula.console.entries",
-    "alula.report.making -> alula.console.page",
     "alula.trees.groot.values -> alula.runtime.plain",
 }
 """What doesn't fit the table yet. This list only gets shorter."""

@@ -13,11 +13,11 @@ from alula.cli.run_request import run_folder
 from alula.cli.saying import warner
 from alula.common.robots import RobotError, find_robot
 from alula.common.run_log import note_mocked
-from alula.console.page import write_report
 from alula.language.errors import has_errors
 from alula.missions.director import Outcome
 from alula.missions.part import NO_PART
 from alula.prove.mission.run import MissionFinding
+from alula.report.page.writing import write_report
 from alula.runtime.live.spec import RequestError
 
 COMMAND = "alula check"

@@ -1,5 +1,4 @@
-"""The operator's page: one page for a run that goes on, over a WebSocket, and for one that is over, as ``report.html``.
+"""The operator's page of a run that goes on: ``server`` serves the page of ``alula.report.page`` and what happens over a WebSocket.
 
-``following`` reads what a run leaves in its folder, ``page`` makes the page, ``server`` serves it; what the page shows is a fold over
-the run's entries, in ``page/fold.js``.
+``feed`` keeps the entries of a run for the pages that are open, ``commands`` and ``acts`` do what the operator asks for.
 """

@@ -10,8 +10,8 @@ from dataclasses import dataclass, field
 from pathlib import Path
 
 from alula.common.robots import RobotFolder, meaning
-from alula.console.entries import FACTS, written
-from alula.console.following import RunFollower
+from alula.report.page.entries import FACTS, written
+from alula.report.page.following import RunFollower
 
 POLL_S = 0.1
 READ_ENTRIES = 1000

@@ -31,10 +31,10 @@ from alula.common.runs import is_deployment, runs_folder, up_folder
 from alula.common.scenarios import scenario_names
 from alula.console import acts, commands
 from alula.console.admission import Admission
-from alula.console.embedded import REPORT
 from alula.console.feed import Feed, place_of
 from alula.console.link import ActError, Link
-from alula.console.page import make_page
+from alula.report.page.embedded import REPORT
+from alula.report.page.writing import make_page
 from alula.runtime.live.options import RunOffer, RunOption
 from alula.runtime.live.spec import RequestError
 

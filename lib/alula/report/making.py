@@ -14,8 +14,6 @@ from alula.common.record import FILE as RECORD
 from alula.common.robots import meaning
 from alula.common.runs import robot_of
 from alula.common.scenarios import load_scenario
-from alula.console.entries import FAULT, Wire
-from alula.console.page import write_report
 from alula.records.causes.alarms import Alarms
 from alula.records.causes.effects import EffectsByFault
 from alula.records.causes.fault_file import effects_of_models, effects_of_robot
@@ -24,6 +22,8 @@ from alula.report.files import Problems
 from alula.report.history import History, read_history
 from alula.report.mock_account import MockSummary, read_mock
 from alula.report.observed import Observed
+from alula.report.page.entries import FAULT, Wire
+from alula.report.page.writing import write_report
 from alula.report.part import Findings, ReportedRun, ReportPart, part_of_robot
 from alula.report.phases import Phases, find_phases
 from alula.report.recovery import Recovery, find_recovery

@@ -93,7 +93,7 @@ class ReportPart(Protocol):
         ...
 
     def entries(self) -> Iterable[Entry]:
-        """Return what the page gets besides what lies in the run's folder, of the topics `alula.console.entries.OF_RECORDINGS`."""
+        """Return what the page gets besides what lies in the run's folder, of the topics `alula.report.page.entries.OF_RECORDINGS`."""
         ...
 
 

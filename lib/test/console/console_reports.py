@@ -9,9 +9,9 @@ from typing import Any
 
 from console_records import LIFT_OFF_S, Story, failing_story, write_record
 
-from alula.console.embedded import REPORT
-from alula.console.entries import Wire
-from alula.console.page import write_report
+from alula.report.page.embedded import REPORT
+from alula.report.page.entries import Wire
+from alula.report.page.writing import write_report
 
 OTHER_RECORDINGS = ("/fault", "/path")
 """Topics of the page that the record of the mission does not hold."""

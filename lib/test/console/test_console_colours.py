@@ -12,7 +12,7 @@ from console_records import LIFT_OFF_S, failing_story, transition
 from console_reports import make_report
 
 from alula.common.record import EVENTS
-from alula.console.page import PARTS
+from alula.report.page.writing import PARTS
 
 LEAST = 4.5
 BARS = ("success", "ended", "interrupted", "violated", "failure", "running")

@@ -31,13 +31,13 @@ from hypothesis.extra import numpy as stn
 from alula.common.record import DATA, EVENTS, FILE, MISSION, OPERATOR, REPORTS, TICKS, TREE, Entry
 from alula.common.robots import RobotError, load_robot_folder
 from alula.common.run_log import PICTURES_FILE, note_act
-from alula.console.areas import areas_of
-from alula.console.clouds import MAX_POINTS, CloudError, packed, read_points, thinned
-from alula.console.embedded import REPORT, entries_inside, read_report
-from alula.console.entries import AREAS, CAUSES, HEALTH, MAP, NODES, PATH, PICTURE, ROUTE, RUN, Converter, Wire
 from alula.console.feed import CHUNK_BYTES, Feed, Place, place_of
-from alula.console.following import RunFollower
-from alula.console.page import MAX_PICTURES, PARTS, make_page, write_report
+from alula.report.page.areas import areas_of
+from alula.report.page.clouds import MAX_POINTS, CloudError, packed, read_points, thinned
+from alula.report.page.embedded import REPORT, entries_inside, read_report
+from alula.report.page.entries import AREAS, CAUSES, HEALTH, MAP, NODES, PATH, PICTURE, ROUTE, RUN, Converter, Wire
+from alula.report.page.following import RunFollower
+from alula.report.page.writing import MAX_PICTURES, PARTS, make_page, write_report
 
 
 def entry(topic: str, t_s: float, value: dict[str, object]) -> Entry:

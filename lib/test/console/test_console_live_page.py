@@ -19,8 +19,8 @@ from console_serving import OPTIONS, WAIT_S, Robot, served
 from alula.common.record import EVENTS, MISSION, OPERATOR, TICKS, TREE
 from alula.common.run_log import note_act
 from alula.console.acts import ActError, WantedRun
-from alula.console.entries import FAULT, HEALTH, PATH
-from alula.console.page import write_report
+from alula.report.page.entries import FAULT, HEALTH, PATH
+from alula.report.page.writing import write_report
 
 
 def test_the_live_page_follows_says_when_it_is_cut_off_and_is_true_again(

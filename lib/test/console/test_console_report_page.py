@@ -12,8 +12,8 @@ from console_records import HOSTILE, LIFT_OFF_S, Story, execution, failing_story
 from console_reports import SUMMARY, make_report, make_story_report
 
 from alula.common.record import EVENTS, MISSION, OPERATOR, TREE
-from alula.console.embedded import REPORT
-from alula.console.page import write_report
+from alula.report.page.embedded import REPORT
+from alula.report.page.writing import write_report
 
 ANSWERS = (
     "[...document.querySelectorAll('#answers tbody tr')].map((row) => [...row.children].map((cell) =>"

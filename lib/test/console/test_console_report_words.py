@@ -12,8 +12,8 @@ from console_records import LIFT_OFF_S, failing_story, overtaken
 from console_reports import make_report, make_story_report
 
 from alula.common.record import DATA, MISSION
-from alula.console.embedded import REPORT
-from alula.console.page import write_report
+from alula.report.page.embedded import REPORT
+from alula.report.page.writing import write_report
 
 TIMES = "[...document.querySelectorAll('.chain')].map((one) => [...one.querySelectorAll('button')].map((b) => parseFloat(b.textContent)))"
 """The times of each chain of causes."""

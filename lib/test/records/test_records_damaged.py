@@ -11,7 +11,6 @@ import pytest
 
 from alula.cli import conform, expect, replay
 from alula.common.record import DECISIONS, EVENTS, FILE, MISSION, REPORTS, RecordFollower, RecordWriter
-from alula.console.following import RunFollower
 from alula.records.errors import AnalysisError
 from alula.records.replay.deciding import Conditions, decide, read_mission
 from alula.records.replay.outputs import write_out
@@ -19,6 +18,7 @@ from alula.records.replay.recorded import ReplayError, load
 from alula.records.run import load_recorded_run
 from alula.report.files import Problems
 from alula.report.history import read_history
+from alula.report.page.following import RunFollower
 
 RECORDING = Path(os.environ["ALULA_ROOT"]) / "tests/recordings/mapping"
 PLACE = "damaged at byte "

@@ -12,11 +12,11 @@ import pytest
 from alula.common import run_log
 from alula.common.faults import FaultChange
 from alula.common.scenarios import load_scenario
-from alula.console.entries import FAULT, HEALTH, PATH
 from alula.report.facts import RunFacts
 from alula.report.files import Problems
 from alula.report.history import History
 from alula.report.making import fault_entries
+from alula.report.page.entries import FAULT, HEALTH, PATH
 from alula.report.part import ReportedRun
 from uav_report.flight import FlightReport
 from uav_report.page import page_entries

@@ -6,7 +6,7 @@ from collections.abc import Iterator
 
 import numpy as np
 
-from alula.console.entries import HEALTH, PATH, WORLD, Wire
+from alula.report.page.entries import HEALTH, PATH, WORLD, Wire
 from uav_report.recording import Recording, Track
 from uav_report.world import TrueSurfaces
 

@@ -1,5 +1,5 @@
 // What happened, in words: the outcome; a row a failure with what was done and what it cost; each failure's chain of causes. What failed of
-// what, and what the mission did about it, is told by "/causes" (alula.console.causes): nothing is judged here.
+// what, and what the mission did about it, is told by "/causes" (alula.report.page.causes): nothing is judged here.
 
 const OUTCOMES = {
   accomplished: ["Mission accomplished", "good"],

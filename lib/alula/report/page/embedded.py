@@ -9,7 +9,7 @@ import zlib
 from collections.abc import Iterable
 from pathlib import Path
 
-from alula.console.entries import Wire, written
+from alula.report.page.entries import Wire, written
 
 REPORT = "report.html"
 _BEGIN, _END = 'id="record">', "</script>"

@@ -12,7 +12,6 @@ from typing import Any
 
 from alula.common.faults import DIED, FaultChange, FaultError, FaultRequest, parse_fault
 from alula.common.record import EVENTS, MISSION, OPERATOR, TREE
-from alula.console.entries import FAULT, HEALTH, NODES, RUN, SUMMARY, Wire
 from alula.records.causes.branches import Trees
 from alula.records.causes.chains import Judgement, KnownFault, Scene, Step, chain_of, reaction_in, reacts_until_s
 from alula.records.causes.effects import EffectsByFault
@@ -22,6 +21,7 @@ from alula.records.causes.faults import Fault, faults_asked, faults_told, trace
 from alula.records.causes.wording import end_text, fault_text, spoken
 from alula.records.errors import AnalysisError
 from alula.records.run import departure, lift_off_of, origin_of
+from alula.report.page.entries import FAULT, HEALTH, NODES, RUN, SUMMARY, Wire
 from alula.runtime.core.events import EngineEvent, TransitionEvent, read_event
 
 HOLDING = {"pause": True, "paused": True, "resume": False, "abort": False}

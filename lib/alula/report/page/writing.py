@@ -10,11 +10,11 @@ from collections.abc import Iterable, Mapping
 from pathlib import Path
 
 from alula.common.files import write_text
-from alula.console.embedded import REPORT, embedded
-from alula.console.entries import PICTURE, Wire
-from alula.console.following import RunFollower
+from alula.report.page.embedded import REPORT, embedded
+from alula.report.page.entries import PICTURE, Wire
+from alula.report.page.following import RunFollower
 
-PARTS = Path(__file__).parent / "page"
+PARTS = Path(__file__).parent / "program"
 MAX_PICTURES = 400
 """In a report: 3 MB of it at most."""
 PROGRAM = ("dom", "fold", "robot", "account", "state", "tree", "timeline", "map", "figures", "pictures", "operator", "manual", "main")

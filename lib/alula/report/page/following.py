@@ -10,12 +10,12 @@ from typing import Any
 from alula.common import run_log
 from alula.common.record import FILE, OPERATOR, Entry, RecordError, RecordFollower
 from alula.common.robots import page_words
-from alula.console.areas import areas_of
-from alula.console.causes import Causes
-from alula.console.clouds import CloudError, packed, read_points
-from alula.console.embedded import REPORT, read_report
-from alula.console.entries import AREAS, CAUSES, MAP, OF_RECORDINGS, PARTS, PICTURE, RUN, SUMMARY, Converter, Wire
-from alula.console.lines import LinesFollower
+from alula.report.page.areas import areas_of
+from alula.report.page.causes import Causes
+from alula.report.page.clouds import CloudError, packed, read_points
+from alula.report.page.embedded import REPORT, read_report
+from alula.report.page.entries import AREAS, CAUSES, MAP, OF_RECORDINGS, PARTS, PICTURE, RUN, SUMMARY, Converter, Wire
+from alula.report.page.lines import LinesFollower
 
 OF_A_PART = ("state", "started_s", "deaths", "why")
 OF_THE_MACHINE = ("out_dir", "run_id")
