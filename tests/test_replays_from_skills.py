@@ -93,7 +93,9 @@ def mapping_over_mocks(out: Path) -> MockedMission:
     skillsets = robot_skillsets(("navigation", "perception", "mapping"))
     behaviour = load_behaviour([ALULA_ROOT / "skillsets/uav/mock.yaml"], robot_skillsets())
     out.mkdir()
-    return MockedMission(skillsets, behaviour.of(frozenset(s.name for s in skillsets)), plan_of(load_scenario("mapping"), inputs), out=out)
+    return MockedMission(
+        skillsets, behaviour.of(frozenset(s.name for s in skillsets)), plan_of(load_scenario("mapping"), inputs, skillsets), out=out
+    )
 
 
 def pause_between(mission: MockedMission, *, pause_s: float, resume_s: float) -> None:

@@ -54,7 +54,7 @@ class MockedScenario:
     @cached_property
     def plan(self) -> MissionPlan:
         """The mission, read once for all runs; raises RobotError and InputError."""
-        return plan_of(self.scenario, self.inputs)
+        return plan_of(self.scenario, self.inputs, self.skillsets)
 
     def check(self, faults: Sequence[FaultRequest]) -> None:
         """Refuse faults that the mocks don't have.

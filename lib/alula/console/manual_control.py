@@ -7,11 +7,11 @@ import threading
 from collections.abc import Callable, Mapping
 from typing import TYPE_CHECKING, Any
 
+from alula.common.plain import to_plain
 from alula.console.form import Field, FormError, fields, values
 from alula.console.link import ActError, Skillset, Skillsets
 from alula.model.execution_state import ExecutionState
 from alula.runtime.core.errors import SkillRuntimeError
-from alula.runtime.plain import to_plain
 
 if TYPE_CHECKING:
     from alula.console.view import ResourceRow, SkillRow, SkillsetView

@@ -39,6 +39,16 @@ def together(fleet: RobotFolder, robots: Mapping[str, Robot]) -> Robot:
     return Robot(fleet.name, skillsets, types, Bindings(bound), files)
 
 
+def places_of(fleet: RobotFolder) -> dict[str, tuple[str, str]]:
+    """Return namespace and own name of each skillset of a fleet, as ("/rover", "base"), by its name in the fleet; nothing for a robot.
+
+    Raises:
+        LanguageError: the models of one of its robots have errors.
+    """
+    skillsets = [(robot, one.name) for robot, folder in fleet.robots.items() for one in load_models(folder).skillsets]
+    return {fleet_name(robot, skillset): (f"/{robot}", skillset) for robot, skillset in skillsets}
+
+
 def in_fleet(robot: str, skillsets: tuple[Skillset, ...]) -> tuple[Skillset, ...]:
     """Return a robot's skillsets under their names in a fleet."""
     return tuple(replace(one, name=fleet_name(robot, one.name)) for one in skillsets)

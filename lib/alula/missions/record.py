@@ -9,6 +9,7 @@ from typing import Concatenate, ParamSpec
 
 from alula.common import run_log
 from alula.common.files import write_text
+from alula.common.plain import to_plain
 from alula.common.record import BLACKBOARD, DATA, DECISIONS, EVENTS, FILE, MISSION, OPERATOR, REPORTS, TICKS, TREE, RecordWriter
 from alula.common.robots import RobotError, find_robot
 from alula.missions.conditions import Condition
@@ -18,7 +19,6 @@ from alula.missions.plan import MissionPlan
 from alula.missions.skillset import Clock
 from alula.runtime.core.events import EngineEvent, ExecutionEvent, event_record
 from alula.runtime.handle import SkillHandle
-from alula.runtime.plain import to_plain
 from alula.trees.groot.watching import Watch
 from alula.trees.view import NodeView
 

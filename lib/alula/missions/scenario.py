@@ -2,26 +2,29 @@
 
 from __future__ import annotations
 
-from dataclasses import replace
+from collections.abc import Iterable
 from pathlib import Path
 
-from alula.common.robots import RobotFolder, find_robot, fleet_name, wrong_world
+from alula.common.robots import find_robot, wrong_world
 from alula.common.scenarios import Scenario
-from alula.language.errors import LanguageError
-from alula.language.fleet import load_models
 from alula.missions.mission_file import plan_of_file
 from alula.missions.part import NO_PART
 from alula.missions.plan import InputError, Inputs, MissionPlan
 from alula.missions.serving import serving_plan
+from alula.model.model import Skillset
 
 
-def plan_of(scenario: Scenario, inputs: Inputs) -> MissionPlan:
-    """Return a scenario's plan for these inputs; raises RobotError where there is no robot or none of its nodes, and InputError."""
+def plan_of(scenario: Scenario, inputs: Inputs, models: Iterable[Skillset]) -> MissionPlan:
+    """Return a scenario's plan for these inputs; ``models`` are those of the robot, or as many as the scenario names.
+
+    Raises:
+        RobotError, InputError: there is no robot, it has no such skillsets or nodes, or the mission's file can't be used.
+    """
     if not scenario.mission:
         return serving_plan(scenario)
     if not scenario.mission.endswith(".xml"):
         raise InputError(f"the mission {scenario.mission} is no file of a tree; name one: missions/NAME.xml")
-    return plan_of_mission_file(find_robot().root / scenario.mission, scenario, inputs)
+    return plan_of_mission_file(find_robot().root / scenario.mission, scenario, inputs, models)
 
 
 def inputs_of(scenario: Scenario, world: str = "") -> Inputs:
@@ -44,26 +47,15 @@ def inputs_of(scenario: Scenario, world: str = "") -> Inputs:
     return inputs
 
 
-def plan_of_mission_file(path: Path, scenario: Scenario, inputs: Inputs) -> MissionPlan:
-    """Return the plan of a file as a scenario's mission.
+def plan_of_mission_file(path: Path, scenario: Scenario, inputs: Inputs, models: Iterable[Skillset]) -> MissionPlan:
+    """Return the plan of a file as a scenario's mission; ``models`` as for `plan_of`.
 
     Raises:
         RobotError, InputError: the robot has no such skillsets or nodes, or the file can't be used.
     """
-    robot = find_robot()
-    try:
-        models = {skillset.name: skillset for skillset in load_models(robot).skillsets}
-    except (LanguageError, OSError) as error:
-        raise InputError(str(error)) from error
-    missing = [name for name in scenario.skillsets if name not in models]
+    known = {skillset.name: skillset for skillset in models}
+    missing = [name for name in scenario.skillsets if name not in known]
     if missing:
         raise InputError(f"the robot has no skillset '{missing[0]}'")
-    part = robot.part("missions") or NO_PART
-    plan = plan_of_file(path, scenario.name, [models[name] for name in scenario.skillsets], inputs, part)
-    return replace(plan, places=places_of(robot))
-
-
-def places_of(fleet: RobotFolder) -> dict[str, tuple[str, str]]:
-    """Return namespace and name of each skillset of a fleet's robots, by its name in the fleet; nothing for a robot."""
-    robots = [(name, one.name) for name, robot in fleet.robots.items() for one in load_models(robot).skillsets]
-    return {fleet_name(robot, skillset): (f"/{robot}", skillset) for robot, skillset in robots}
+    part = find_robot().part("missions") or NO_PART
+    return plan_of_file(path, scenario.name, [known[name] for name in scenario.skillsets], inputs, part)

@@ -4,8 +4,8 @@ from __future__ import annotations
 
 from collections.abc import Callable
 
-from alula.language.syntax.elements import told_unit
 from alula.model.model import Parameter, Resource, ResultKind, Skill
+from alula.model.units import told_unit
 from alula.trees.palette import Category, Direction, NodeType, Port, node_type
 from alula.trees.values import ANY, BOOL, DOUBLE, INT, SIZED, STRING, UINT, PortType, shown
 

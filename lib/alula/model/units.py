@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+import re
 from collections.abc import Mapping
 
 UNIT_IN_SI: Mapping[str, float] = {
@@ -36,3 +37,9 @@ KIND_OF_UNIT: Mapping[str, str] = {
     "%": "a part of a whole",
 }
 """What a unit measures; one kind is never compared with another."""
+
+
+def told_unit(comment: str) -> str:
+    """Return the unit that a comment begins with, as `Hz` or `m/s, over the ground`; empty where it begins with none."""
+    unit = re.split(r"[,;:]", comment, maxsplit=1)[0].strip()
+    return unit if unit in KIND_OF_UNIT else ""

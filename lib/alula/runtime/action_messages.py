@@ -8,8 +8,8 @@ from typing import Any
 from alula.model.execution_state import ExecutionState
 from alula.model.ros_types import FEEDBACK_FIELDS, RESULT_FIELDS
 from alula.runtime.core.events import ExecutionEvent
+from alula.runtime.field_types import FieldTypes
 from alula.runtime.middleware import GoalResult
-from alula.runtime.plain import FieldTypes
 
 
 class ActionMessages:

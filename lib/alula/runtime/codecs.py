@@ -10,6 +10,7 @@ from collections.abc import Callable, Mapping
 from dataclasses import dataclass
 from typing import Any
 
+from alula.common.plain import to_plain
 from alula.model.execution_state import ExecutionState
 from alula.model.unmet import Unmet
 from alula.runtime.core.events import EngineEvent, ExecutionEvent, TransitionEvent, kind_record, read_kind, read_unmet, unmet_record
@@ -27,7 +28,6 @@ from alula.runtime.middleware import (
     Topic,
     WhyReply,
 )
-from alula.runtime.plain import to_plain
 from alula.runtime.views import DataReading, Sample
 
 NANOSECONDS = 1_000_000_000

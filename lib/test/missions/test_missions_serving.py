@@ -16,7 +16,7 @@ from alula.records.errors import AnalysisError
 
 def serving(*, ready: bool = True) -> tuple[MissionDriver, SimpleNamespace]:
     client = SimpleNamespace(ready=ready)
-    plan = plan_of(Scenario("standby", "serves", ("base",)), {})
+    plan = plan_of(Scenario("standby", "serves", ("base",)), {}, ())
     return MissionDriver(plan, lambda _name, _wake: client, lambda: 1_000_000_000, {}), client
 
 

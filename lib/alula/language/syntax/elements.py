@@ -2,14 +2,13 @@
 
 from __future__ import annotations
 
-import re
 from collections.abc import Callable
 
 from alula.language.lexer import Kind
 from alula.language.syntax.cursor import Cursor
 from alula.language.syntax.quantities import quantity, setting
 from alula.model.model import Assignment, Data, Parameter
-from alula.model.units import KIND_OF_UNIT
+from alula.model.units import told_unit
 
 
 def one_or_block(cursor: Cursor, entry: Callable[[], None], outer: Callable[[], bool]) -> None:
@@ -54,12 +53,6 @@ def read_data(cursor: Cursor) -> Data:
     another = cursor.ahead().text == ":" and cursor.ahead(2).kind is Kind.NAME
     period = setting(cursor, "period") if cursor.at("period") and not another else None
     return Data(name.text, kind.text, period, told_unit(cursor.previous.comment), span=cursor.span(name, kind))
-
-
-def told_unit(comment: str) -> str:
-    """Return the unit that a comment begins with, as `Hz` or `m/s, over the ground`; else nothing."""
-    unit = re.split(r"[,;:]", comment, maxsplit=1)[0].strip()
-    return unit if unit in KIND_OF_UNIT else ""
 
 
 def read_change(cursor: Cursor) -> Assignment:

@@ -15,6 +15,7 @@ from dataclasses import dataclass
 from typing import Any
 
 from alula.common.faults import FaultRequest
+from alula.common.plain import to_plain
 from alula.common.record import OPERATOR, TICKS, Entry
 from alula.missions.director import Director, End, Outcome
 from alula.missions.driver import MissionDriver
@@ -29,7 +30,6 @@ from alula.records.tree import path_to
 from alula.runtime.client import Client
 from alula.runtime.core.events import EngineEvent
 from alula.runtime.handle import SkillHandle
-from alula.runtime.plain import to_plain
 
 LIMIT_S = 3600.0
 """Mission clock after the record's end, after which a mission that goes round in circles is left."""

@@ -38,9 +38,9 @@ def plan_for(recorded: Recorded, tree: str) -> MissionPlan:
     """Return the mission's own plan, or that of the file ``tree``."""
     inputs = inputs_of_record(recorded)
     try:
-        scenario = load_scenario(recorded.scenario)
-        return plan_of_mission_file(Path(tree), scenario, inputs) if tree else plan_of(scenario, inputs)
-    except (ScenarioError, RobotError, InputError) as error:
+        scenario, models = load_scenario(recorded.scenario), robot_skillsets()
+        return plan_of_mission_file(Path(tree), scenario, inputs, models) if tree else plan_of(scenario, inputs, models)
+    except (ScenarioError, RobotError, InputError, AnalysisError) as error:
         raise ReplayError(f"{recorded.path}: {error}") from error
 
 

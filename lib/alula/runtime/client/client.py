@@ -7,6 +7,7 @@ import threading
 from collections.abc import Callable, Mapping
 from typing import Any
 
+from alula.common.plain import to_plain
 from alula.model.model import Data, Skillset
 from alula.runtime.callbacks import Unsubscribe
 from alula.runtime.client.feed import Feed
@@ -17,7 +18,6 @@ from alula.runtime.core.replies import TransitionReply
 from alula.runtime.core.why import Why
 from alula.runtime.handle import Ended, SkillHandle
 from alula.runtime.middleware import CALL_S, Middleware
-from alula.runtime.plain import to_plain
 from alula.runtime.views import DataReading, SkillsetView
 from alula.runtime.waiting import Pending
 

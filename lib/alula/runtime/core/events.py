@@ -6,10 +6,10 @@ from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 from typing import Any
 
+from alula.common.plain import to_plain
 from alula.model.execution_state import ExecutionState
 from alula.model.model import ResultKind
 from alula.model.unmet import Unmet
-from alula.runtime.plain import to_plain
 
 NANOSECONDS = 1e9
 EXECUTION = "EXECUTION"

@@ -7,10 +7,10 @@ import math
 from collections.abc import Callable, Mapping
 from typing import Any
 
+from alula.common.plain import to_plain
 from alula.model.model import Skill
 from alula.model.ros_types import PRIMITIVES
 from alula.runtime import fitting
-from alula.runtime.plain import to_plain
 
 TEXT_LIMIT = 10_000
 """Characters of a text that are carried; the rest is counted."""

@@ -7,11 +7,11 @@ import importlib
 import json
 from collections.abc import Callable, Mapping
 
+from alula.common.plain import to_plain
 from alula.model.model import Skillset
 from alula.model.ros_types import PRIMITIVES
 from alula.runtime.core.errors import SkillRuntimeError
 from alula.runtime.middleware import Middleware, Reply, Topic, data_topic
-from alula.runtime.plain import to_plain
 from alula.runtime.staleness import StalenessWatch, is_stale, limit_ns
 from alula.runtime.views import DataReading, Sample
 

@@ -7,7 +7,7 @@ from collections.abc import Callable, Mapping, Sequence
 
 import msgpack
 
-from alula.runtime.plain import to_plain
+from alula.common.plain import to_plain
 
 _FLOAT32 = struct.Struct("<f")
 

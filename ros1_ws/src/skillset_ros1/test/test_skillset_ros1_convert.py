@@ -10,7 +10,7 @@ from hypothesis import strategies as st
 from sensor_msgs.msg import BatteryState, JointState
 from std_msgs.msg import Bool, Header, Int8, UInt16, UInt64
 
-from alula.runtime.plain import to_plain
+from alula.common.plain import to_plain
 from skillset_ros1.convert import fields_of, fill, message_class, values_of
 
 NUMBERS = st.floats(allow_nan=False, allow_infinity=False)

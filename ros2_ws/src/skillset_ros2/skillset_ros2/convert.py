@@ -7,7 +7,7 @@ import re
 from typing import Any
 
 from alula.model.ros_types import INTEGER_RANGES
-from alula.runtime.plain import FieldTypes
+from alula.runtime.field_types import FieldTypes
 
 _ARRAY = re.compile(r"^sequence<(.*?)(, \d+)?>$|\[.*\]$")
 

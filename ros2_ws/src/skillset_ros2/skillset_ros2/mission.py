@@ -10,12 +10,15 @@ from __future__ import annotations
 import argparse
 import sys
 from collections.abc import Sequence
+from dataclasses import replace
 from pathlib import Path
 
 import rclpy.utilities
 
-from alula.common.robots import RobotError
+from alula.common.robots import RobotError, find_robot
 from alula.common.scenarios import ScenarioError, load_scenario
+from alula.language.errors import LanguageError
+from alula.language.fleet import load_models, places_of
 from alula.missions.director import EXIT_CODES, Outcome
 from alula.missions.plan import InputError
 from alula.missions.scenario import inputs_of, plan_of
@@ -37,9 +40,10 @@ def main(arguments: Sequence[str] | None = None) -> int:
     options = parse(rclpy.utilities.remove_ros_args(words)[1:])
     try:
         scenario = load_scenario(options.scenario)
-        plan = plan_of(scenario, inputs_of(scenario, options.world))
+        inputs, robot = inputs_of(scenario, options.world), find_robot()
+        plan = replace(plan_of(scenario, inputs, load_models(robot).skillsets), places=places_of(robot))
         options.out.mkdir(parents=True, exist_ok=True)
-    except (ScenarioError, RobotError, InputError, OSError) as error:
+    except (ScenarioError, RobotError, LanguageError, InputError, OSError) as error:
         sys.stderr.write(f"mission: {error}\n")
         return EXIT_CODES[Outcome.NOT_STARTED]
     return run_mission(plan, options.out, words)

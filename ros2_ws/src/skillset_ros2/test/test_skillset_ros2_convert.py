@@ -11,11 +11,11 @@ from hypothesis import strategies as st
 from sensor_msgs.msg import JointState
 from std_msgs.msg import Bool, Header, Int8, UInt8MultiArray, UInt64
 
+from alula.common.plain import to_plain
 from alula.model.model import Parameter
 from alula.model.ros_types import INTEGER_RANGES
 from alula.runtime import fitting
 from alula.runtime.local.values import fit
-from alula.runtime.plain import to_plain
 from skillset_ros2.convert import fields_of, fill, message_class, values_of
 
 NUMBERS = st.floats(allow_nan=False, allow_infinity=False)

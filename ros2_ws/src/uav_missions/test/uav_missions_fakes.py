@@ -12,6 +12,7 @@ from alula.missions.director import Mission
 from alula.missions.plan import MissionPlan
 from alula.missions.scenario import plan_of
 from alula.model.execution_state import ExecutionState as State
+from alula.records.models import robot_skillsets
 from alula.runtime.handle import SkillHandle
 from alula.runtime.waiting import Pending
 
@@ -185,7 +186,7 @@ def clients(world: World) -> dict[str, FakeClient]:
 
 @functools.cache
 def mapping_plan(waypoints: tuple[tuple[float, float, float], ...]) -> MissionPlan:
-    return plan_of(load_scenario("mapping"), {"route": [list(waypoint) for waypoint in waypoints]})
+    return plan_of(load_scenario("mapping"), {"route": [list(waypoint) for waypoint in waypoints]}, robot_skillsets())
 
 
 def make_mission(world: World, waypoints=SQUARE, **skillsets: FakeClient) -> tuple[Mission, Blackboard]:

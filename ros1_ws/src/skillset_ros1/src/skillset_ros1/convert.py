@@ -1,4 +1,4 @@
-"""Fields of ROS 1 messages; what fits into them is as in the ROS 2 world (``alula.runtime.plain``)."""
+"""Fields of ROS 1 messages; what fits into them is as in the ROS 2 world (``alula.runtime.field_types``)."""
 
 from __future__ import annotations
 
@@ -9,7 +9,7 @@ from typing import Any
 import genpy
 
 from alula.model.ros_types import INTEGER_RANGES
-from alula.runtime.plain import FieldTypes
+from alula.runtime.field_types import FieldTypes
 
 _ARRAY = re.compile(r"\[\d*\]$")
 

@@ -10,8 +10,8 @@ from typing import Any
 
 from action_msgs.msg import GoalStatus
 
+from alula.common.plain import to_plain
 from alula.records.replay.comparison import alike
-from alula.runtime.plain import to_plain
 from skillset_ros2.replay.node import RecordedFuture, Subscribers
 
 STATUS = {2: GoalStatus.STATUS_CANCELED, 3: GoalStatus.STATUS_SUCCEEDED, 4: GoalStatus.STATUS_ABORTED, 8: GoalStatus.STATUS_CANCELED}

@@ -15,6 +15,7 @@ from pathlib import Path
 from types import SimpleNamespace
 from typing import Any
 
+from alula.common.plain import to_plain
 from alula.common.record import Entry
 from alula.common.robots import FILE, find_robot
 from alula.mock import NEVER, Behaviour, Choice, MockSkill, follow
@@ -28,7 +29,6 @@ from alula.runtime.core.events import EngineEvent, ExecutionEvent
 from alula.runtime.core.execution import Execution
 from alula.runtime.hooks import SkillHooks
 from alula.runtime.local import LocalManagers
-from alula.runtime.plain import to_plain
 from skillset_ros2.convert import fill, values_of
 from skillset_ros2.replay.actions import RecordedActionClient
 from skillset_ros2.replay.bag import CALLS, MESSAGE, Call, begin_of, entries_of, read_bag, read_calls

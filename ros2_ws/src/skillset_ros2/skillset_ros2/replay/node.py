@@ -6,8 +6,8 @@ from collections.abc import Callable, Mapping
 from types import SimpleNamespace
 from typing import Any
 
+from alula.common.plain import to_plain
 from alula.runtime.local import Timer, VirtualClock
-from alula.runtime.plain import to_plain
 
 Subscribers = dict[str, list[Callable[[Any], None]]]
 
