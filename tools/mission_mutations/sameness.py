@@ -24,16 +24,16 @@ from alula.missions.nodes import Needs
 from alula.missions.skills import SkillNode
 from alula.prove.mission.accepted import DESCRIPTION
 from alula.prove.mission.oracle import Answer, Question
-from alula.prove.mission.reading import scripts_of
 from alula.prove.mission.regions import Closure, Region, Regions, Sets
 from alula.prove.mission.state import Event
 from alula.prove.mission.system import System
 from alula.prove.mission.ticking import TICK, Outcome
-from alula.trees.document import Element
+from alula.trees.access import scripts_of
+from alula.trees.document import Attribute, Element
 from alula.trees.node import Node, pointer
 from alula.trees.palette import Direction
 from alula.trees.reading import read_files, type_name
-from alula.trees.script import parse
+from alula.trees.script import statements_of
 from alula.trees.script.syntax import Assignment, Literal, Name, walk
 
 Products = tuple[frozenset[int], ...]
@@ -192,9 +192,9 @@ class Seen:
             return None
         return (node.name, *_attributes(element))
 
-    def _computes(self, text: str) -> bool:
+    def _computes(self, script: Attribute) -> bool:
         """Tell whether a script writes values that the search does not keep as they are."""
-        parts = [part for statement in parse(text).statements for part in walk(statement)]
+        parts = [part for statement in statements_of(script.value) for part in walk(statement)]
         return any(not self._kept(part) for part in parts if isinstance(part, Assignment))
 
     def _kept(self, part: Assignment) -> bool:

@@ -12,9 +12,10 @@ from alula.check.entries import Writers
 from alula.check.exclusion import exclude
 from alula.check.problems import of_element
 from alula.check.reach import Reach, never_reached, several_run, unreached, waits_in_vain
-from alula.check.scripts import Scripts, after, before, within
+from alula.check.scripts import Scripts
 from alula.check.sites import Site, expand
 from alula.check.traits import Traits
+from alula.trees.access import scripts_of
 from alula.trees.errors import Problem
 from alula.trees.palette import Direction, Palette
 from alula.trees.reading import TreeFiles, type_name
@@ -122,7 +123,7 @@ def _others(files: TreeFiles) -> list[str]:
 
 def _scripts(whole: Whole) -> Iterator[Problem]:
     for site in whole.root.walk():
-        for attribute in (*before(site), *within(site), *after(site)):
+        for attribute in scripts_of(site.element, site.type):
             whole.scripts.program(attribute)
     yield from whole.scripts.problems
 

@@ -5,11 +5,12 @@ from __future__ import annotations
 from collections.abc import Collection, Iterator
 from dataclasses import dataclass, replace
 
-from alula.check import scripts
 from alula.check.problems import in_value, of_value
+from alula.check.scripts import Scripts
 from alula.check.sites import Board, Key, Site
 from alula.check.traits import Traits
 from alula.common.suggestions import nearest
+from alula.trees.access import scripts_after, scripts_before, scripts_within
 from alula.trees.document import Attribute
 from alula.trees.errors import Problem
 from alula.trees.node import pointer
@@ -47,7 +48,7 @@ class Use:
 class Uses:
     """All uses of entries in a tree, in the order in which they may come first."""
 
-    def __init__(self, programs: scripts.Scripts, traits: Traits) -> None:
+    def __init__(self, programs: Scripts, traits: Traits) -> None:
         self._programs = programs
         self._traits = traits
         self._before: dict[Site, list[Use]] = {}
@@ -69,17 +70,17 @@ class Uses:
     def after(self, site: Site) -> list[Use]:
         """Return those of its scripts after it has ended."""
         if site not in self._after:
-            self._after[site] = [use for attribute in scripts.after(site) for use in self._script(site, attribute)]
+            self._after[site] = [use for attribute in scripts_after(site.element) for use in self._script(site, attribute)]
         return self._after[site]
 
     def _first(self, site: Site) -> Iterator[Use]:
-        for attribute in scripts.before(site):
+        for attribute in scripts_before(site.element):
             yield from self._script(site, attribute)
         if site.is_subtree:
             yield from _constants(site)
             return
         yield from self._ports(site, write=False)
-        for attribute in scripts.within(site):
+        for attribute in scripts_within(site.element, site.type):
             yield from self._script(site, attribute)
         yield from self._ports(site, write=True)
 
@@ -115,7 +116,7 @@ class Uses:
                 if not self._traits.is_name(node.name):
                     yield Use(board.key(node.name), node.name, False, attribute, (node.offset, node.end))
             case Assignment(target=Name() as target):
-                if node.operator not in {":=", "="}:
+                if not node.replaces:
                     yield from self._node(board, attribute, target)
                 yield from self._node(board, attribute, node.value)
                 place, kind = (target.offset, target.end), _written(node.value)

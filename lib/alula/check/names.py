@@ -8,12 +8,12 @@ from dataclasses import dataclass
 
 from alula.check.checking import Whole
 from alula.check.problems import in_value
-from alula.check.scripts import after, before, within
 from alula.check.skills import Skills
 from alula.common.suggestions import nearest, quoted
 from alula.language.messages import FieldError
 from alula.missions.world import FUNCTIONS
 from alula.model.ros_types import PRIMITIVES
+from alula.trees.access import scripts_of
 from alula.trees.document import Attribute
 from alula.trees.errors import Problem
 from alula.trees.script.syntax import Assignment, Call, Comparison, Literal, Name, Node, walk
@@ -28,7 +28,7 @@ class NameRules:
     def names(self, whole: Whole) -> Iterator[Problem]:
         """Yield dotted names, states and functions in scripts that nothing of the robot has."""
         for site in whole.root.walk():
-            for attribute in (*before(site), *within(site), *after(site)):
+            for attribute in scripts_of(site.element, site.type):
                 program = whole.scripts.program(attribute)
                 for statement in program.statements if program else ():
                     yield from self._unguarded(attribute, statement)

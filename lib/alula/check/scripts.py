@@ -2,13 +2,9 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator
-
 from alula.check.problems import in_value
-from alula.check.sites import Site
 from alula.trees.document import Attribute
 from alula.trees.errors import Problem
-from alula.trees.reading import POSTCONDITIONS, PRECONDITIONS
 from alula.trees.script import Program, ScriptError, parse
 
 
@@ -37,25 +33,3 @@ class Scripts:
         for note in program.notes:
             self.problems.append(in_value("ALU616", attribute, (note.offset, note.end), note.message, note.cure, warning=True))
         return program
-
-
-def before(site: Site) -> Iterator[Attribute]:
-    """Yield the attributes with the scripts that run before the node is ticked."""
-    yield from _present(site, PRECONDITIONS)
-
-
-def within(site: Site) -> Iterator[Attribute]:
-    """Yield those of the node itself: a text that names an entry holds none, and an empty one may do nothing."""
-    if site.type is not None:
-        for attribute in _present(site, site.type.scripts):
-            if not attribute.value.lstrip().startswith("{") and (attribute.value or not site.type.ports[attribute.name].may_be_empty):
-                yield attribute
-
-
-def after(site: Site) -> Iterator[Attribute]:
-    """Yield those that run when it has ended."""
-    yield from _present(site, POSTCONDITIONS)
-
-
-def _present(site: Site, names: tuple[str, ...]) -> Iterator[Attribute]:
-    return (site.element.attributes[name] for name in names if name in site.element.attributes)

@@ -12,6 +12,7 @@ from dataclasses import dataclass, field, replace
 from enum import Enum
 from functools import cached_property
 
+from alula.common.graphs import reachable_from
 from alula.common.public import public
 from alula.model.expressions import TRUE, Comparison, DataIs, Expression
 from alula.model.span import NOWHERE, Span
@@ -79,13 +80,9 @@ class Resource:
 
     def reachable(self) -> frozenset[str]:
         """Return the states with a way of arrows from the initial one, extern or not."""
-        found, todo = {self.initial}, [self.initial]
-        while todo:
-            source = todo.pop()
-            following = {*self.targets(source, extern=False), *self.targets(source, extern=True)} - found
-            found |= following
-            todo += following
-        return frozenset(found)
+        return frozenset(
+            reachable_from([self.initial], lambda state: (*self.targets(state, extern=False), *self.targets(state, extern=True)))
+        )
 
     @cached_property
     def _targets(self) -> Mapping[tuple[str, bool], Mapping[str, None]]:

@@ -105,7 +105,7 @@ def test_both_sides_of_and_are_evaluated_and_one_branch():
 def test_names_are_told_by_what_is_done_to_them():
     names = parse("a := b + @c; d = RED; e += 1; running(nav.goto) ? nav.state == UP : f(g + 1)").names
     assert names.written == {"a", "d", "e"}
-    assert names.created == {"a"}
+    assert names.replaced == {"a", "d"}
     assert names.read == {"b", "@c", "RED", "e", "nav.state", "UP", "g"}
     assert names.asked == {"nav.goto"}
     assert names.called == {"running", "f"}

@@ -10,6 +10,7 @@ from collections.abc import Hashable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
 
 from alula.prove.mission.reading import OUTCOME, Read
+from alula.trees.access import takes_script_from_entry
 from alula.trees.ends import ENDS
 from alula.trees.node import Node
 from alula.trees.status import RUNNING, SKIPPED
@@ -55,8 +56,8 @@ class Looking:
 
     def _plain(self, node: Node) -> bool:
         """Tell whether all that a node asks for stands in the file."""
-        texts = [node.wiring.element.get(name) for name in node.wiring.type.scripts]
-        return node.wiring.type.name not in self.read.free and not any(text.lstrip().startswith("{") for text in texts)
+        of = node.wiring
+        return of.type.name not in self.read.free and not takes_script_from_entry(of.element, of.type)
 
     def _may_skip(self, number: int) -> bool:
         node = self._nodes[number]

@@ -7,15 +7,13 @@ one after another, leads to it.
 
 from __future__ import annotations
 
-from collections.abc import Callable, Hashable, Iterable, Mapping
-from typing import TypeVar
+from collections.abc import Callable
 
 from alula.model.model import ResultKind
 from alula.prove.mission.state import Event, Kind
 from alula.prove.mission.system import System
 
 CALM = frozenset({Kind.TICK, Kind.START, Kind.INTERRUPT})
-Situation = TypeVar("Situation", bound=Hashable)
 
 
 def calm_of(system: System, *, terminating: bool) -> Callable[[Event], bool]:
@@ -33,15 +31,3 @@ def calm_of(system: System, *, terminating: bool) -> Callable[[Event], bool]:
         return event.kind in CALM or (terminating and event.kind is Kind.RESULT and event.result in good[event.skill])
 
     return calm
-
-
-def reaching(goals: Iterable[Situation], before: Mapping[Situation, Iterable[Situation]]) -> set[Situation]:
-    """Return the goals and all from which they are reached, by what can come before each situation (or the other way round)."""
-    found = set(goals)
-    todo = list(found)
-    while todo:
-        for one in before.get(todo.pop(), ()):
-            if one not in found:
-                found.add(one)
-                todo.append(one)
-    return found

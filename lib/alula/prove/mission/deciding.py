@@ -5,12 +5,11 @@ from __future__ import annotations
 from collections.abc import Iterator, Mapping
 
 from alula.missions.skill_types import OUTCOME_PORT
-from alula.prove.mission.reading import scripts_of
 from alula.prove.mission.regions import Regions
 from alula.prove.mission.system import System
-from alula.trees.node import Node, pointer
-from alula.trees.palette import Direction
-from alula.trees.script import ScriptError, parse
+from alula.trees.access import named_entries, scripts_of, written_entries
+from alula.trees.node import Node
+from alula.trees.script import statements_of
 from alula.trees.script.syntax import Call, Comparison, Literal, Name, walk
 from alula.trees.status import Status
 
@@ -70,12 +69,8 @@ def _ends(regions: Regions) -> Mapping[int, frozenset[str]]:
 
 
 def _asked(system: System, node: Node, ends: Mapping[int, frozenset[str]]) -> Iterator[tuple[str, str]]:
-    for text in scripts_of(node.wiring.element, node.wiring.type):
-        try:
-            program = parse(text)
-        except ScriptError:
-            continue
-        for part in (part for statement in program.statements for part in walk(statement)):
+    for attribute in scripts_of(node.wiring.element, node.wiring.type):
+        for part in (part for statement in statements_of(attribute.value) for part in walk(statement)):
             match part:
                 case Call(function="failed", arguments=(Literal(value=str(end)) | Name(name=end),)):
                     if not any(end in known for known in ends.values()):
@@ -93,13 +88,12 @@ def _writers(system: System, entry: str) -> list[int]:
     """Return the leaves whose outcomes an entry has, none where it may have anything else."""
     names = system.reads.sources({entry})
     for node in system.nodes:
-        ports = node.wiring.type.ports.values()
-        written = {pointer(node.wiring.ports.get(port.name, ""), port.name) for port in ports if port.direction is not Direction.INPUT}
-        others = {str(one).removeprefix("@") for one in written if one} | system.reads.asks(node.wiring.element, node.wiring.type).written
+        written = set(written_entries(node).values())
+        others = {one.removeprefix("@") for one in written} | system.reads.asks(node.wiring.element, node.wiring.type).written
         if node not in system.leaves and names & others:
             return []
     return [leaf for leaf, node in enumerate(system.leaves) if _outcome(node) in names]
 
 
 def _outcome(node: Node) -> str:
-    return str(pointer(node.wiring.ports.get(OUTCOME_PORT, ""), OUTCOME_PORT) or "").removeprefix("@")
+    return named_entries(node).get(OUTCOME_PORT, "").removeprefix("@")

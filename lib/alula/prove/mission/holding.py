@@ -13,11 +13,12 @@ from collections.abc import Iterator, Mapping
 from dataclasses import dataclass
 from itertools import product
 
+from alula.common.graphs import reachable_from
 from alula.language.errors import Severity
 from alula.model.expressions import Constant, Expression, Not, ResourceIs, SkillRuns, atoms
 from alula.model.model import Property, PropertyKind
 from alula.prove.limits import Deadline, OutOfTimeError
-from alula.prove.mission.calm import calm_of, reaching
+from alula.prove.mission.calm import calm_of
 from alula.prove.mission.conditions import Faults, faults_shown, true_in
 from alula.prove.mission.fitting import Values, agree, all_values
 from alula.prove.mission.regions import Regions
@@ -187,7 +188,7 @@ class _Search:
         """Yield where it never comes while data have these values."""
         before = {there: [here for event, here in ways if agree(values, event.choices)] for there, ways in self._calm_before.items()}
         # What was not looked at any further may lead anywhere.
-        good = reaching({one for one in self._before if not one[1]} | self._open, before)
+        good = reachable_from({one for one in self._before if not one[1]} | self._open, lambda one: before.get(one, ()))
         yield from (one for one in self._before if one not in good)
 
     def _at_rest(self, found: Awaiting, values: Values) -> tuple[list[Event], State]:

@@ -9,6 +9,7 @@ from __future__ import annotations
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
 
+from alula.common.graphs import reachable_from
 from alula.model import semantics
 from alula.prove.limits import OutOfTimeError
 from alula.prove.mission.regions import Region, Regions
@@ -89,15 +90,14 @@ def _startable(regions: Regions, place: int, number: int) -> set[str]:
     system = regions.system
     bare = system.number(Managers(system.managers_of(number).states))
     found: set[str] = set()
-    seen, todo = {bare}, [bare]
-    while todo:
-        one = todo.pop()
+
+    def alive(one: int) -> list[int]:
+        return [number for event, number in system.moves_of(place, one) if event.kind is not Kind.DIE]
+
+    for one in reachable_from([bare], alive):
         states = _states(system, place, one)
         skills = system.skillsets[place].skills
         found |= {skill.name for skill in skills if not any(semantics.unmet_preconditions(skill, states, {}))}
-        after = {number for event, number in system.moves_of(place, one) if event.kind is not Kind.DIE} - seen
-        seen |= after
-        todo += after
     return found
 
 

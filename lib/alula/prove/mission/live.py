@@ -13,11 +13,11 @@ from typing import NamedTuple
 from alula.missions.skill_types import OUTCOME_PORT
 from alula.missions.skills import SkillNode
 from alula.prove.mission.ahead import RUNS, Looking
-from alula.prove.mission.reading import ANOTHER, OUTCOME, scripts_of
-from alula.trees.node import Node, pointer
+from alula.prove.mission.reading import ANOTHER, OUTCOME
+from alula.trees.access import named_entries, scripts_of, written_entries
+from alula.trees.node import Node
 from alula.trees.nodes.subtree import SubTree
-from alula.trees.palette import Direction
-from alula.trees.script import ScriptError, parse
+from alula.trees.script import statements_of
 from alula.trees.script.syntax import Assignment, Call, Chain, Comparison, Literal, Name, walk
 from alula.trees.script.syntax import Node as Part
 from alula.trees.status import FAILURE, SKIPPED, SUCCESS, Answer
@@ -292,38 +292,30 @@ class Liveness:
         for one in (node, *_below(node)):
             if one.wiring.type.name not in self._unread:
                 found |= self._ports(one)
-            for text in scripts_of(one.wiring.element, one.wiring.type):
-                found |= self._script(one, text, NOTHING)
+            for attribute in scripts_of(one.wiring.element, one.wiring.type):
+                found |= self._script(one, attribute.value, NOTHING)
         return found
 
     def _ports(self, node: Node) -> Reads:
-        names = (pointer(text, name) for name, text in node.wiring.ports.items()) if not isinstance(node, SubTree) else ()
-        return frozenset((_place(node, name), None) for name in names if name is not None)
+        names = () if isinstance(node, SubTree) else named_entries(node).values()
+        return frozenset((_place(node, name), None) for name in names)
 
     def _asked(self, node: Node, *attributes: str) -> Reads:
         return NOTHING.union(*(self._script(node, node.wiring.element.get(one), NOTHING) for one in attributes))
 
     def _written(self, node: Node) -> frozenset[Place]:
         """Return what a leaf writes whenever it answers."""
-        found = set()
-        for port in node.wiring.type.ports.values():
-            name = pointer(node.wiring.ports.get(port.name, ""), port.name) if port.direction is not Direction.INPUT else None
-            found |= {_place(node, name)} if name is not None else set()
-        return frozenset(found)
+        return frozenset(_place(node, name) for name in written_entries(node).values())
 
     @staticmethod
     def _outcome(node: Node) -> Place:
-        name = pointer(node.wiring.ports.get(OUTCOME_PORT, ""), OUTCOME_PORT)
+        name = named_entries(node).get(OUTCOME_PORT)
         return (0, "") if name is None else _place(node, name)
 
     def _script(self, node: Node, text: str, after: Reads) -> Reads:
         """Return what is live before a script; what is no script reads nothing here (``Looking`` says that it may ask for anything)."""
-        try:
-            program = parse(text) if text.strip() else None
-        except ScriptError:
-            return after
-        for statement in reversed(program.statements if program is not None else ()):
-            if isinstance(statement, Assignment) and isinstance(statement.target, Name) and statement.operator in {":=", "="}:
+        for statement in reversed(statements_of(text)):
+            if isinstance(statement, Assignment) and isinstance(statement.target, Name) and statement.replaces:
                 after = _without(after, frozenset({_place(node, statement.target.name)})) | self._read_by(node, statement.value)
             else:
                 after |= self._read_by(node, statement)

@@ -17,12 +17,13 @@ from typing import TYPE_CHECKING
 
 from alula.model.model import Skillset
 from alula.prove.mission.oracle import Asked, Oracle, UndecidedError
-from alula.prove.mission.reading import scripts_of, type_of
+from alula.prove.mission.reading import type_of
 from alula.prove.mission.unknown import Distance, UnknownNumber, UnknownText
-from alula.trees.document import Element
+from alula.trees.access import scripts_of
+from alula.trees.document import Attribute, Element
 from alula.trees.palette import Palette
 from alula.trees.reading import TreeFiles
-from alula.trees.script import ScriptError, parse
+from alula.trees.script import statements_of
 from alula.trees.script.compiler import EPSILON
 from alula.trees.script.syntax import Assignment, Call, Chain, Comparison, Conditional, Literal, Name, Node, Prefix, children
 
@@ -55,8 +56,8 @@ class Conditions:
         asking = _Asking(types)
         for tree in files.trees.values():
             for element in tree.iterate():
-                for text in scripts_of(element, type_of(element, palette)):
-                    asking.script(element, text)
+                for attribute in scripts_of(element, type_of(element, palette)):
+                    asking.script(element, attribute)
         return cls(asking.kinds, frozenset(asking.fresh))
 
 
@@ -74,14 +75,10 @@ class _Asking:
         self._types = types
         self._place = ""
 
-    def script(self, element: Element, text: str) -> None:
-        try:
-            program = parse(text)
-        except ScriptError:
-            return
-        self._place = f"line {element.place.line}, `{text}`"
-        for statement in program.statements:
-            self._look(statement, asked=text != element.get("otherwise"))
+    def script(self, element: Element, attribute: Attribute) -> None:
+        self._place = f"line {element.place.line}, `{attribute.value}`"
+        for statement in statements_of(attribute.value):
+            self._look(statement, asked=attribute.value != element.get("otherwise"))
 
     def _look(self, node: Node, *, asked: bool) -> None:
         """Look at a part of a script, of whose value no more is ``asked`` than whether it is true, or which goes on as it is."""

@@ -12,9 +12,10 @@ from alula.prove.mission.reading import ANOTHER
 from alula.prove.mission.robot import Memory, Robot
 from alula.prove.mission.runnable import names_in, remembered, why_not
 from alula.prove.mission.unknown import Unknown, UnknownText, is_unknown, unknown
+from alula.trees.access import written_entries
 from alula.trees.ends import ANY_END
 from alula.trees.errors import TickError
-from alula.trees.node import Condition, Control, Node, SyncAction, pointer, register
+from alula.trees.node import Condition, Control, Node, SyncAction, register
 from alula.trees.palette import CHILDREN, Category, Direction, NodeType, Port, name_in_files
 from alula.trees.status import FAILURE, IDLE, RUNNING, SKIPPED, SUCCESS, Answer, Skipped
 
@@ -169,14 +170,13 @@ def _free(robot: Robot, node: Node, options: tuple[str, ...]) -> Answer:
 def write(robot: Robot, node: Node) -> None:
     """Write values of which nothing is known to all outputs."""
     for port in outputs(node):
-        key = pointer(node.wiring.ports.get(port.name, ""), port.name)
-        node.put(port.name, unknown(robot.oracle, f"`{key}`", port.type))
+        node.put(port.name, unknown(robot.oracle, f"`{written_entries(node)[port.name]}`", port.type))
 
 
 def outputs(node: Node) -> list[Port]:
     """Return the ports that a node may write, and its file gives an entry for."""
-    ports = (port for port in node.wiring.type.ports.values() if port.direction is not Direction.INPUT)
-    return [port for port in ports if pointer(node.wiring.ports.get(port.name, ""), port.name) is not None]
+    written = written_entries(node)
+    return [port for port in node.wiring.type.ports.values() if port.name in written]
 
 
 _ANSWERS: Mapping[str, Answer] = {one.value: one for one in (SUCCESS, FAILURE, RUNNING, SKIPPED)}

@@ -3,19 +3,20 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Iterable, Iterator, Mapping
+from collections.abc import Iterable, Mapping
 from dataclasses import dataclass, field
-from typing import NamedTuple
 
+from alula.common.graphs import reachable_from
 from alula.missions.mission_file import DEGRADED, STOPPING
 from alula.missions.world import FUNCTIONS
 from alula.prove.mission.oracle import Oracle
 from alula.prove.mission.unknown import UNKNOWN, UnknownNumber, UnknownText
+from alula.trees.access import scripts_of
 from alula.trees.document import Element
 from alula.trees.node import pointer
 from alula.trees.palette import Category, NodeType, Palette
-from alula.trees.reading import POSTCONDITIONS, PRECONDITIONS, TreeFiles, is_port, type_name
-from alula.trees.script import ScriptError, parse
+from alula.trees.reading import TreeFiles, is_port, type_name
+from alula.trees.script import names_in, statements_of
 from alula.trees.script.syntax import Assignment, Call, Chain, Comparison, Literal, Name, Node, walk
 
 ANOTHER = "(another text)"
@@ -65,28 +66,21 @@ class Read:
 
     def sources(self, names: Iterable[str]) -> frozenset[str]:
         """Return entries, and all that what they have may come of."""
-        found = set(names)
-        todo = list(found)
-        while todo:
-            name = todo.pop()
-            more = {source for source, target in self.flows if target == name} - found
-            found |= more
-            todo += more
-        return frozenset(found)
+        return frozenset(reachable_from(names, lambda name: (source for source, target in self.flows if target == name)))
 
     def asks(self, element: Element, type_: NodeType) -> Asks:
         """Return what one node asks for."""
         one = Read(self.oracle, names=set())
-        scripts = [_Named.of(text) for text in scripts_of(element, type_)]
-        named = {name for script in scripts for name in script.names}
-        for text in scripts_of(element, type_):
-            _script(one, text, {})
+        statements = [one for attribute in scripts_of(element, type_) for one in statements_of(attribute.value)]
+        names = names_in(statements)
+        named = {_bare(name) for name in names.read | names.asked}
+        for statement in statements:
+            _statement(one, statement, {})
         _ports(one, element, self.unread)
         if type_name(element) not in self.unread:
             named |= {_bare(pointer(value.value, name) or value.value) for name, value in element.attributes.items() if is_port(name)}
-        written = frozenset(name for script in scripts for name in script.written)
-        skills = frozenset(name for script in scripts for name in script.skills)
-        return Asks(frozenset(one.names), frozenset(named), written, frozenset(one.ends), one.asks_first, skills)
+        written = frozenset(map(_bare, names.replaced))
+        return Asks(frozenset(one.names), frozenset(named), written, frozenset(one.ends), one.asks_first, _skills_asked(statements))
 
     def value(self, name: str, value: object) -> object:
         """Return what is kept of an entry's value."""
@@ -130,8 +124,9 @@ def what_is_read(
     read = Read(oracle, unread=frozenset(opaque), free=frozenset(free))
     for tree in files.trees.values():
         for element in tree.iterate():
-            for text in scripts_of(element, type_of(element, palette)):
-                _script(read, text, constants)
+            for attribute in scripts_of(element, type_of(element, palette)):
+                for statement in statements_of(attribute.value):
+                    _statement(read, statement, constants)
             _ports(read, element, read.unread)
     for model in files.models.values():
         for port in model.ports.values():
@@ -154,35 +149,23 @@ def type_of(element: Element, palette: Palette) -> NodeType | None:
     return None if element.tag == Category.SUBTREE.value else palette.get(type_name(element))
 
 
-def scripts_of(element: Element, type_: NodeType | None) -> Iterator[str]:
-    """Yield the scripts of a node."""
-    for name in (*PRECONDITIONS, *POSTCONDITIONS, *(type_.scripts if type_ is not None else ())):
-        if name in element.attributes and not element.get(name).lstrip().startswith("{"):
-            yield element.get(name)
-
-
-def _script(read: Read, text: str, constants: Mapping[str, float]) -> None:
-    try:
-        program = parse(text)
-    except ScriptError:
-        return
-    for statement in program.statements:
-        targets = [one for one in walk(statement) if isinstance(one, Assignment) and isinstance(one.target, Name)]
-        for one in targets:
-            _assignment(read, one)
-        inside = {id(part) for one in targets for part in walk(one)}
-        read.names |= {_bare(one.name) for one in walk(statement) if isinstance(one, Name) and id(one) not in inside}
-        for node in walk(statement):
-            _look(read, node, constants)
+def _statement(read: Read, statement: Node, constants: Mapping[str, float]) -> None:
+    targets = [one for one in walk(statement) if isinstance(one, Assignment) and isinstance(one.target, Name)]
+    for one in targets:
+        _assignment(read, one)
+    inside = {id(part) for one in targets for part in walk(one)}
+    read.names |= {_bare(one.name) for one in walk(statement) if isinstance(one, Name) and id(one) not in inside}
+    for node in walk(statement):
+        _look(read, node, constants)
 
 
 def _assignment(read: Read, node: Assignment) -> None:
     target = _bare(node.target.name) if isinstance(node.target, Name) else ""
     sources = {_bare(one.name) for one in walk(node.value) if isinstance(one, Name)}
     read.flows |= {(source, target) for source in sources}
-    if node.operator not in {":=", "="}:
+    if not node.replaces:
         read.flows.add((target, target))
-    if node.operator not in {":=", "="} or any(isinstance(one, Chain) for one in walk(node.value)):
+    if not node.replaces or any(isinstance(one, Chain) for one in walk(node.value)):
         read.counted.add(target)
 
 
@@ -215,26 +198,11 @@ def _ports(read: Read, element: Element, unread: frozenset[str]) -> None:
             read.whole.add(_bare(key))
 
 
-class _Named(NamedTuple):
-    """What a script names: the entries that it computes with, those that it writes, and the skills whose executions it asks for."""
-
-    names: set[str]
-    written: set[str]
-    skills: set[str]
-
-    @classmethod
-    def of(cls, text: str) -> _Named:
-        """Read a script."""
-        try:
-            program = parse(text)
-        except ScriptError:
-            return cls(set(), set(), set())
-        nodes = [node for statement in program.statements for node in walk(statement)]
-        targets = [node.target for node in nodes if isinstance(node, Assignment) and node.operator in {":=", "="}]
-        names = {_bare(node.name) for node in nodes if isinstance(node, Name) and not any(node is one for one in targets)}
-        calls = [node for node in nodes if isinstance(node, Call) and FUNCTIONS[node.function].kind == "skill"]
-        skills = {str(one.value if isinstance(one, Literal) else getattr(one, "name", "")) for call in calls for one in call.arguments}
-        return cls(names, {_bare(one.name) for one in targets if isinstance(one, Name)}, skills)
+def _skills_asked(statements: Iterable[Node]) -> frozenset[str]:
+    """Return the skills whose executions statements ask for."""
+    calls = [node for statement in statements for node in walk(statement) if isinstance(node, Call)]
+    arguments = [one for call in calls if FUNCTIONS[call.function].kind == "skill" for one in call.arguments]
+    return frozenset(str(one.value if isinstance(one, Literal) else getattr(one, "name", "")) for one in arguments)
 
 
 def _bare(name: str) -> str:

@@ -15,11 +15,12 @@ from typing import TYPE_CHECKING
 from alula.missions.world import states_of
 from alula.model.model import Skillset
 from alula.prove.mission.oracle import Oracle
-from alula.prove.mission.reading import scripts_of, type_of
+from alula.prove.mission.reading import type_of
 from alula.prove.mission.unknown import Distance
+from alula.trees.access import scripts_of, takes_script_from_entry
 from alula.trees.palette import Palette
-from alula.trees.reading import POSTCONDITIONS, PRECONDITIONS, TreeFiles, type_name
-from alula.trees.script import ScriptError, parse
+from alula.trees.reading import TreeFiles, type_name
+from alula.trees.script import statements_of
 from alula.trees.script.syntax import Call, Comparison, Name, Node, children, walk
 
 if TYPE_CHECKING:
@@ -44,24 +45,16 @@ class Compared:
         elements = [element for tree in files.trees.values() for element in tree.iterate()]
         types = [type_of(element, palette) for element in elements]
         for element, type_ in zip(elements, types, strict=True):
-            names = (*PRECONDITIONS, *POSTCONDITIONS, *(type_.scripts if type_ is not None else ()))
-            if any(element.get(name).lstrip().startswith("{") for name in names):
+            if takes_script_from_entry(element, type_):
                 return cls()
-        texts = (text for element, type_ in zip(elements, types, strict=True) for text in scripts_of(element, type_))
+        texts = (one.value for element, type_ in zip(elements, types, strict=True) for one in scripts_of(element, type_))
         named: Counter[str] = Counter(type_name(element) for element in elements)
         compared: Counter[str] = Counter()
-        for program in (program for text in texts for program in _parsed(text)):
+        for program in (program for text in texts for program in statements_of(text)):
             named.update(one.name for one in _read(program))
             compared.update(name for one in walk(program) if isinstance(one, Comparison) for name in _compared(one, states))
         numbers = {number: name for name, number in states_of(several).items()}
         return cls(frozenset(name for name in states if named[name] == compared[name]), numbers)
-
-
-def _parsed(text: str) -> tuple[Node, ...]:
-    try:
-        return tuple(parse(text).statements)
-    except ScriptError:
-        return ()
 
 
 def _read(node: Node) -> Iterator[Name]:

@@ -12,8 +12,9 @@ from dataclasses import dataclass
 from functools import partial
 from itertools import product
 
+from alula.common.graphs import reachable_from
 from alula.prove.limits import Deadline, OutOfTimeError
-from alula.prove.mission.calm import calm_of, reaching
+from alula.prove.mission.calm import calm_of
 from alula.prove.mission.ending import Ending, Group
 from alula.prove.mission.fitting import Values, agree, all_values, answers
 from alula.prove.mission.measured import DATA
@@ -72,7 +73,7 @@ class Waits:
                 self._explore(list(first), deadline, values)
             except OutOfTimeError as error:
                 over = error
-            good: set[State] = reaching(self._ends | self._open, self._before)
+            good = reachable_from(self._ends | self._open, lambda one: self._before.get(one, ()))
             never = set(self._after) - good
             ends = ends and not never
             data = ", ".join(words for one in answers(values, questions) if (words := choice(one)))
@@ -91,7 +92,7 @@ class Waits:
             if begin in known:
                 continue
             rounds = self._last(begin)
-            explained: set[State] = reaching(rounds, self._before)
+            explained = reachable_from(rounds, lambda one: self._before.get(one, ()))
             known |= explained
             state = next((one for one in first if one in rounds), begin)
             active = [node for node in self._system.active(state) if all(node in self._system.active(one) for one in rounds)]
@@ -103,8 +104,8 @@ class Waits:
     def _last(self, state: State) -> set[State]:
         """Return situations that are come to from there, each of which leads to all others of them and to nothing else."""
         while True:
-            after: set[State] = reaching([state], self._after)
-            before: set[State] = reaching([state], self._before)
+            after = reachable_from([state], lambda one: self._after.get(one, ()))
+            before = reachable_from([state], lambda one: self._before.get(one, ()))
             left = after - before
             if not left:
                 return after
@@ -211,11 +212,7 @@ class Waits:
         """Return managers at rest that calm steps lead to."""
         key = (place, number)
         if key not in self._at_rest:
-            seen, todo = {number}, [number]
-            while todo:
-                for event, after in self._system.moves_of(place, todo.pop()):
-                    if self._calm(event) and after not in seen:
-                        seen.add(after)
-                        todo.append(after)
+            moves = self._system.moves_of
+            seen = reachable_from([number], lambda one: (after for event, after in moves(place, one) if self._calm(event)))
             self._at_rest[key] = tuple(one for one in sorted(seen) if self._rests(place, one))
         return self._at_rest[key]

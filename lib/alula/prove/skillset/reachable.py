@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Iterable, Mapping
 from dataclasses import replace
 
+from alula.common.graphs import reachable_from
 from alula.language.counterexamples import Counterexample
 from alula.language.errors import Diagnostic, Severity
 from alula.model.model import Skill, Skillset
@@ -156,13 +157,7 @@ def _lost_skills(skillset: Skillset, graph: Graph) -> list[Diagnostic]:
         if not starts:
             continue
         graph.deadline.check()
-        hopeful = set(starts)
-        todo = list(starts)
-        while todo:
-            for source in sources[todo.pop()]:
-                if source not in hopeful:
-                    hopeful.add(source)
-                    todo.append(source)
+        hopeful = reachable_from(starts, sources.__getitem__)
         if len(hopeful) < len(graph.states):
             number = next(n for n in range(len(graph.states)) if n not in hopeful)
             stuck.setdefault(number, []).append(skill.name)

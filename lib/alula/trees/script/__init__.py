@@ -4,9 +4,9 @@ Extensions of ours: dotted names (``navigation.flight_status == IN_AIR``) and ca
 """
 
 from alula.trees.script.errors import ScriptError
-from alula.trees.script.parser import parse
-from alula.trees.script.program import Names, Note, Program
+from alula.trees.script.parser import parse, statements_of
+from alula.trees.script.program import Names, Note, Program, names_in
 from alula.trees.script.scope import Reference, Scope, Value
 from alula.trees.script.values import truth
 
-__all__ = ["Names", "Note", "Program", "Reference", "Scope", "ScriptError", "Value", "parse", "truth"]
+__all__ = ["Names", "Note", "Program", "Reference", "Scope", "ScriptError", "Value", "names_in", "parse", "statements_of", "truth"]

@@ -47,6 +47,14 @@ def parse(text: str) -> Program:
     return _Parser(text).program()
 
 
+def statements_of(text: str) -> tuple[Node, ...]:
+    """Return the statements of a script, none where it can't be read: the check of its file has said so then."""
+    try:
+        return parse(text).statements
+    except ScriptError:
+        return ()
+
+
 @dataclass
 class _Begun:
     """Operators of one level that still wait for their last operand."""

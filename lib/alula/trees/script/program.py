@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Iterable, Iterator, Sequence
 from dataclasses import dataclass, field
 
 from alula.trees.script.compiler import Code, compile_node
@@ -14,11 +14,11 @@ from alula.trees.script.values import ValueMismatch, truth
 
 @dataclass(frozen=True, slots=True)
 class Names:
-    """The names of a script: entries read and written, those of them that ``:=`` may make, what calls name, and functions."""
+    """The names in a script: entries read and written, those written without being read, what calls name, and functions."""
 
     read: frozenset[str]
     written: frozenset[str]
-    created: frozenset[str]
+    replaced: frozenset[str]
     asked: frozenset[str]
     called: frozenset[str]
 
@@ -69,19 +69,24 @@ class Program:
     @property
     def names(self) -> Names:
         """The names that the script uses."""
-        targets = [node for node in self.nodes() if isinstance(node, Assignment)]
-        calls = [node for node in self.nodes() if isinstance(node, Call)]
-        aside = {id(node.target) for node in targets if node.operator in {":=", "="}}
-        asked = [argument for node in calls for argument in node.arguments if isinstance(argument, Name)]
-        aside |= {id(argument) for argument in asked}
-        return Names(
-            read=_names(self.nodes(), lambda node: id(node) not in aside),
-            written=_names(node.target for node in targets),
-            created=_names(node.target for node in targets if node.operator == ":="),
-            asked=_names(asked),
-            called=frozenset(node.function for node in calls),
-        )
+        return names_in(self.statements)
 
 
-def _names(nodes: Iterator[Node] | Sequence[Node], chosen: Callable[[Node], bool] = lambda _: True) -> frozenset[str]:
-    return frozenset(node.name for node in nodes if isinstance(node, Name) and chosen(node))
+def names_in(statements: Iterable[Node]) -> Names:
+    """Return the names that statements use."""
+    nodes = [node for statement in statements for node in walk(statement)]
+    assigned = [node for node in nodes if isinstance(node, Assignment)]
+    calls = [node for node in nodes if isinstance(node, Call)]
+    asked = [argument for node in calls for argument in node.arguments if isinstance(argument, Name)]
+    aside = {id(node) for node in (*asked, *(one.target for one in assigned if one.replaces))}
+    return Names(
+        read=_names(node for node in nodes if id(node) not in aside),
+        written=_names(node.target for node in assigned),
+        replaced=_names(node.target for node in assigned if node.replaces),
+        asked=_names(asked),
+        called=frozenset(node.function for node in calls),
+    )
+
+
+def _names(nodes: Iterable[Node]) -> frozenset[str]:
+    return frozenset(node.name for node in nodes if isinstance(node, Name))

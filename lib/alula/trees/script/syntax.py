@@ -88,6 +88,11 @@ class Assignment:
     offset: int
     end: int
 
+    @property
+    def replaces(self) -> bool:
+        """Tell whether the value takes the place of the entry's, which is not read."""
+        return self.operator in {":=", "="}
+
 
 Node: TypeAlias = Literal | Name | Call | Prefix | Chain | Comparison | Conditional | Assignment
 

@@ -1,0 +1,59 @@
+"""What a node reads and writes, as check and search read it."""
+
+from __future__ import annotations
+
+import pytest
+
+from alula.trees.access import (
+    named_entries,
+    scripts_after,
+    scripts_before,
+    scripts_of,
+    scripts_within,
+    takes_script_from_entry,
+    written_entries,
+)
+from alula.trees.document import Element
+from alula.trees.factory import build_tree
+from alula.trees.palette import NodeType
+from alula.trees.reading import read_text
+from alula.trees.script import names_in, statements_of
+from alula.trees.standard import standard_palette
+
+
+def node(line: str) -> tuple[Element, NodeType]:
+    element = read_text(f'<root BTCPP_format="4"><BehaviorTree ID="a">{line}</BehaviorTree></root>').trees["a"].children[0]
+    type_ = standard_palette().get(element.tag)
+    assert type_ is not None
+    return element, type_
+
+
+def test_scripts_come_in_the_order_in_which_they_run() -> None:
+    element, type_ = node('<Script _post="p" code="c" _onSuccess="s" _while="w" _skipIf="k"/>')
+    assert [one.name for one in scripts_before(element)] == ["_skipIf", "_while"]
+    assert [one.name for one in scripts_within(element, type_)] == ["code"]
+    assert [one.name for one in scripts_after(element)] == ["_onSuccess", "_post"]
+    assert [one.value for one in scripts_of(element, type_)] == ["k", "w", "c", "s", "p"]
+    assert [one.name for one in scripts_of(element, None)] == ["_skipIf", "_while", "_onSuccess", "_post"]
+
+
+@pytest.mark.parametrize(("code", "from_entry"), [("a := 1", False), ("{code}", True), (" {code}", True)])
+def test_a_script_that_an_entry_holds_is_none_of_the_file(code: str, from_entry: bool) -> None:  # noqa: FBT001
+    element, type_ = node(f'<Script code="{code}"/>')
+    assert takes_script_from_entry(element, type_) is from_entry
+    assert bool(list(scripts_within(element, type_))) is not from_entry
+
+
+def test_what_ports_name_is_told_apart_by_whether_it_is_written() -> None:
+    files = read_text(
+        '<root BTCPP_format="4"><BehaviorTree ID="a"><Sequence><Script code="n := 1"/>'
+        '<LoopDouble queue="{all}" value="{=}"><AlwaysSuccess/></LoopDouble></Sequence></BehaviorTree></root>'
+    )
+    loop = build_tree(files, standard_palette(), lambda: 0).root.children[1]
+    assert named_entries(loop) == {"queue": "all", "value": "value"}
+    assert written_entries(loop)["value"] == "value"
+
+
+def test_a_script_that_can_not_be_read_has_no_statements() -> None:
+    assert statements_of("a := ") == statements_of("") == ()
+    assert names_in([*statements_of("a := b"), *statements_of("c += 1; running(x.y)")]).read == {"b", "c"}
