@@ -12,10 +12,8 @@ from dataclasses import dataclass, replace
 from functools import partial
 from pathlib import Path
 from time import monotonic
-from typing import BinaryIO
+from typing import TYPE_CHECKING, BinaryIO
 
-from alula.check.findings import findings_of
-from alula.check.robot import models_of, part_of
 from alula.common.public import public
 from alula.common.robots import RobotError, RobotFolder, find_robot, load_robot_folder, meaning
 from alula.language import models
@@ -23,16 +21,17 @@ from alula.language.check.fields import check_fields
 from alula.language.errors import Diagnostic, Severity, has_errors
 from alula.language.messages import NO_MESSAGES, Messages, messages_of
 from alula.language.models import ModelFile, models_in
-from alula.missions.part import NO_PART, MissionPart
 from alula.model.model import Skillset
 from alula.model.span import Span
-from alula.records.causes.fault_file import states_of_faults
 from alula.trees.document import read_source
 from alula.trees.errors import FileError
 from alula.trees.library import ENDINGS, Library
 from alula.trees.library import ignore as ignore_problem
 from alula.trees.palette import name_in_files
 from alula.trees.reading import read_files
+
+if TYPE_CHECKING:
+    from alula.missions.part import MissionPart
 
 Tell = Callable[[str], None]
 """Takes a line about progress, or about what is left out."""
@@ -215,10 +214,13 @@ def prove_missions(files: Sequence[ModelFile], timeout_s: float, tell: Tell = ig
     sound = [file for file in files if not has_errors(file.findings)]
     if not sound:
         return
-    from alula.prove.mission.prover import prove_mission  # which brings its solvers along
+    # Late: the search brings its solvers along, and models are checked without it.
+    from alula.missions.part import NO_PART
+    from alula.prove.mission.prover import prove_mission
+    from alula.records.causes.fault_file import states_of_faults
 
     robot = _robot(ignore)  # what is to be told of it was told when they were checked
-    skillsets, part = robot.skillsets, robot.part
+    skillsets, part = robot.skillsets, robot.part or NO_PART
     faults = states_of_faults(skillsets, tell) if skillsets else {}
     library = Library()
     library.add(Path(file.path) for file in files if files[1:])
@@ -246,14 +248,14 @@ class _Robot:
 
     root: Path | None = None
     skillsets: tuple[Skillset, ...] = ()
-    part: MissionPart = NO_PART
+    part: MissionPart | None = None
     messages: Messages = NO_MESSAGES
 
     def has(self, path: Path, source: bytes) -> bool:
         """Tell whether a file is a mission of this robot: it lies in its folder, or names a skillset or a node of it."""
         if self.root is None or self.root in path.resolve().parents:
             return self.root is not None
-        names = [f"{one.name}." for one in self.skillsets] + [f"<{name_in_files(node)}" for node in self.part.nodes]
+        names = [f"{one.name}." for one in self.skillsets] + [f"<{name_in_files(node)}" for node in (self.part.nodes if self.part else ())]
         return any(re.search(rb"\b" * name[0].isalpha() + re.escape(name.encode()) + rb"\b", source) for name in names)
 
 
@@ -263,17 +265,23 @@ def _robot(tell: Tell) -> _Robot:
     except RobotError as error:
         tell(f"no skills are known: {error}")
         return _Robot()
+    from alula.check.robot import models_of, part_of  # late, as in `_checked`
+
     return _Robot(robot.root, models_of(robot, tell), part_of(robot, tell), messages_of(robot))
 
 
 def _checked(
     path: str, robot: _Robot, palettes: Sequence[Path], library: Library, main: str, tell: Tell, enums: Collection[str]
 ) -> list[Diagnostic]:
+    from alula.check.findings import findings_of  # late: models are checked without it
+    from alula.missions.part import NO_PART
+
     try:
         source = read_source(Path(path))
         own = robot if robot.has(Path(path), source) else _Robot()
         others = own.root is None
-        found = findings_of(path, source, own.skillsets, palettes, own.part, own.messages, library, main, of_others=others, enums=enums)
+        part = own.part or NO_PART
+        found = findings_of(path, source, own.skillsets, palettes, part, own.messages, library, main, of_others=others, enums=enums)
     except FileError as error:
         found = [Diagnostic("ALU001", error.problem.message, Span(path, 0, 0, 0))]
     for finding in found:

@@ -12,7 +12,6 @@ from collections.abc import Iterator
 from dataclasses import dataclass, field
 from pathlib import Path
 from xml.parsers import expat
-from xml.sax.saxutils import escape
 
 from alula.trees.errors import FileError, Place, Problem
 
@@ -29,6 +28,8 @@ LESS = re.compile(rb"<")
 DASHES = re.compile(rb"-(?=-)|-\Z")
 """In a comment; the last one stands before its end."""
 DECLARATION = re.compile(rb"\s+(<\?xml[^>]*\?>)")
+_ESCAPED = str.maketrans({"&": "&amp;", "<": "&lt;", ">": "&gt;", '"': "&quot;", "\n": "&#10;", "\t": "&#9;", "\r": "&#13;"})
+"""How an attribute's value has to be written; xml.sax.saxutils would take the network's modules along."""
 _AMPERSAND = "an `&` that stands for itself is no XML, so other tools refuse the file", "write &amp;"
 _LESS = "a `<` in an attribute is no XML, so other tools refuse the file", "write &lt;"
 _DASHES = "a comment with `--` in it is no XML, so other tools refuse the file", "write other signs than dashes there"
@@ -63,7 +64,7 @@ class Attribute:
 
     def text(self) -> str:
         """Return it as it stands in a file."""
-        value = self.source or '"' + escape(self.value, {'"': "&quot;", "\n": "&#10;", "\t": "&#9;", "\r": "&#13;"}) + '"'
+        value = self.source or '"' + self.value.translate(_ESCAPED) + '"'
         return f"{self.lead}{self.name}{self.sign}{value}"
 
 

@@ -9,7 +9,7 @@ from alula.language.errors import Diagnostic, Severity
 from alula.language.outside import Arrow, opened, untaken
 from alula.model.model import Skillset
 from alula.prove.limits import Deadline, OutOfTimeError
-from alula.prove.skillset import explicit, few, symbolic
+from alula.prove.skillset import explicit
 from alula.prove.skillset.abstract import Abstraction, without_data
 from alula.prove.skillset.local import Suspect, local_checks
 
@@ -72,6 +72,9 @@ class _Search:
 
     def _as_sets(self, skillset: Skillset, abstraction: Abstraction) -> list[Diagnostic]:
         """Return all global findings; what a few skills show against a property is among them also where time is too short for the rest."""
+        # Late: diagrams take a moment to load, and few situations are looked at without them.
+        from alula.prove.skillset import few, symbolic
+
         quick = self.deadline.half("properties, with a few skills")
         refuted = few.refuted(abstraction, skillset.properties, quick, copies=self.copies)
         self.deadline.doing = "situations as sets"
