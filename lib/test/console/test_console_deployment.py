@@ -13,7 +13,7 @@ from console_page import SIZES, Page
 from console_serving import Bench, Robot, answer_to, heard, serve, served
 
 from alula.common.network import claim_domain
-from alula.console.following import RunFollower
+from alula.report.page.following import RunFollower
 from alula.console.link import Skillsets
 
 PARTS = {"bridge": ("running", ""), "rover": ("running", ""), "recorder": ("given up", "exit code 1: the disk is full")}
