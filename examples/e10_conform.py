@@ -3,7 +3,7 @@
 It prints:
 
     its own model: True, 30 events
-    another model: at 2.2 s hand BUSY -> FULL (pick 000000000001 hold): no step that the model allows in this situation has it
+    another model: at 2.2 s hand BUSY -> FULL (pick 000000000002 hold): no step that the model allows in this situation has it
 """
 
 from __future__ import annotations

@@ -38,7 +38,7 @@ def topics(robot: Robot) -> list[BridgedTopic]:
             name = f"/{skillset.name}/reported"
             found.append(BridgedTopic(name, "ros1_to_ros2", "skillset_interfaces/ResourceStates", latched=True, depth=10))
         # Who watches over the robot on its own computer listens for them. Not latched: the last one of dead managers is no heartbeat.
-        found.append(BridgedTopic(f"/{skillset.name}/alive", "ros2_to_ros1", "std_msgs/Header", latched=False, depth=1))
+        found.append(BridgedTopic(f"/{skillset.name}/alive", "ros2_to_ros1", "skillset_interfaces/Heartbeat", latched=False, depth=1))
     return list({topic.name: topic for topic in reversed(found)}.values())[::-1]
 
 

@@ -22,25 +22,17 @@ _SUFFIXES = (".mcap", ".db3", ".bag", ".jsonl", ".json")
 
 
 @dataclass(frozen=True)
-class Logged:
-    """An event as it was logged; ``instance_id`` is that of its managers, empty where the log does not say."""
-
-    event: EngineEvent
-    instance_id: str = ""
-
-
-@dataclass(frozen=True)
 class Log:
     """The events of a log in their order; ``cut`` says why it breaks off, where it does."""
 
     path: Path
-    entries: tuple[Logged, ...]
+    events: tuple[EngineEvent, ...]
     cut: str = ""
 
     @property
     def skillsets(self) -> tuple[str, ...]:
         """The skillsets that it is about."""
-        return tuple(dict.fromkeys(entry.event.skillset for entry in self.entries))
+        return tuple(dict.fromkeys(event.skillset for event in self.events))
 
 
 def read_log(path: Path) -> Log:
@@ -59,7 +51,7 @@ def read_log(path: Path) -> Log:
         log = record
     else:
         log = _read_bag(file)
-    if not log.entries:
+    if not log.events:
         raise AnalysisError(f"{file}: has no events of skillsets{f'; {log.cut}' if log.cut else ''}")
     return log
 
@@ -79,9 +71,9 @@ def _log_file(path: Path) -> Path:
     return found[0]
 
 
-def _event(value: dict[str, Any], place: str, instance_id: str = "") -> Logged:
+def _event(value: dict[str, Any], place: str) -> EngineEvent:
     try:
-        return Logged(read_event(value), instance_id)
+        return read_event(value)
     except ValueError as error:
         raise AnalysisError(f"{place}: is no event: {error}") from None
 
@@ -104,7 +96,7 @@ def _read_lines(path: Path) -> Log:
         lines = path.read_text(encoding="utf-8").split("\n")
     except (OSError, UnicodeDecodeError) as error:
         raise AnalysisError(f"{path}: can't be read: {error}") from None
-    entries: list[Logged] = []
+    events: list[EngineEvent] = []
     for number, line in enumerate(lines, 1):
         if not line.strip():
             continue
@@ -112,12 +104,12 @@ def _read_lines(path: Path) -> Log:
             value = json.loads(line)
         except (ValueError, RecursionError) as error:
             if number == len(lines):  # a writer ends each line: what stands behind the last one was cut off
-                return Log(path, tuple(entries), "its last line was cut off")
+                return Log(path, tuple(events), "its last line was cut off")
             raise AnalysisError(f"{path}:{number}: is no JSON: {error}") from None
         if not isinstance(value, dict):
             raise AnalysisError(f"{path}:{number}: is no event, but {type(value).__name__}")
-        entries.append(_event(value, f"{path}:{number}"))
-    return Log(path, tuple(entries))
+        events.append(_event(value, f"{path}:{number}"))
+    return Log(path, tuple(events))
 
 
 def _read_bag(path: Path) -> Log:
@@ -128,13 +120,13 @@ def _read_bag(path: Path) -> Log:
         with rosbag1.Reader(path) if path.suffix == ".bag" else rosbag2.Reader(path) as reader:
             wanted = [one for one in reader.connections if one.msgtype == MESSAGE]
             read = _decoder(path, reader.connections, ros1=path.suffix == ".bag")
-            entries = tuple(_from_message(read(data), path) for _, _, data in reader.messages(wanted))
+            events = tuple(_from_message(read(data), path) for _, _, data in reader.messages(wanted))
     except AnalysisError:
         raise
     except Exception as error:  # noqa: BLE001 - whatever a damaged or hostile bag makes the reader raise
         remedy = "" if path.suffix == ".bag" else f"; if it is whole, copy its topics of {MESSAGE} into another (ros2 bag convert)"
         raise AnalysisError(f"{path}: can't be read as a bag: {type(error).__name__}: {error}{remedy}") from None
-    return Log(path, entries)
+    return Log(path, events)
 
 
 def _decoder(path: Path, connections: Sequence[Connection], *, ros1: bool) -> Callable[[bytes], Any]:
@@ -158,13 +150,14 @@ def _decoder(path: Path, connections: Sequence[Connection], *, ros1: bool) -> Ca
     return lambda data: read(data, MESSAGE)
 
 
-def _from_message(message: Any, path: Path) -> Logged:
+def _from_message(message: Any, path: Path) -> EngineEvent:
+    """Return the event of a message of any version: older ones have no reason and no kind of result, and the instance id in the header."""
     stamp_s = message.header.stamp.sec + message.header.stamp.nanosec / 1e9
     names = ("sequence", "skillset", "skill", "id", "state", "result", "message", "resource", "from_state", "to_state", "cause")
     value = {"stamp_s": stamp_s, "kind": _KINDS.get(message.kind), **{name: getattr(message, name) for name in names}}
-    # Older bags say neither.
     value |= {name: getattr(message, name, "") for name in ("result_kind", "reason")} | dict(_values(message, path))
-    return _event(value, str(path), message.header.frame_id)
+    value["instance_id"] = getattr(message, "instance_id", message.header.frame_id)
+    return _event(value, str(path))
 
 
 def _values(message: Any, path: Path) -> Iterator[tuple[str, object]]:

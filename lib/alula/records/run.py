@@ -81,7 +81,7 @@ def load_recorded_run(path: Path) -> RecordedRun:
     """
     log = read_log(path)
     robot = robot_of(path)
-    return RecordedRun(path, tuple(entry.event for entry in log.entries), _mission(path), None if robot is None else robot.departure)
+    return RecordedRun(path, log.events, _mission(path), None if robot is None else robot.departure)
 
 
 def _mission(path: Path) -> Mapping[str, Any]:

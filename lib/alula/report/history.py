@@ -75,7 +75,7 @@ def in_order(events: Iterable[EngineEvent]) -> list[EngineEvent]:
     seen: set[tuple[object, ...]] = set()
     unique: list[EngineEvent] = []
     for event in events:
-        key = (event.skillset, event.sequence, event.stamp_s, *_what(event))
+        key = (event.skillset, event.instance_id, event.sequence, event.stamp_s, *_what(event))
         if key not in seen:
             seen.add(key)
             unique.append(event)
@@ -89,14 +89,17 @@ def _what(event: EngineEvent) -> tuple[str, ...]:
 
 
 def gaps(events: Sequence[EngineEvent], joined: Mapping[str, object] | None = None) -> Iterator[str]:
-    """Yield a sentence for each hole in a skillset's numbering, which begins at 1 and again at 1 with each restart.
+    """Yield a sentence for each hole in a skillset's numbering, which begins at 1 with each start of its managers.
 
     ``joined``: the number of a skillset's last event before the mission, where its managers ran already.
     """
     last = {skillset: number for skillset, number in (joined or {}).items() if isinstance(number, int)}
+    managers: dict[str, str] = {}
     for event in events:
-        before = last.get(event.skillset, 0)
-        last[event.skillset] = max(before, event.sequence) if event.sequence != 1 else 1
+        others = event.instance_id != managers.setdefault(event.skillset, event.instance_id)
+        managers[event.skillset] = event.instance_id
+        before = 0 if others or event.sequence == 1 else last.get(event.skillset, 0)
+        last[event.skillset] = max(before, event.sequence)
         if event.sequence > before + 1:
             yield f"{event.skillset} lost {event.sequence - before - 1} events before {event.stamp_s:.2f} s of mission clock"
 

@@ -22,7 +22,6 @@ from alula.runtime.middleware import (
     REPORTED,
     RESOURCE_STATES,
     SKILL_STATES,
-    PublishedEvent,
     ResourceStates,
     SkillStates,
     Topic,
@@ -125,17 +124,12 @@ def _decode_why(response: Any) -> WhyReply:
     return WhyReply("", Why("", response.ready, response.reason, response.refusal, found, history))
 
 
-def published_event(message: Any) -> PublishedEvent:
-    """Return an event; inputs and outputs are plain values."""
-    return PublishedEvent(message.header.frame_id, event_of(message))
-
-
 def event_of(message: Any) -> EngineEvent:
-    """Return an event without the name of its managers."""
+    """Return an event; inputs and outputs are plain values."""
     stamp_ns = stamp_ns_of(message.header.stamp)
     if message.kind == type(message).TRANSITION:
         states = (message.resource, message.from_state, message.to_state)
-        return TransitionEvent(message.sequence, stamp_ns, *states, message.cause, message.skillset, message.reason)
+        return TransitionEvent(message.sequence, stamp_ns, *states, message.cause, message.skillset, message.reason, message.instance_id)
     return ExecutionEvent(
         message.sequence,
         stamp_ns,
@@ -149,14 +143,14 @@ def event_of(message: Any) -> EngineEvent:
         message.skillset,
         read_kind(message.result_kind),
         read_unmet(json.loads(message.unmet_json or "null")),
+        message.instance_id,
     )
 
 
 def states_of(message: Any) -> ResourceStates:
-    """Read ``ResourceStates``; ``frame_id`` holds the instance id and the number of the last event."""
-    instance_id, _, after = message.header.frame_id.partition(" ")
+    """Read ``ResourceStates``."""
     values = {one.name: ResourceStatus(one.state, one.previous_state, one.stamp_ns, one.reason) for one in message.resources}
-    return ResourceStates(instance_id, int(after or 0), stamp_ns_of(message.header.stamp), values)
+    return ResourceStates(message.instance_id, message.sequence, stamp_ns_of(message.header.stamp), values)
 
 
 class Codecs:
@@ -177,7 +171,7 @@ class Codecs:
         self._encoded: dict[str, tuple[SkillRecord, Any]] = {}
         self._decoded: dict[str, tuple[tuple[Any, ...], SkillRecord]] = {}
         self._topics: Mapping[str, TopicCodec] = {
-            EVENTS.name: TopicCodec(messages.Event, self._event_message, published_event),
+            EVENTS.name: TopicCodec(messages.Event, self._event_message, event_of),
             RESOURCE_STATES.name: TopicCodec(messages.ResourceStates, self._states_message, states_of),
             REPORTED.name: TopicCodec(messages.ResourceStates, self._states_message, states_of),
             SKILL_STATES.name: TopicCodec(messages.SkillStates, self._skills_message, self._skills_of),
@@ -196,12 +190,11 @@ class Codecs:
 
     # --- topics ------------------------------------------------------------------------------------------------------
 
-    def _event_message(self, skillset: str, told: PublishedEvent) -> Any:
+    def _event_message(self, skillset: str, event: EngineEvent) -> Any:
         """Return an event as a message; its outputs are there when it is the last of its execution."""
-        event, kind = told.event, self._messages.Event
-        message = kind(skillset=skillset, sequence=event.sequence)
+        kind = self._messages.Event
+        message = kind(skillset=skillset, instance_id=event.instance_id, sequence=event.sequence)
         set_stamp(message.header.stamp, event.stamp_ns)
-        message.header.frame_id = told.instance_id
         if isinstance(event, ExecutionEvent):
             message.kind = kind.EXECUTION
             message.skill, message.id, message.state = event.skill, event.id, event.state.value
@@ -218,23 +211,24 @@ class Codecs:
         return message
 
     def _states_message(self, skillset: str, states: ResourceStates) -> Any:
-        """Return resource states as a message; ``frame_id`` says whose they are, and after which event."""
+        """Return resource states as a message."""
         resources = [self._resource(name, one) for name, one in states.resources.items()]
-        message = self._messages.ResourceStates(skillset=skillset, resources=resources)
+        message = self._messages.ResourceStates(
+            skillset=skillset, instance_id=states.instance_id, sequence=states.sequence, resources=resources
+        )
         set_stamp(message.header.stamp, states.stamp_ns)
-        message.header.frame_id = f"{states.instance_id} {states.after}"
         return message
 
     def _skills_message(self, skillset: str, states: SkillStates) -> Any:
-        message = self._messages.SkillStates(skillset=skillset, skills=[self._skill(name, one) for name, one in states.skills.items()])
+        skills = [self._skill(name, one) for name, one in states.skills.items()]
+        message = self._messages.SkillStates(skillset=skillset, instance_id=states.instance_id, skills=skills)
         set_stamp(message.header.stamp, states.stamp_ns)
-        message.header.frame_id = states.instance_id
         return message
 
     def _skills_of(self, message: Any) -> SkillStates:
         """Return skill states; inputs and outputs are plain values."""
         skills = {one.name: self._skill_of(one) for one in message.skills}
-        return SkillStates(message.header.frame_id, stamp_ns_of(message.header.stamp), skills)
+        return SkillStates(message.instance_id, stamp_ns_of(message.header.stamp), skills)
 
     def _resource(self, name: str, value: ResourceStatus) -> Any:
         kept, message = self._resources.get(name, (None, None))

@@ -17,7 +17,7 @@ from typing import Any, Protocol
 from alula.model.execution_state import ExecutionState
 from alula.model.model import Data
 from alula.model.ros_types import PRIMITIVES
-from alula.runtime.core.events import EngineEvent, ExecutionEvent
+from alula.runtime.core.events import ExecutionEvent
 from alula.runtime.core.records import ResourceStatus, SkillRecord
 from alula.runtime.core.why import Why
 from alula.runtime.timers import Job, Timer
@@ -87,20 +87,12 @@ def thinned(callback: OnValue, topic: Topic, now_ns: Callable[[], int]) -> OnVal
 
 @dataclass(frozen=True)
 class ResourceStates:
-    """All resources after a step; ``after``: the last event that they include; ``instance_id``: new at each start of the managers."""
+    """All resources after a step; ``sequence``: of the last event that they include; ``instance_id``: as in the events."""
 
     instance_id: str
-    after: int
+    sequence: int
     stamp_ns: int
     resources: Mapping[str, ResourceStatus]
-
-
-@dataclass(frozen=True)
-class PublishedEvent:
-    """An event, with the ``instance_id`` of the managers that published it."""
-
-    instance_id: str
-    event: EngineEvent
 
 
 @dataclass(frozen=True)
@@ -255,7 +247,7 @@ class Middleware(Protocol):
         ...
 
     def new_id(self) -> str:
-        """Return an id for a goal, 12 hexadecimal digits."""
+        """Return a new id, 12 hexadecimal digits: of a goal, of managers."""
         ...
 
     def advertise(self, topic: Topic) -> Publisher:

@@ -91,7 +91,7 @@ def test_the_bridge_configuration(files):
                 "latched": True,
                 "depth": 1,
             },
-            {"name": "/rover/alive", "direction": "ros2_to_ros1", "type": "std_msgs/Header", "latched": False, "depth": 1},
+            {"name": "/rover/alive", "direction": "ros2_to_ros1", "type": "skillset_interfaces/Heartbeat", "latched": False, "depth": 1},
         ],
         "services": [
             {"name": "/rover/transition", "server": "ros2", "type": "skillset_interfaces/Transition", "timeout_s": 5.0},

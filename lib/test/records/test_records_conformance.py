@@ -168,9 +168,20 @@ def test_managers_that_are_restarted_count_from_one_and_know_nothing_of_before()
     assert [monitor.take(event) for event in (*first, *later)] == [None] * 4
     verdict = monitor.verdict
     assert (verdict.conforms, verdict.restarts, verdict.open) == (True, {"rover": (1.1,)}, ("rover.goto 1",))
-    named = SkillsetMonitor(ROVER)
-    assert [named.take(event, "first") for event in first] == [None] * 3
-    assert named.take(later[0], "first") is not None
+
+
+def named(events, instance_id):
+    return [replace(event, instance_id=instance_id) for event in events]
+
+
+def test_whose_an_event_is_says_whether_the_managers_were_restarted():
+    first, again = Story().started().events, [replace(event, stamp_ns=event.stamp_ns + NS) for event in Story().started().events]
+    assert finding(ROVER, [*named(first, "one"), *named(again, "one")]).why.startswith("it comes after event 3: ")
+    assert finding(ROVER, [*named(first, "one"), *named(again, "two")]) is None
+    lost = finding(ROVER, [*named(first, "one"), *named(again[1:], "two")])
+    assert lost.why == "event 1 is missing", "and not: it comes after event 3"
+    more = [replace(event, sequence=event.sequence + 3) for event in again[:1]]
+    assert finding(ROVER, [*named(first, "one"), *named(more, "two")]).why == "events 1 to 3 are missing", "nor event 4 of the first"
 
 
 def test_a_log_that_ends_within_a_step_conforms_and_says_what_is_owed():

@@ -5,6 +5,7 @@ from __future__ import annotations
 import contextlib
 import json
 import os
+import re
 import sqlite3
 from pathlib import Path
 
@@ -43,10 +44,36 @@ def lines(path, events):
     path.write_text("".join(json.dumps(event_record(event)) + "\n" for event in events), encoding="utf-8")
 
 
-def bag(path, events, storage):
+DEFINITION = (ROOT / "bridge/interfaces/skillset_interfaces/msg/Event.msg").read_text(encoding="utf-8")
+OF_0_3 = """
+std_msgs/Header header
+uint64 sequence
+string skillset
+uint8 EXECUTION=0
+uint8 TRANSITION=1
+uint8 kind
+string skill
+string id
+string state
+string result
+string result_kind
+string unmet_json
+string message
+string inputs_json
+string outputs_json
+string resource
+string from_state
+string to_state
+string cause
+string reason
+"""
+"""The definition of version 0.3.0, whose header carries the instance id."""
+OF_0_2 = re.sub("string (unmet_json|reason|result_kind)\n", "", OF_0_3)
+
+
+def bag(path, events, storage, definition=DEFINITION):
     """Write what a recorder of ROS 2 would: CDR on a topic of each skillset."""
     store = get_typestore(Stores.ROS2_JAZZY)
-    definition = (ROOT / "bridge/interfaces/skillset_interfaces/msg/Event.msg").read_text(encoding="utf-8")
     store.register(get_types_from_msg(definition, MESSAGE))
     message, header, time = (store.types[name] for name in (MESSAGE, "std_msgs/msg/Header", "builtin_interfaces/msg/Time"))
     with BagWriter(path, version=9, storage_plugin=storage) as writer:
@@ -58,18 +85,19 @@ def bag(path, events, storage):
             fields = {
                 name: told.get(name, "") for name in ("skillset", "skill", "id", "state", "result", "result_kind", "message", "resource")
             }
-            fields |= {name: told.get(name, "") for name in ("from_state", "to_state", "cause", "reason")}
+            fields |= {name: told.get(name, "") for name in ("from_state", "to_state", "cause", "reason", "instance_id")}
+            fields |= {"unmet_json": json.dumps(told["unmet"]) if told.get("unmet") else ""}
             stamp = time(sec=event.stamp_ns // 10**9, nanosec=event.stamp_ns % 10**9)
+            frame_id = "" if "instance_id" in definition else event.instance_id
             whole = message(
-                header=header(stamp=stamp, frame_id="one"),
+                header=header(stamp=stamp, frame_id=frame_id),
                 sequence=event.sequence,
                 kind=int(told["kind"] == "TRANSITION"),
                 inputs_json=json.dumps(told.get("inputs", {})),
                 outputs_json="",
-                unmet_json=json.dumps(told["unmet"]) if told.get("unmet") else "",
                 EXECUTION=0,
                 TRANSITION=1,
-                **fields,
+                **{name: value for name, value in fields.items() if f"string {name}" in definition},
             )
             writer.write(topic, event.stamp_ns, store.serialize_cdr(whole, MESSAGE))
 
@@ -79,13 +107,23 @@ def test_every_kind_of_log_says_the_same(tmp_path, flown, capsys):
     lines(tmp_path / "events.jsonl", flown)
     bag(tmp_path / "mcap", flown, StoragePlugin.MCAP)
     bag(tmp_path / "sqlite", flown, StoragePlugin.SQLITE3)
-    told = [entry.event for entry in read_log(tmp_path).entries]
-    assert [event_record(event) for event in told] == [event_record(event) for event in flown]
+    assert [event_record(event) for event in read_log(tmp_path).events] == [event_record(event) for event in flown]
     inside = next((tmp_path / "mcap").glob("*.mcap"))
     for log in (tmp_path, tmp_path / FILE, tmp_path / "events.jsonl", tmp_path / "mcap", tmp_path / "sqlite", inside):
         assert main([str(log), "--json"]) == 0
         verdict = json.loads(capsys.readouterr().out)
         assert (verdict["conforms"], verdict["events"], verdict["cut"]) == (True, len(flown), "")
+
+
+@pytest.mark.parametrize("storage", [StoragePlugin.MCAP, StoragePlugin.SQLITE3])
+@pytest.mark.parametrize("definition", [OF_0_2, OF_0_3, DEFINITION])
+def test_bags_of_every_version_say_whose_each_event_is(tmp_path, flown, storage, definition, capsys):
+    bag(tmp_path / "bag", flown, storage, definition)
+    told = read_log(tmp_path / "bag").events
+    assert [(one.instance_id, one.sequence) for one in told] == [(one.instance_id, one.sequence) for one in flown]
+    assert len({one.instance_id for one in told}) == len({one.skillset for one in told}), "each skillset has managers of its own"
+    assert main([str(tmp_path / "bag"), "--json"]) == 0
+    assert json.loads(capsys.readouterr().out)["restarts"] == {}
 
 
 @pytest.mark.parametrize("name", ["mapping", "mapping-zed", "mapping-both", "inspection", "inspection-radio"])

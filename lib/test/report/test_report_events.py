@@ -48,6 +48,7 @@ def test_a_record_is_one_of_an_event():
         "from_state": "OK",
         "to_state": "BROKEN",
         "reason": "",
+        "instance_id": "",
     }
     because = replace(event, reason="the lens is covered")
     assert read_event(json.loads(json.dumps(event_record(because)))) == because
@@ -102,6 +103,16 @@ def test_latched_repetitions_count_once_and_gaps_are_told():
     events = in_order([at(2, 2.0), at(1, 1.0), at(2, 2.0), at(5, 3.0), at(1, 9.0), at(2, 10.0)])
     assert [event.sequence for event in events] == [1, 2, 5, 1, 2]
     assert list(gaps(events)) == ["navigation lost 2 events before 3.00 s of mission clock"]
+
+
+def test_what_other_managers_lost_first_is_told_by_whose_the_events_are():
+    def at(number, stamp_s, whose):
+        values = started(sequence=number, stamp_s=stamp_s, instance_id=whose, skill="goto", id=str(number), state="REQUESTED")
+        return read_event(values)
+
+    events = [at(1, 1.0, "a"), at(2, 2.0, "a"), at(3, 9.0, "b"), at(4, 10.0, "b")]
+    assert list(gaps(events)) == ["navigation lost 2 events before 9.00 s of mission clock"]
+    assert list(gaps([*events[:2], at(1, 9.0, "b")])) == []
 
 
 def test_what_a_mission_has_left_out_because_it_was_before_it_is_not_lost(tmp_path):

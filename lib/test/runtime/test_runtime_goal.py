@@ -11,7 +11,7 @@ from alula.runtime.client.connection import DESCRIBE_S, DOUBT_S, RIVALS_NS
 from alula.runtime.client.goal import ACKNOWLEDGE_LIMIT, ACKNOWLEDGE_S, GRACE_S, LOST_S, SILENCE_S
 from alula.runtime.core.events import ExecutionEvent, TransitionEvent
 from alula.runtime.local import VirtualClock
-from alula.runtime.middleware import EVENTS, RESOURCE_STATES, GoalResult, PublishedEvent, ResourceStates, ResourceStatus
+from alula.runtime.middleware import EVENTS, RESOURCE_STATES, GoalResult, ResourceStates, ResourceStatus
 from alula.runtime.waiting import ThreadWaiter
 from alula_testing.runtime_models import flying_skillset
 
@@ -93,8 +93,8 @@ class Graph:
 
     def tell(self, instance_id: str, handle, state: ExecutionState, sequence: int = 0) -> None:
         self.sequence = sequence or self.sequence + 1
-        event = ExecutionEvent(self.sequence, self.clock.now_ns, "takeoff", handle.id, state, "", "", {}, {})
-        self.heard[EVENTS.name](PublishedEvent(instance_id, event))
+        event = ExecutionEvent(self.sequence, self.clock.now_ns, "takeoff", handle.id, state, "", "", {}, {}, instance_id=instance_id)
+        self.heard[EVENTS.name](event)
 
 
 @pytest.fixture
@@ -158,7 +158,7 @@ def test_a_goal_that_was_taken_and_is_not_told_of_is_asked_for(graph, client):
 
 def test_a_gap_in_the_events_has_the_endings_asked_for(graph, client):
     handle = running(graph, client)
-    graph.heard[EVENTS.name](PublishedEvent("one", TransitionEvent(9, 0, "sdk", "A", "B", "extern")))
+    graph.heard[EVENTS.name](TransitionEvent(9, 0, "sdk", "A", "B", "extern", instance_id="one"))
     assert graph.link.asked == [handle.id]
     client._news.on_result(handle.id, GoalResult(S.TERMINATED, "DONE", "there", {}))
     assert not handle.done  # its event may still come, and say when it was
@@ -172,7 +172,7 @@ def test_a_result_that_comes_long_before_its_event_waits_for_what_has_led_to_it(
     handle.add_done_callback(lambda _: seen.append((graph.clock.now_ns, client.resources)))
     client._news.on_result(handle.id, GoalResult(S.RESOURCE_INVARIANT_VIOLATED, "has_sdk", "", {}))
     graph.run_for(GRACE_S - 1.0)
-    graph.heard[EVENTS.name](PublishedEvent("one", TransitionEvent(3, 0, "sdk", "AVAILABLE", "UNAVAILABLE", "extern")))
+    graph.heard[EVENTS.name](TransitionEvent(3, 0, "sdk", "AVAILABLE", "UNAVAILABLE", "extern", instance_id="one"))
     graph.tell("one", handle, S.RESOURCE_INVARIANT_VIOLATED, sequence=4)
     graph.run_for(GRACE_S - 1.0)
     assert seen == []
@@ -188,7 +188,7 @@ def test_a_state_is_shown_when_the_event_that_has_led_to_it_was_told(graph, clie
     graph.states("one", after=2, sdk="AVAILABLE")
     assert (seen, client.resources) == ([], {"sdk": "AVAILABLE"})
     for sequence, before, after in ((1, "AVAILABLE", "UNAVAILABLE"), (2, "UNAVAILABLE", "AVAILABLE")):
-        graph.heard[EVENTS.name](PublishedEvent("one", TransitionEvent(sequence, 0, "sdk", before, after, "extern")))
+        graph.heard[EVENTS.name](TransitionEvent(sequence, 0, "sdk", before, after, "extern", instance_id="one"))
     assert seen == [1, "UNAVAILABLE", 2, "AVAILABLE"]
 
 
@@ -212,7 +212,7 @@ def test_an_end_whose_event_never_comes_is_told_all_the_same(graph, client):
 
 def test_an_end_is_told_when_the_resources_after_it_are_known(graph, client):
     handle = running(graph, client)
-    graph.heard[EVENTS.name](PublishedEvent("one", TransitionEvent(3, 0, "axes", "USED", "AVAILABLE", "takeoff")))
+    graph.heard[EVENTS.name](TransitionEvent(3, 0, "axes", "USED", "AVAILABLE", "takeoff", instance_id="one"))
     graph.tell("one", handle, S.TERMINATED, sequence=4)
     assert not handle.done
     seen = []

@@ -169,11 +169,12 @@ def test_records_are_those_of_the_event_messages():
     requested, taken = records[0], records[1]
     assert json.loads(json.dumps(requested)) == {
         "stamp_s": 0.0,
+        "instance_id": "000000000001",
         "sequence": 2,
         "skillset": "flying",
         "kind": "EXECUTION",
         "skill": "takeoff",
-        "id": "000000000001",
+        "id": "000000000002",
         "state": "REQUESTED",
         "result": "",
         "result_kind": "",
@@ -182,7 +183,8 @@ def test_records_are_those_of_the_event_messages():
         "inputs": {"height": 3.0},
         "outputs": {},
     }
-    assert set(taken) == {"stamp_s", "sequence", "skillset", "kind", "resource", "from_state", "to_state", "cause", "reason"}
+    common = {"stamp_s", "instance_id", "sequence", "skillset", "kind"}
+    assert set(taken) == {*common, "resource", "from_state", "to_state", "cause", "reason"}
     assert records[-1]["outputs"] == {"reached": 2.5}
 
 

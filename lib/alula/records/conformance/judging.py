@@ -25,6 +25,6 @@ def judge(log: Log, models: Sequence[Path] = ()) -> ConformanceVerdict:
             monitor = Monitor(models_of(log.skillsets, models))
     except UnsupportedModelError as error:
         raise AnalysisError(str(error)) from None
-    for entry in log.entries:
-        monitor.take(entry.event, entry.instance_id)
+    for event in log.events:
+        monitor.take(event)
     return monitor.verdict

@@ -50,23 +50,21 @@ class SkillsetMonitor:
         """When the managers were restarted, seconds of mission clock."""
         self.events = 0
         self._steps = PossibleSteps(skillset)
-        self._begin("")
+        self._begin()
 
-    def _begin(self, instance_id: str) -> None:
+    def _begin(self) -> None:
         self._beliefs: list[Belief] = [Belief(semantics.initial(self.skillset))]
         self._last: EngineEvent | None = None
-        self._instance_id = instance_id
         self._ended: dict[str, str] = {}
 
-    def take(self, event: EngineEvent, instance_id: str = "") -> Finding | None:
-        """Take the next event; ``instance_id`` is that of its managers, where known. Return a finding, the first time."""
+    def take(self, event: EngineEvent) -> Finding | None:
+        """Take the next event. Return a finding, the first time."""
         if self.finding is not None:
             return None
         self.events += 1
-        if self._restarted(event, instance_id):
+        if self._restarted(event):
             self.restarts.append(event.stamp_s)
-            self._begin(instance_id)
-        self._instance_id = self._instance_id or instance_id
+            self._begin()
         why = self._out_of_order(event)
         if not why:
             following = list(self._following(event))
@@ -97,13 +95,13 @@ class SkillsetMonitor:
             return ()
         return tuple(told(happening) for happening in self._beliefs[0].expected)
 
-    def _restarted(self, event: EngineEvent, instance_id: str) -> bool:
-        """Tell whether an event is the first of managers that were restarted: they count from 1 again, and time has passed."""
-        if self._last is None or event.sequence != 1:
+    def _restarted(self, event: EngineEvent) -> bool:
+        """Tell whether an event is of managers that were restarted; in older logs: it is number 1 again, and time has passed."""
+        if self._last is None:
             return False
-        if instance_id and self._instance_id:
-            return instance_id != self._instance_id
-        return event.stamp_ns > self._last.stamp_ns
+        if event.instance_id and self._last.instance_id:
+            return event.instance_id != self._last.instance_id
+        return event.sequence == 1 and event.stamp_ns > self._last.stamp_ns
 
     def _out_of_order(self, event: EngineEvent) -> str:
         before = 0 if self._last is None else self._last.sequence

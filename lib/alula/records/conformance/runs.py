@@ -55,13 +55,13 @@ class Monitor:
         self.skillsets = tuple(skillsets)
         self._monitors = {skillset.name: SkillsetMonitor(skillset) for skillset in self.skillsets}
 
-    def take(self, event: EngineEvent, instance_id: str = "") -> Finding | None:
+    def take(self, event: EngineEvent) -> Finding | None:
         """Take the next event; return what does not conform, once a skillset.
 
         Raises:
             KeyError: there is no model of the event's skillset.
         """
-        return self._monitors[event.skillset].take(event, instance_id)
+        return self._monitors[event.skillset].take(event)
 
     @property
     def verdict(self) -> ConformanceVerdict:

@@ -85,9 +85,9 @@ class GoalTracker:
             if not self._acknowledged and not self.handle.done:
                 self._timer = self._middleware.later(ACKNOWLEDGE_S, self._look)
 
-    def on_event(self, event: ExecutionEvent, instance_id: str, after: int) -> None:
+    def on_event(self, event: ExecutionEvent, after: int) -> None:
         """Take an event of this execution; its end is told when the resources are known as they were after event ``after``."""
-        self.instance_id = instance_id
+        self.instance_id = event.instance_id
         self._acknowledge()
         self._cancel_timer()
         if not event.state.terminal:

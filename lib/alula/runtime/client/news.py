@@ -24,7 +24,6 @@ from alula.runtime.middleware import (
     SKILL_STATES,
     GoalResult,
     Middleware,
-    PublishedEvent,
     ResourceStates,
     SkillStates,
 )
@@ -120,15 +119,15 @@ class ClientNews:
         if self.closed or not self.connection.heard(states.instance_id, states.stamp_ns):
             return
         self.heard += 1
-        if self.states_after >= 0 and (self._early or states.after > self._last_event):
+        if self.states_after >= 0 and (self._early or states.sequence > self._last_event):
             # Its event may have got lost.
-            self._early.append((states, self._middleware.later(GRACE_S, lambda: self._show_early(states.after))))
+            self._early.append((states, self._middleware.later(GRACE_S, lambda: self._show_early(states.sequence))))
         else:
             self._show(states)
 
-    def _show_early(self, after: int) -> None:
-        """Show the states that include no event beyond ``after``."""
-        while self._early and self._early[0][0].after <= after:
+    def _show_early(self, sequence: int) -> None:
+        """Show the states that include no event beyond this one."""
+        while self._early and self._early[0][0].sequence <= sequence:
             states, timer = self._early.popleft()
             timer.cancel()
             self._show(states)
@@ -140,7 +139,7 @@ class ClientNews:
     def _show(self, states: ResourceStates) -> None:
         if self.closed or self._is_old(states):
             return
-        self.states_after = states.after
+        self.states_after = states.sequence
         self.resources = {name: value.state for name, value in states.resources.items()}
         self.reasons = {name: value.reason for name, value in states.resources.items()}
         try:
@@ -153,13 +152,12 @@ class ClientNews:
 
     def _is_old(self, states: ResourceStates) -> bool:
         """Tell whether these states were known before; without a transition there may be a new reason."""
-        known = states.after == self.states_after and all(self.reasons.get(name) == one.reason for name, one in states.resources.items())
-        return states.after < self.states_after or known
+        known = states.sequence == self.states_after and all(self.reasons.get(name) == one.reason for name, one in states.resources.items())
+        return states.sequence < self.states_after or known
 
-    def _on_told(self, told: PublishedEvent) -> None:
-        event = told.event
+    def _on_told(self, event: EngineEvent) -> None:
         # An event that was published while the history was on its way comes twice.
-        if self.closed or not self.connection.heard(told.instance_id, event.stamp_ns) or event.sequence <= self._last_event:
+        if self.closed or not self.connection.heard(event.instance_id, event.stamp_ns) or event.sequence <= self._last_event:
             return
         self.heard += 1
         gap = event.sequence > self._last_event + 1 and self._last_event > 0
@@ -174,10 +172,10 @@ class ClientNews:
         finally:
             # Also after a callback has raised: the handle of a goal that has ended must end.
             if isinstance(event, ExecutionEvent):
-                self._follow_event(event, told.instance_id)
+                self._follow_event(event)
             self._show_early(self._last_event)
 
-    def _follow_event(self, event: ExecutionEvent, instance_id: str) -> None:
+    def _follow_event(self, event: ExecutionEvent) -> None:
         if event.state.terminal:
             self._keep_last(event.skill, event.stamp_ns, event)
             orphan = self._orphans.pop(event.id, None)
@@ -187,7 +185,7 @@ class ClientNews:
             self._orphans[event.id].link.cancel(event.id)
         tracker = self._open.get(event.id)
         if tracker is not None:
-            tracker.on_event(event, instance_id, self._last_transition)
+            tracker.on_event(event, self._last_transition)
 
     def _on_skills(self, states: SkillStates) -> None:
         if self.closed or not self.connection.heard(states.instance_id, states.stamp_ns):

@@ -42,10 +42,13 @@ class Entry:
 
 
 class SkillsetContext:
-    """Records steps; ``publish`` gets the events of each, numbered from 1 without gaps."""
+    """Records steps; ``publish`` gets the events of each, numbered from 1 without gaps, with the ``instance_id`` of the managers."""
 
-    def __init__(self, skillset: Skillset, clock_ns: Callable[[], int], publish: Callable[[Sequence[EngineEvent]], None]) -> None:
+    def __init__(
+        self, skillset: Skillset, clock_ns: Callable[[], int], publish: Callable[[Sequence[EngineEvent]], None], instance_id: str = ""
+    ) -> None:
         self._skillset = skillset
+        self._instance_id = instance_id
         self._clock_ns = clock_ns
         self._publish_events = publish
         self._situation = semantics.initial(skillset)
@@ -150,7 +153,7 @@ class SkillsetContext:
         now_ns = self._clock_ns()
         self.resources[change.resource] = ResourceStatus(change.target, change.source, now_ns, change.reason)
         states = (change.resource, change.source, change.target)
-        return TransitionEvent(self.sequence, now_ns, *states, change.cause, self._skillset.name, change.reason)
+        return TransitionEvent(self.sequence, now_ns, *states, change.cause, self._skillset.name, change.reason, self._instance_id)
 
     def _with_cause(self, entered: Entered) -> Entered:
         """Have a refusal say which change that was explained came last of what it asks for; an end by an invariant says it already."""
@@ -178,6 +181,7 @@ class SkillsetContext:
             skillset=self._skillset.name,
             result_kind=self._skillset.skill(execution.skill).kind_of(execution.result) if terminated else None,
             unmet=execution.unmet,
+            instance_id=self._instance_id,
         )
 
 

@@ -77,6 +77,7 @@ class SkillsetEngine:
         clock_ns: the mission clock, nanoseconds.
         hooks: one a skill, or the caller of hooks that are elsewhere.
         listener: gets the events of each step.
+        instance_id: of the managers, for the events.
         defer: runs a stop hook that a step of another caller has made necessary; by default in the thread of that step. It
             should not wait for other hooks: emergencies come this way.
         on_error: gets one text for each error that no execution can carry.
@@ -94,6 +95,7 @@ class SkillsetEngine:
         hooks: Mapping[str, SkillHooks] | HookCaller,
         listener: Listener,
         *,
+        instance_id: str = "",
         defer: Submit = run_at_once,
         on_error: Callable[[str], None] = log_error,
         interrupt_timeout_s: float = DEFAULT_TIMEOUT_S,
@@ -120,7 +122,7 @@ class SkillsetEngine:
         """Why skills whose ``on_start`` went wrong take no requests."""
         self._lock = threading.Lock()
         self._outbox = Outbox(listener, on_error)
-        self._context = SkillsetContext(skillset, clock_ns, self._outbox.put)
+        self._context = SkillsetContext(skillset, clock_ns, self._outbox.put, instance_id)
 
     # --- the start: what managers that were here before have left running ---------------------------------------------------
 

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
-from typing import Any
+from typing import Any, TypedDict
 
 from alula.common.plain import to_plain
 from alula.model.execution_state import ExecutionState
@@ -24,6 +24,7 @@ class ExecutionEvent:
     """An execution entered ``state``; ``result`` and ``unmet`` are as in ``Execution``. ``stamp_ns`` is mission clock.
 
     ``result_kind`` is that of the result when TERMINATED (see ``Skill.kind_of``), else None; also where a record does not say it.
+    ``instance_id`` is that of the managers, new at each of their starts; empty without managers, and where a record does not say it.
     """
 
     sequence: int
@@ -38,6 +39,7 @@ class ExecutionEvent:
     skillset: str = ""
     result_kind: ResultKind | None = None
     unmet: tuple[Unmet, ...] = ()
+    instance_id: str = ""
 
     @property
     def stamp_s(self) -> float:
@@ -54,7 +56,7 @@ class ExecutionEvent:
 class TransitionEvent:
     """A resource changed; ``cause`` is ``extern``, ``event <name>`` or ``<skill> <id> <effect>``. ``stamp_ns`` is mission clock.
 
-    ``reason``: why, in the words of the functional layer's report; empty where it told none.
+    ``reason``: why, in the words of the functional layer's report; empty where it told none. ``instance_id`` as of an execution's event.
     """
 
     sequence: int
@@ -65,6 +67,7 @@ class TransitionEvent:
     cause: str
     skillset: str = ""
     reason: str = ""
+    instance_id: str = ""
 
     @property
     def stamp_s(self) -> float:
@@ -86,7 +89,8 @@ def event_record(event: EngineEvent) -> dict[str, object]:
     Seconds, as all that people and tools plot in a record. They are read back to the nanosecond for the first 24 days (2 ** 21 s) of a
     clock, as those of simulations are, and to 0.2 us for a clock that counts from 1970; ``sequence`` keeps the order of what is closer.
     """
-    record: dict[str, object] = {"stamp_s": event.stamp_s, "sequence": event.sequence, "skillset": event.skillset}
+    record: dict[str, object] = {"stamp_s": event.stamp_s, "instance_id": event.instance_id}
+    record |= {"sequence": event.sequence, "skillset": event.skillset}
     if isinstance(event, ExecutionEvent):
         record |= {"kind": EXECUTION, "skill": event.skill, "id": event.id, "state": event.state.value}
         record |= {"result": event.result, "result_kind": kind_record(event.result_kind), "unmet": unmet_record(event.unmet)}
@@ -135,21 +139,34 @@ def read_event(record: Mapping[str, Any]) -> EngineEvent:
     if kind not in _READERS:
         raise ValueError(f"there is no kind of event {kind!r}; there are {', '.join(_READERS)}")
     try:
-        return _READERS[kind](record, int(record.get("sequence", 0)), _stamp_ns(record), str(record.get("skillset", "")))
+        return _READERS[kind](record)
     except KeyError as error:
         raise ValueError(f"it has no {error.args[0]}") from error
     except (TypeError, OverflowError) as error:
         raise ValueError(str(error)) from error
 
 
-def _stamp_ns(record: Mapping[str, Any]) -> int:
-    return round(float(record["stamp_s"]) * NANOSECONDS)
+class _Common(TypedDict):
+    """What the events of both kinds have."""
+
+    sequence: int
+    stamp_ns: int
+    skillset: str
+    instance_id: str
 
 
-def _execution_of(record: Mapping[str, Any], sequence: int, stamp_ns: int, skillset: str) -> ExecutionEvent:
+def _common(record: Mapping[str, Any]) -> _Common:
+    return {
+        "sequence": int(record.get("sequence", 0)),
+        "stamp_ns": round(float(record["stamp_s"]) * NANOSECONDS),
+        "skillset": str(record.get("skillset", "")),
+        "instance_id": str(record.get("instance_id", "")),
+    }
+
+
+def _execution_of(record: Mapping[str, Any]) -> ExecutionEvent:
     return ExecutionEvent(
-        sequence=sequence,
-        stamp_ns=stamp_ns,
+        **_common(record),
         skill=str(record["skill"]),
         id=str(record["id"]),
         state=ExecutionState(record["state"]),
@@ -157,26 +174,23 @@ def _execution_of(record: Mapping[str, Any], sequence: int, stamp_ns: int, skill
         message=str(record.get("message", "")),
         inputs=record.get("inputs") or {},
         outputs=record.get("outputs") or {},
-        skillset=skillset,
         result_kind=read_kind(record.get("result_kind")),
         unmet=read_unmet(record.get("unmet")),
     )
 
 
-def _transition_of(record: Mapping[str, Any], sequence: int, stamp_ns: int, skillset: str) -> TransitionEvent:
+def _transition_of(record: Mapping[str, Any]) -> TransitionEvent:
     return TransitionEvent(
-        sequence=sequence,
-        stamp_ns=stamp_ns,
+        **_common(record),
         resource=str(record["resource"]),
         from_state=str(record["from_state"]),
         to_state=str(record["to_state"]),
         cause=str(record.get("cause", "")),
-        skillset=skillset,
         reason=str(record.get("reason", "")),
     )
 
 
-_READERS: Mapping[str, Callable[[Mapping[str, Any], int, int, str], EngineEvent]] = {
+_READERS: Mapping[str, Callable[[Mapping[str, Any]], EngineEvent]] = {
     EXECUTION: _execution_of,
     TRANSITION: _transition_of,
 }

@@ -15,7 +15,7 @@ from alula.runtime.local.clock import NANOSECONDS, VirtualClock, WorldError
 from alula.runtime.local.managers import HooksFactory, LocalManagers
 from alula.runtime.local.middleware import Bus, VirtualMiddleware
 from alula.runtime.local.values import Types
-from alula.runtime.middleware import EVENTS, PublishedEvent
+from alula.runtime.middleware import EVENTS
 
 T = TypeVar("T")
 OnEvent = Callable[[str, EngineEvent], None]
@@ -107,7 +107,7 @@ class LocalWorld:
     def on_event(self, callback: OnEvent) -> None:
         """Call ``callback(skillset, event)`` for each event of the skillsets that are served now."""
         for name in self.managers:
-            VirtualMiddleware(self._bus, name).subscribe(EVENTS, functools.partial(_pass_on, callback, name))
+            VirtualMiddleware(self._bus, name).subscribe(EVENTS, functools.partial(callback, name))
 
     # --- time --------------------------------------------------------------------------------------------------------
 
@@ -155,7 +155,3 @@ class LocalWorld:
         if not over:
             raise WorldError(f"the coroutine has not ended within {timeout_s:g} s")
         return returned[0]
-
-
-def _pass_on(callback: OnEvent, name: str, told: PublishedEvent) -> None:
-    callback(name, told.event)

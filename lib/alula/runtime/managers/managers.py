@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import uuid
 from collections.abc import Callable, Mapping, Sequence
 
 from alula.model.model import Skillset
@@ -17,7 +16,7 @@ from alula.runtime.managers.records import SkillStatesPublisher
 from alula.runtime.managers.resources import ResourceManager
 from alula.runtime.managers.services import SkillsetServices
 from alula.runtime.managers.skill import SkillManager
-from alula.runtime.middleware import EVENTS, Middleware, PublishedEvent
+from alula.runtime.middleware import EVENTS, Middleware
 
 FLUSH_S = 1.0
 UNKNOWN_YET = "not known: the managers have just started, and what ran before has yet to be stopped"
@@ -64,7 +63,7 @@ class Managers:
             raise SkillRuntimeError(f"parameter hook_timeout_s is {hook_timeout_s:g}; a hook needs a positive time")
         self.skillset = skillset
         self.middleware = middleware
-        self.instance_id = uuid.uuid4().hex[:12]
+        self.instance_id = middleware.new_id()
         self._closed = False
         self.on_step: list[Listener] = []
         """Called at each step, within it, before it is published."""
@@ -74,6 +73,7 @@ class Managers:
             middleware.now_ns,
             hooks,
             self._on_events,
+            instance_id=self.instance_id,
             defer=middleware.defer,
             on_error=middleware.log,
             interrupt_timeout_s=interrupt_timeout_s,
@@ -120,7 +120,7 @@ class Managers:
             on_step(events)
         self.resources.on_events(events)
         for event in events:
-            self._events.publish(PublishedEvent(self.instance_id, event))
+            self._events.publish(event)
         for event in events:
             if isinstance(event, ExecutionEvent):
                 self.skills[event.skill].on_event(event)

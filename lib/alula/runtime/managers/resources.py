@@ -30,7 +30,7 @@ class ResourceManager:
         self._publisher = middleware.advertise(RESOURCE_STATES)
         # Kept apart from the engine's, so that each message is the state after the step that it is sent for.
         self._latest = dict(engine.resources)
-        self._after = 0
+        self._sequence = 0
         self._lock = threading.Lock()
         self._silences = {one.name: one for one in engine.skillset.resources if one.silence_s is not None}
         self._staleness = StalenessWatch(middleware, self._on_silence)
@@ -51,7 +51,7 @@ class ResourceManager:
         with self._lock:
             for event in transitions:
                 self._latest[event.resource] = ResourceStatus(event.to_state, event.from_state, event.stamp_ns, event.reason)
-            self._after = transitions[-1].sequence
+            self._sequence = transitions[-1].sequence
             self._publish(transitions[-1].stamp_ns)
 
     def transition(self, resource: str, to: str, reason: str = "") -> TransitionReply:
@@ -94,7 +94,7 @@ class ResourceManager:
         return round((self._silences[name].silence_s or 0.0) * 1e9)
 
     def _publish(self, stamp_ns: int) -> None:
-        self._publisher.publish(ResourceStates(self._instance_id, self._after, stamp_ns, dict(self._latest)))
+        self._publisher.publish(ResourceStates(self._instance_id, self._sequence, stamp_ns, dict(self._latest)))
 
     def _transition(self, request: Mapping[str, Any], reply: Reply) -> None:
         reply(self.transition(request["resource"], request["to"], request["reason"]))

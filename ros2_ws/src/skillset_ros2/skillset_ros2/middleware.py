@@ -13,7 +13,7 @@ import skillset_interfaces.srv
 from rclpy.duration import Duration
 from rclpy.event_handler import SubscriptionEventCallbacks
 from rclpy.node import Node
-from std_msgs.msg import Header
+from skillset_interfaces.msg import Heartbeat
 
 from alula.runtime.codecs import Codecs, ServiceCodec, set_stamp, stamp_ns_of
 from alula.runtime.middleware import ALIVE_PERIOD_S, CALL_S, Goal, GoalListener, OnError, OnHeartbeat, OnReply, OnValue, Serve, Topic
@@ -151,13 +151,12 @@ class RclpyMiddleware(RclpyBase):
     def announce(self, instance_id: str, on_rival: OnError) -> None:
         """Send heartbeats, latched, from the executor: one that hangs goes silent. Those that were there first stay."""
         begun_ns = time.time_ns()
-        heartbeat = Header(frame_id=instance_id)
-        set_stamp(heartbeat.stamp, begun_ns)
+        heartbeat = Heartbeat(instance_id=instance_id, begun_ns=begun_ns)
         told = f"managers of {self._skillset} are there already ({self.node.resolve_topic_name(self.name('alive'))}); end them first"
         later: set[str] = set()
 
         def hear(other: Any) -> None:
-            mine, others = (begun_ns, instance_id), (stamp_ns_of(other.stamp), other.frame_id)
+            mine, others = (begun_ns, instance_id), (other.begun_ns, other.instance_id)
             if others[1] != instance_id and others < mine:
                 on_rival(told)
             elif others[1] != instance_id and others[1] not in later:
@@ -169,9 +168,13 @@ class RclpyMiddleware(RclpyBase):
                 self._send_heartbeat()
                 self.later(ALIVE_PERIOD_S, beat)
 
-        self.listen(self.name("alive"), Header, hear, latched(1))
-        publisher: Any = self.node.create_publisher(Header, self.name("alive"), ALIVE, event_callbacks=QUIET_PUBLISHER)
-        self._send_heartbeat = lambda: publisher.publish(heartbeat)
+        def send() -> None:
+            set_stamp(heartbeat.header.stamp, self.now_ns())
+            publisher.publish(heartbeat)
+
+        self.listen(self.name("alive"), Heartbeat, hear, latched(1))
+        publisher: Any = self.node.create_publisher(Heartbeat, self.name("alive"), ALIVE, event_callbacks=QUIET_PUBLISHER)
+        self._send_heartbeat = send
         beat()
 
     def watch(self, on_heartbeat: OnHeartbeat, on_doubt: Job) -> None:
@@ -179,8 +182,8 @@ class RclpyMiddleware(RclpyBase):
         last: list[str] = []
 
         def hear(heartbeat: Any) -> None:
-            last[:] = [heartbeat.frame_id]
-            on_heartbeat(heartbeat.frame_id, 0)
+            last[:] = [heartbeat.instance_id]
+            on_heartbeat(heartbeat.instance_id, stamp_ns_of(heartbeat.header.stamp))
 
         def changed(info: Any) -> None:
             # By the changes: the counts are wrong where both sides are in one process (alive from 0 to -1).
@@ -191,7 +194,7 @@ class RclpyMiddleware(RclpyBase):
                 on_heartbeat(last[0], 0)
 
         self.node.create_subscription(
-            Header,
+            Heartbeat,
             self.name("alive"),
             self.on_loop(hear),
             ALIVE,

@@ -18,7 +18,7 @@ from rclpy.executors import ExternalShutdownException, ShutdownException
 from rclpy.logging import get_logger
 from rclpy.node import Node
 from rclpy.signals import SignalHandlerOptions
-from std_msgs.msg import Header
+from skillset_interfaces.msg import Heartbeat
 
 from alula.common.fast_dds import leave
 from alula.common.ros_arguments import ROS_ARGUMENTS, without_roslaunch
@@ -123,7 +123,7 @@ def listen_for_rivals(skillset: str) -> Node:
     """
     node = Node(skillset, enable_rosout=False, start_parameter_services=False)
     heard: list[object] = []
-    subscription = node.create_subscription(Header, f"{skillset}/alive", heard.append, latched(1))
+    subscription = node.create_subscription(Heartbeat, f"{skillset}/alive", heard.append, latched(1))
     executor = NodeExecutor()
     executor.add_node(node)
     end_s = time.monotonic() + LISTEN_FIRST_S

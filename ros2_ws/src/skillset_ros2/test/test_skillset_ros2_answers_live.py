@@ -14,10 +14,9 @@ navigation_actions = pytest.importorskip("navigation_interfaces.action")
 from action_msgs.msg import GoalStatus  # noqa: E402
 from navigation_managers.model import SKILLSET  # noqa: E402
 from rclpy.parameter import Parameter  # noqa: E402
-from skillset_interfaces.msg import SkillStates  # noqa: E402
+from skillset_interfaces.msg import Heartbeat, SkillStates  # noqa: E402
 from skillset_interfaces.srv import SetPaused, Why  # noqa: E402
 from skillset_ros2_rig import READY_S, SOON_S, Navigation, until  # noqa: E402
-from std_msgs.msg import Header  # noqa: E402
 
 from alula.model.execution_state import ExecutionState  # noqa: E402
 from alula.runtime.core.errors import SkillRuntimeError  # noqa: E402
@@ -70,11 +69,11 @@ def test_managers_that_answer_after_they_were_given_up_are_found_again(anyhow):
 def test_heartbeats_are_messages_too_and_end_where_the_executor_hangs(anyhow):
     """Another world hears nothing of DDS liveliness."""
     navigation, go_on, hangs = anyhow, threading.Event(), threading.Event()
-    heard: list[Header] = []
+    heard: list[Heartbeat] = []
     periods: list[None] = []
-    navigation.node.create_subscription(Header, "navigation/alive", heard.append, LATCHED)
+    navigation.node.create_subscription(Heartbeat, "navigation/alive", heard.append, LATCHED)
     until(lambda: len(heard) >= 3, "heartbeats come again and again")
-    assert {beat.frame_id for beat in heard} == {navigation.managers.managers.instance_id}
+    assert {beat.instance_id for beat in heard} == {navigation.managers.managers.instance_id}
 
     def hang() -> None:
         hangs.set()

@@ -14,8 +14,9 @@ from alula.model.expressions import Comparison, DataIs
 from alula.model.model import ResultKind
 from alula.model.unmet import Unmet
 from alula.runtime.codecs import Codecs
-from alula.runtime.core.events import ExecutionEvent
-from alula.runtime.middleware import EVENTS, PublishedEvent, Topic
+from alula.runtime.core.events import ExecutionEvent, TransitionEvent
+from alula.runtime.core.records import ResourceStatus
+from alula.runtime.middleware import EVENTS, RESOURCE_STATES, SKILL_STATES, ResourceStates, SkillStates, Topic
 from alula.runtime.views import Sample
 from skillset_ros2.convert import message_class
 
@@ -47,8 +48,21 @@ ENDS = [
 
 @pytest.mark.parametrize(("state", "kind", "unmet"), ENDS)
 def test_an_event_says_as_a_message_what_it_was(state, kind, unmet):
-    event = ExecutionEvent(3, 1_500_000_000, "go", "1", state, "NAME", "in words", {"speed": 1.0}, {}, "rover", kind, unmet)
+    event = ExecutionEvent(3, 1_500_000_000, "go", "1", state, "NAME", "in words", {"speed": 1.0}, {}, "rover", kind, unmet, "an instance")
     codec = CODECS.topic(EVENTS)
-    told = PublishedEvent("an instance", event)
-    sent = deserialize_message(serialize_message(codec.encode("rover", told)), skillset_interfaces.msg.Event)
-    assert codec.decode(sent) == told
+    sent = deserialize_message(serialize_message(codec.encode("rover", event)), skillset_interfaces.msg.Event)
+    assert codec.decode(sent) == event
+
+
+def test_whose_a_message_is_and_after_which_event_are_fields_of_it():
+    heard = {
+        EVENTS: TransitionEvent(2**40, 5, "axes", "FREE", "USED", "extern", "rover", instance_id="an instance"),
+        RESOURCE_STATES: ResourceStates("an instance", 2**40, 5, {"axes": ResourceStatus("USED", "FREE", 5)}),
+        SKILL_STATES: SkillStates("an instance", 5, {}),
+    }
+    for topic, value in heard.items():
+        codec = CODECS.topic(topic)
+        message = codec.encode("rover", value)
+        assert (message.instance_id, message.header.frame_id) == ("an instance", "")
+        assert topic is SKILL_STATES or message.sequence == 2**40
+        assert codec.decode(message) == value

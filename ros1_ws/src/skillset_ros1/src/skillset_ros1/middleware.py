@@ -16,7 +16,7 @@ import rospy
 import skillset_interfaces.msg
 import skillset_interfaces.srv
 from roslib.message import get_message_class
-from std_msgs.msg import Header
+from skillset_interfaces.msg import Heartbeat
 
 from alula.runtime.codecs import Codecs, set_stamp, stamp_ns_of
 from alula.runtime.middleware import (
@@ -156,13 +156,14 @@ class RospyMiddleware(RospyBase):
 
     def announce(self, instance_id: str, on_rival: OnError) -> None:  # noqa: ARG002 - the master tells of rivals before
         """Send heartbeats from a thread of their own: simulated time may stand still, and hooks be slow."""
-        publisher = rospy.Publisher(self.name("alive"), Header, latch=True, queue_size=1)
+        publisher = rospy.Publisher(self.name("alive"), Heartbeat, latch=True, queue_size=1)
         self._parts.append(publisher.unregister)
+        begun_ns = time.time_ns()
 
         def beat() -> None:
             while not self._over.is_set() and not rospy.is_shutdown():
-                heartbeat = Header(frame_id=instance_id)
-                set_stamp(heartbeat.stamp, now_ns())
+                heartbeat = Heartbeat(instance_id=instance_id, begun_ns=begun_ns)
+                set_stamp(heartbeat.header.stamp, now_ns())
                 publisher.publish(heartbeat)
                 self._over.wait(ALIVE_PERIOD_S)
 
@@ -175,9 +176,9 @@ class RospyMiddleware(RospyBase):
         def hear(heartbeat: Any) -> None:
             self.server = heartbeat._connection_header["callerid"]  # noqa: SLF001 - rospy's way to tell the sender
             heard_s[:] = [time.monotonic()]
-            on_heartbeat(heartbeat.frame_id, stamp_ns_of(heartbeat.stamp))
+            on_heartbeat(heartbeat.instance_id, stamp_ns_of(heartbeat.header.stamp))
 
-        heartbeats = self.listen(self.name("alive"), Header, hear)
+        heartbeats = self.listen(self.name("alive"), Heartbeat, hear)
 
         def look() -> None:
             lease_s = LEASE_S if is_connected(heartbeats) else BROKEN_LEASE_S
