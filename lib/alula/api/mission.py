@@ -200,15 +200,13 @@ class Mission:
         Raises:
             AlulaError: it belongs to no robot, a figure is wrong, or Storm (``pip install stormpy``) is not there.
         """
-        from alula.odds.graph import explore
         from alula.odds.odds import changed, odds_of
-        from alula.odds.robot import steps_of
+        from alula.odds.robot import graph_of
 
         if self.robot is None:
             raise OddsError(f"{self.path}: belongs to no robot, so there are no figures; load it with `Mission.load(scenario, robot)`")
         with meaning(self.robot):
-            steps, figures = steps_of(self.path, self.world)
-            graph = explore(steps, figures, unlikely=unlikely)
+            graph, figures = graph_of(self.path, self.world, unlikely=unlikely)
             return odds_of(graph, changed(figures, change, graph) if change else figures)
 
 

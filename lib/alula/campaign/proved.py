@@ -20,7 +20,7 @@ from alula.prove.mission.answers import Answers, Row
 from alula.prove.mission.managers import Failures
 from alula.prove.mission.oracle import UndecidedError
 from alula.prove.mission.regions import Regions
-from alula.prove.mission.system import System
+from alula.prove.mission.system import System, look_at
 from alula.records.causes.effects import EffectsByFault
 from alula.records.tree import Path
 
@@ -86,14 +86,17 @@ def proved(
     try:
         robot = find_robot()
         path = robot.root / scenario.mission
-        system = System.read(path, models, robot.part("missions") or NO_PART, LOOKED_AT, deadline)
-        regions = Regions(system, deadline)
-        unproved = _explored(regions, time_s)
+        part = robot.part("missions") or NO_PART
+        regions, unproved = look_at(
+            lambda why: System.read(path, models, part, LOOKED_AT, deadline, why_any_order=why),
+            lambda system: _explored(Regions(system, deadline), time_s),
+        )
     except (UndecidedError, InputError, RobotError) as error:
         return ProvedMission(unproved=f"its runs can't be looked at: {error}")
     except OutOfTimeError:
         return ProvedMission(unproved=_bound(time_s))
     found: dict[Key, ProvedAnswer] = {}
+    system = regions.system
     for row in Answers(regions).rows:
         one = _answer(system, row, effects)
         known = found.get((one.place, one.end, one.moment))
@@ -106,13 +109,13 @@ def proved(
     return ProvedMission(found, unproved, seen)
 
 
-def _explored(regions: Regions, time_s: float) -> str:
-    """Find all regions; return why there may be more."""
+def _explored(regions: Regions, time_s: float) -> tuple[Regions, str]:
+    """Find all regions; return them, and why there may be more."""
     try:
         regions.explore()
     except OutOfTimeError:
-        return _bound(time_s)
-    return ""
+        return regions, _bound(time_s)
+    return regions, ""
 
 
 def _bound(time_s: float) -> str:

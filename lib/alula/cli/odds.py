@@ -17,9 +17,8 @@ from alula.common.robots import RobotError
 from alula.common.scenarios import ScenarioError
 from alula.missions.plan import InputError
 from alula.odds.errors import OddsError
-from alula.odds.graph import explore
 from alula.odds.odds import changed, odds_of
-from alula.odds.robot import steps_of
+from alula.odds.robot import graph_of
 from alula.odds.telling import as_dict, as_svg, as_text
 from alula.prove.mission.oracle import UndecidedError
 from alula.records.errors import AnalysisError
@@ -54,8 +53,7 @@ def run(given: argparse.Namespace) -> int:
     """Do what is asked for; raises what ``main`` tells."""
     if given.most < 1:
         raise OddsError(f"--most {given.most}: is a number of situations, from 1 on")
-    steps, figures = steps_of(given.file, given.world, tell=warner(COMMAND))
-    graph = explore(steps, figures, most=given.most, unlikely=given.unlikely, tell=_tell)
+    graph, figures = graph_of(given.file, given.world, most=given.most, unlikely=given.unlikely, tell=_tell, warn=warner(COMMAND))
     changes = {text: changed(figures, text, graph) for text in given.changes}
     found = odds_of(graph, figures)
     others = {text: odds_of(graph, other, costs=False) for text, other in changes.items()}

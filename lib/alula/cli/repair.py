@@ -17,9 +17,8 @@ from alula.common.errors import AlulaError
 from alula.common.files import write_text
 from alula.common.garbage import collect_seldom
 from alula.odds.errors import OddsError
-from alula.odds.graph import explore
 from alula.odds.odds import Odds, odds_of
-from alula.odds.robot import steps_of
+from alula.odds.robot import graph_of
 from alula.prove.limits import Deadline, OutOfTimeError
 from alula.repair.repairing import Question, Search
 from alula.repair.subject import Subject
@@ -73,8 +72,8 @@ def _odds(path: Path, before: Path, changed: Path) -> tuple[Odds, Odds] | None:
 
 
 def _odds_of(path: Path, changed: Path) -> Odds:
-    steps, figures = steps_of(path, changed=changed)
-    return odds_of(explore(steps, figures, most=MOST, unlikely=UNLIKELY), figures, costs=False)
+    graph, figures = graph_of(path, changed=changed, most=MOST, unlikely=UNLIKELY)
+    return odds_of(graph, figures, costs=False)
 
 
 MOST, UNLIKELY = 3_000, 1e-4

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from pathlib import Path
 
 from alula.check.robot import Warn, models_of, part_of
@@ -13,10 +13,12 @@ from alula.missions.scenario import inputs_of
 from alula.mock import load_behaviour
 from alula.model.model import Skillset
 from alula.odds.figures import Figures
+from alula.odds.graph import MOST_SITUATIONS, Graph, Tell, explore
 from alula.odds.mission import Brought, MissionSteps
 from alula.odds.reading import load_figures
+from alula.prove.mission.findings import taken_as
 from alula.prove.mission.managers import Failures
-from alula.prove.mission.system import System
+from alula.prove.mission.system import System, look_at
 from alula.records.causes.effects import FaultEffects
 from alula.records.causes.fault_file import load_effects
 
@@ -27,24 +29,69 @@ def ignore(_line: str) -> None:
     """Take no notice."""
 
 
-def steps_of(
-    path: Path, world: str = "", others: Figures | None = None, *, tell: Warn = ignore, changed: Path | None = None
-) -> tuple[MissionSteps, Figures]:
-    """Return what can happen to a mission's file of this robot, and the figures that it hangs on: the robot's, or others.
+def mission_of(
+    path: Path, world: str = "", others: Figures | None = None, *, warn: Warn = ignore, changed: Path | None = None
+) -> tuple[Callable[[str], System], Callable[[System], MissionSteps], Figures]:
+    """Return what reads a mission's file of this robot, as for ``look_at``, what can happen to it then, and the figures that it hangs on.
 
-    ``changed`` is another file with the same mission, changed, which is looked at with this one's inputs.
+    Args:
+        path: of the mission.
+        world: of its scenario, where that has several.
+        others: figures in the place of the robot's.
+        warn: is told what can't be read.
+        changed: another file with the same mission, changed, which is looked at with this one's inputs.
 
     Raises:
         AlulaError: a file is missing or wrong, with its place.
     """
     robot = find_robot()
-    models = models_of(robot, tell)
+    models = models_of(robot, warn)
     figures, effects = _of_faults(robot, models)
     failures = Failures(refusals=False, hooks=False, aborts=False)
-    part = part_of(robot, tell)
-    system = System.read(changed or path, models, part, failures, few=COUNTED, known=_inputs(path, world))
+    part, inputs, brought, departure = part_of(robot, warn), _inputs(path, world), _brought(robot, models), _departure(robot, models)
     known = figures if others is None else others
-    return MissionSteps(system, effects, _brought(robot, models), _departure(robot, models), known), known
+
+    def read(why_any_order: str) -> System:
+        return System.read(changed or path, models, part, failures, few=COUNTED, known=inputs, why_any_order=why_any_order)
+
+    return read, lambda system: MissionSteps(system, effects, brought, departure, known), known
+
+
+def graph_of(
+    path: Path,
+    world: str = "",
+    others: Figures | None = None,
+    *,
+    most: int = MOST_SITUATIONS,
+    unlikely: float = 0.0,
+    tell: Tell | None = None,
+    warn: Warn = ignore,
+    changed: Path | None = None,
+) -> tuple[Graph, Figures]:
+    """Return the situations that a mission's file of this robot can come into, and the figures: the robot's, or others.
+
+    Args:
+        path: of the mission.
+        world: of its scenario, where that has several.
+        others: figures in the place of the robot's.
+        most: of the situations that are looked at, as of ``explore``.
+        unlikely: as of ``explore``.
+        tell: as of ``explore``.
+        warn: is told what can't be read, and which nodes may do anything, so that the odds are bounds over all of that.
+        changed: another file with the same mission, changed, which is looked at with this one's inputs.
+
+    Raises:
+        AlulaError: a file is missing or wrong, with its place.
+    """
+    read, steps_of, known = mission_of(path, world, others, warn=warn, changed=changed)
+
+    def look(system: System) -> tuple[Graph, System]:
+        return explore(steps_of(system), known, most=most, unlikely=unlikely, tell=tell), system
+
+    graph, system = look_at(read, look)
+    for finding in taken_as(system, exactly=False):
+        warn(f"{finding.span}: {finding.message}")
+    return graph, known
 
 
 def _inputs(path: Path, world: str) -> Inputs | None:

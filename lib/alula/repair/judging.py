@@ -9,7 +9,7 @@ from dataclasses import dataclass
 from pathlib import Path
 
 from alula.language.errors import Diagnostic, Severity
-from alula.odds.robot import steps_of
+from alula.odds.robot import mission_of
 from alula.prove.limits import Deadline
 from alula.prove.mission.prover import Proved, prove_within
 from alula.prove.mission.run import MissionRun
@@ -85,7 +85,8 @@ class Judge:
     def fates(self, text: str) -> Callable[[Sequence[str], int | None], Fate | None]:
         """Return what tells it of a text, of at most so many situations: of several faults that is quicker than one by one."""
         with self._subject.copy(text) as path:
-            steps, _ = steps_of(self._subject.flown_as, changed=path)
+            read, steps_of, _ = mission_of(self._subject.flown_as, changed=path)
+            steps = steps_of(read(""))
 
         def fate(faults: Sequence[str], most: int | None) -> Fate | None:
             self._deadline.doing = f"looking at the runs with {' and then '.join(faults) or 'no fault'}"

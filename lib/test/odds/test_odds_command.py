@@ -56,6 +56,75 @@ def test_the_mean_time_is_that_of_the_skills_that_run(carrier: Path, capsys: pyt
     assert found["seconds"] == pytest.approx([expected_s] * 2)
 
 
+OWN = """
+from alula import trees
+from alula.parts import MissionPart
+
+
+@trees.register("robot.Counted")
+class Counted(trees.Decorator):
+    ports = (trees.input_port("many", trees.INT),)
+    remembers = ("_count",)
+
+    def setup(self):
+        self._count = 0
+
+    def update(self):
+        if self._count >= self.number("many"):
+            return trees.SUCCESS
+        answer = self.child.execute()
+        self._count += answer is trees.SUCCESS
+        return trees.RUNNING if answer is trees.SUCCESS else answer
+
+
+@trees.register("robot.Near")
+class Near(trees.Control):
+    ports = (trees.input_port("seen", trees.ANY),)
+
+    def update(self):
+        return self.children[0 if self.get("seen")["x"] < 3 else 1].execute()
+
+
+PART = MissionPart((Counted, Near))
+"""
+COUNTED = '<robot.Counted many="MANY"><carrier.pick/></robot.Counted>'
+NEAR = '<robot.Near seen="{seen}"><carrier.pick/><AlwaysSuccess/></robot.Near>'
+
+
+@pytest.mark.parametrize(
+    ("inside", "exact"), [(COUNTED.replace("MANY", "1"), True), (COUNTED.replace("MANY", "{many}"), False), (NEAR, False)]
+)
+def test_a_class_with_children_that_meets_a_value_that_nobody_knows_makes_bounds(
+    inside: str,
+    exact: bool,  # noqa: FBT001
+    carrier: Path,
+    capsys: pytest.CaptureFixture[str],
+) -> None:
+    (carrier / "code").mkdir()
+    (carrier / "code/counting_nodes.py").write_text(OWN, encoding="utf-8")
+    (carrier / "robot.yaml").write_text("name: carrier\npython: [code]\nparts: {missions: 'counting_nodes:PART'}\n", encoding="utf-8")
+    model, mission = carrier / "skillsets/carrier.skill", carrier / "missions/own.xml"
+    outputs = "output {\n      many: int32\n      seen: Spot\n    }\n    result {\n      success ARRIVED"
+    model.write_text(
+        "type Spot\n" + model.read_text(encoding="utf-8").replace("result {\n      success ARRIVED", outputs), encoding="utf-8"
+    )
+    (carrier / "skillsets/types.yaml").write_text("Spot: geometry_msgs/Point\n", encoding="utf-8")
+    drive = '<carrier.drive place="0" many="{many}" seen="{seen}"/>'
+    tree = f'<BehaviorTree ID="own"><SequenceWithMemory>{drive}{inside}</SequenceWithMemory></BehaviorTree>'
+    mission.write_text(f'<root BTCPP_format="4" main_tree_to_execute="own">{tree}</root>', encoding="utf-8")
+    assert main([str(mission), "--json"]) == 0
+    said = capsys.readouterr()
+    least, most = (Fraction(one) for one in json.loads(said.out)["outcomes"]["accomplished"]["exact"])
+    if exact:
+        assert least == most == Fraction(7, 10) * Fraction(6, 10)
+        assert said.err == ""
+    else:
+        assert (least, most) == (0, Fraction(7, 10)), "it may fail at once, or succeed without its child; no drive, no success"
+        assert "own.xml:1:" in said.err
+        assert "may tick and halt its children in any order" in said.err
+        assert "is not known" in said.err
+
+
 WHEEL = """
 faults:
   wheel:

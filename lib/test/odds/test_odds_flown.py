@@ -19,10 +19,9 @@ from alula.missions.mocked import MockedMission
 from alula.missions.part import NO_PART
 from alula.mock import Behaviour, Ending, Rule
 from alula.odds.figures import Figures
-from alula.odds.graph import explore
 from alula.odds.odds import Odds, odds_of
 from alula.odds.reading import load_figures
-from alula.odds.robot import steps_of
+from alula.odds.robot import graph_of
 from alula.records.causes.fault_file import effects_of_robot
 
 CARRIER = Path(__file__).parent / "carrier"
@@ -56,12 +55,12 @@ MISSION = DRONE / "missions/mapping.xml"
 
 def drones(others: Mapping[str, int] | None = None) -> tuple[Flights, Odds]:
     """Return flights of the drone's mission and its odds, by its own figures, or with other faults so many times an hour."""
-    _, own = steps_of(MISSION)
+    _, own = graph_of(MISSION, most=1)
     figures: Figures = own if others is None else only(own, others)
-    steps, _ = steps_of(MISSION, others=figures)
+    graph, _ = graph_of(MISSION, others=figures, unlikely=1e-3)
     scenario = load_mocked_scenario("mapping")
     flights = Flights.by(scenario.plan, scenario.skillsets, scenario.behaviour, figures, effects_of_robot().known)
-    return flights, odds_of(explore(steps, figures, unlikely=1e-3), figures, costs=False)
+    return flights, odds_of(graph, figures, costs=False)
 
 
 def within(odds: Odds, ends: list[Outcome]) -> bool:

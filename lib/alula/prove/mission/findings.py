@@ -33,11 +33,14 @@ def findings(regions: Regions, answers: Answers) -> list[Diagnostic]:
     return [*found, *_unanswered(regions, answers), *_never(regions)] if regions.complete else found
 
 
-def taken_as(system: System) -> Iterator[Diagnostic]:
-    """Yield ALU715, once for each type of node of the robot's own that has children or no class: how the search takes it."""
+def taken_as(system: System, *, exactly: bool = True) -> Iterator[Diagnostic]:
+    """Yield ALU715, once for each type of node of the robot's own that has children or no class: how the search takes it.
+
+    ``exactly``: also of those that it takes as they are.
+    """
     for one in system.own.taken:
         node = next((node for node in system.nodes if node.wiring.type.name == one.name), None)
-        if node is None:
+        if node is None or not (exactly or one.why_not):
             continue
         if not one.why_not:
             how = "is ticked by its class, and its children with it"

@@ -21,7 +21,7 @@ from alula.prove.mission.holding import SINGLE, held
 from alula.prove.mission.managers import Failures
 from alula.prove.mission.oracle import UndecidedError
 from alula.prove.mission.regions import Regions
-from alula.prove.mission.system import System
+from alula.prove.mission.system import System, look_at
 from alula.prove.mission.waits import Waits
 from alula.prove.mission.wanted import wanted
 
@@ -139,23 +139,18 @@ class _Search:
         bounds = () if complete and not undecided else (_bound(self._path, len(regions.regions), given, undecided),)
         return _Seen(self._path, regions, tuple(found), tuple(answers.rows), bounds)
 
-    def _regions(self, deadline: Deadline, why_any_order: str = "") -> tuple[Regions, bool]:
-        """Return what was looked at within a time, and whether a property needs some of that; raises as ``System.read``.
+    def _regions(self, deadline: Deadline) -> tuple[Regions, bool]:
+        """Return what was looked at within a time, and whether a property needs some of that; raises as ``System.read``."""
 
-        Where a class of a robot's own that was run needs what the search does not know, all such classes may do anything instead.
-        """
-        system = System.read(self._path, self._models, self._part, LOOKED_AT, deadline, why_any_order=why_any_order)
-        properties, _ = wanted(system.nodes, system.skillsets, self._faults)
-        # What must come is looked at one situation after another, for which it needs time of its own.
-        several = any(one.kind not in SINGLE for one in properties)
-        regions = Regions(system, deadline.half(deadline.doing) if several else deadline)
-        try:
+        def look(system: System) -> tuple[Regions, bool]:
+            properties, _ = wanted(system.nodes, system.skillsets, self._faults)
+            # What must come is looked at one situation after another, for which it needs time of its own.
+            several = any(one.kind not in SINGLE for one in properties)
+            regions = Regions(system, deadline.half(deadline.doing) if several else deadline)
             _explore(regions)
-        except UndecidedError as error:
-            if not system.own.any_run:
-                raise
-            return self._regions(deadline, str(error))
-        return regions, several
+            return regions, several
+
+        return look_at(lambda why: System.read(self._path, self._models, self._part, LOOKED_AT, deadline, why_any_order=why), look)
 
     def also(self, before: _Seen, deadline: Deadline, given: str) -> _Seen:
         """Look at runs in which hooks raise, managers die, or somebody aborts or pauses the mission; of those, what is new."""

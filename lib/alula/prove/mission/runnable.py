@@ -12,7 +12,7 @@ import inspect
 import math
 import textwrap
 from collections.abc import Iterator
-from types import FunctionType
+from types import FunctionType, ModuleType
 
 from alula.trees.node import Control, Decorator, Node
 from alula.trees.status import Skipped, Status
@@ -214,7 +214,8 @@ class _Code:
                 self._refuse(node, f"uses `{ast.unparse(node)}`")
         elif isinstance(node.value, ast.Name) and node.value.id not in self._local:
             value = self._value(node.value)
-            if not (value is math or value is Status or value is Skipped):
+            ours = isinstance(value, ModuleType) and value.__name__ == FACE and self._is_fixed(getattr(value, node.attr, NotImplemented))
+            if not (value is math or value is Status or value is Skipped or ours):
                 self._refuse(node, f"uses `{ast.unparse(node)}`")
         elif node.attr not in OF_OTHERS:
             self._refuse(node, f"uses `{ast.unparse(node)}`")
@@ -224,8 +225,11 @@ class _Code:
         if isinstance(value, FunctionType) and not f"{value.__module__}.".startswith("alula."):
             if value not in self._above:
                 _Code(self._real, self._sets, value, method=False, above=self._above).look()
-        elif not (_is_constant(value) or value is math or self._is_harmless(value)):
+        elif not (value is math or self._is_fixed(value) or (isinstance(value, ModuleType) and value.__name__ == FACE)):
             self._refuse(node, f"uses `{node.id}`")
+
+    def _is_fixed(self, value: object) -> bool:
+        return _is_constant(value) or self._is_harmless(value)
 
     @staticmethod
     def _is_harmless(value: object) -> bool:

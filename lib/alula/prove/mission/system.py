@@ -18,8 +18,9 @@ its end, and nothing else happens.
 from __future__ import annotations
 
 import copy
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from pathlib import Path
+from typing import TypeVar
 
 from alula.missions.director import Director, Outcome
 from alula.missions.mission_file import STOP_HERE, FiledMission, plan_of_file
@@ -34,7 +35,7 @@ from alula.prove.mission.ahead import RUNS
 from alula.prove.mission.managers import ENDED, RUNNING, SENT, End, Failures, ManagersSteps
 from alula.prove.mission.measured import Conditions
 from alula.prove.mission.memory import FEW, Body, TreeMemory
-from alula.prove.mission.oracle import Answer, Oracle, Question
+from alula.prove.mission.oracle import Answer, Oracle, Question, UndecidedError
 from alula.prove.mission.own import OwnNodes, own_nodes
 from alula.prove.mission.reading import what_is_read
 from alula.prove.mission.robot import Client, Memory, Robot, Waits
@@ -48,6 +49,7 @@ from alula.trees.palette import Direction, NodeType, Port
 from alula.trees.reading import TreeFiles, read_files, type_name
 
 _GIVEN_S = 30.0
+T = TypeVar("T")
 TERMINATED, FAILED = ExecutionState.TERMINATED.value, ExecutionState.FAILED.value
 
 
@@ -302,6 +304,21 @@ class _Starting:
     def __call__(self, _: object) -> Mapping[str, object]:
         self._robot.starting = self._leaf
         return {}
+
+
+def look_at(read: Callable[[str], System], look: Callable[[System], T]) -> T:
+    """Return what ``look`` finds in a mission's system, which ``read`` gives: ``lambda why: System.read(..., why_any_order=why)``.
+
+    Where a class of the robot's own that was run needs what the search does not know, the system is read again, with all such classes
+    taken as ones that may do anything. Raises UndecidedError where anything else needs it.
+    """
+    system = read("")
+    try:
+        return look(system)
+    except UndecidedError as error:
+        if not system.own.any_run:
+            raise
+        return look(read(str(error)))
 
 
 def nowhere_made(files: TreeFiles, skillsets: Sequence[Skillset], part: MissionPart) -> list[NodeType]:

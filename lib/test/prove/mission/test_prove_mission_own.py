@@ -15,6 +15,7 @@ from own_nodes import Moody
 from test_prove_mission_runs import PART as PICKS
 from test_prove_mission_runs import flown, robots
 
+from alula import trees
 from alula.language.errors import Diagnostic, Severity
 from alula.language.models import ModelFile, check_texts
 from alula.missions.part import NO_PART, MissionPart
@@ -229,7 +230,16 @@ def test_a_leaf_whose_code_breaks_on_what_is_known_is_named(tmp_path: Path) -> N
 # --- which classes are run ---------------------------------------------------------------------------------------------
 
 
-@pytest.mark.parametrize("kind", own_nodes.RUN.values())
+@register("robot.Spelled")
+class Spelled(trees.Decorator):
+    """Names what is public by its module."""
+
+    def update(self) -> Answer:
+        """Tick the child once."""
+        return trees.SUCCESS if self.child.execute() is not trees.RUNNING else trees.RUNNING
+
+
+@pytest.mark.parametrize("kind", [*own_nodes.RUN.values(), Spelled])
 def test_code_that_hangs_on_nothing_else_is_run(kind: type[Node]) -> None:
     assert why_not(kind) == ""
 
