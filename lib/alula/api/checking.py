@@ -7,8 +7,8 @@ all runs of each skillset, all runs of each mission.
 from __future__ import annotations
 
 import re
-from collections.abc import Callable, Collection, Mapping, Sequence
-from dataclasses import dataclass, replace
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass, field, replace
 from functools import partial
 from pathlib import Path
 from time import monotonic
@@ -16,6 +16,7 @@ from typing import TYPE_CHECKING, BinaryIO
 
 from alula.common.public import public
 from alula.common.robots import RobotError, RobotFolder, find_robot, load_robot_folder, meaning
+from alula.common.scenarios import Scenario, ScenarioError
 from alula.language import models
 from alula.language.check.fields import check_fields
 from alula.language.errors import Diagnostic, Severity, has_errors
@@ -27,14 +28,16 @@ from alula.trees.document import read_source
 from alula.trees.errors import FileError
 from alula.trees.library import ENDINGS, Library
 from alula.trees.library import ignore as ignore_problem
-from alula.trees.palette import name_in_files
-from alula.trees.reading import read_files
+from alula.trees.palette import NodeType, name_in_files
+from alula.trees.reading import read_models
+from alula.trees.source import TreeSource
 
 if TYPE_CHECKING:
     from alula.missions.part import MissionPart
 
 Tell = Callable[[str], None]
 """Takes a line about progress, or about what is left out."""
+NO_ENUMS: Mapping[str, float] = {}
 TIME_S = 30.0
 """What the proofs of a file may take."""
 
@@ -50,7 +53,7 @@ def check_files(
     palettes: Sequence[str | Path] = (),
     main: str = "",
     packages: Mapping[str, str | Path] | None = None,
-    enums: Collection[str] = (),
+    enums: Mapping[str, float] | None = None,
     proofs: bool = True,
     closed_world: bool = False,
     timeout_s: float = TIME_S,
@@ -68,7 +71,7 @@ def check_files(
         palettes: of missions, files of more types of nodes (TreeNodesModel).
         main: the ID of the main tree, where a mission does not say it.
         packages: folders of ROS packages, by their names, for includes that name one.
-        enums: names of numbers that scripts of missions may use.
+        enums: numbers of names that scripts of missions may use.
         proofs: False: leave out the proofs.
         closed_world: assume that transitions that are neither extern nor used by an effect are never taken.
         timeout_s: for the proofs of a file; what could not be decided in it is a finding.
@@ -80,7 +83,7 @@ def check_files(
     with meaning(None if robot is None else load_robot_folder(Path(robot).resolve())):
         given = list(map(str, paths)) or robot_models(find_robot())
         others = {name: Path(folder) for name, folder in (packages or {}).items()}
-        files = checked_files(given, palettes=list(map(str, palettes)), main=main, packages=others, enums=enums, tell=tell)
+        files = checked_files(given, palettes=list(map(str, palettes)), main=main, packages=others, enums=enums or {}, tell=tell)
         if proofs:
             prove_files(files, timeout_s, closed_world=closed_world, tell=tell)
     return [finding for file in files for finding in file.findings]
@@ -103,7 +106,7 @@ def checked_files(
     palettes: Sequence[str] = (),
     main: str = "",
     packages: Mapping[str, Path] | None = None,
-    enums: Collection[str] = (),
+    enums: Mapping[str, float] = NO_ENUMS,
     tell: Tell = ignore,
 ) -> list[ModelFile]:
     """Return the models, then the missions, with their findings; `-` is the standard input where that is given."""
@@ -119,13 +122,13 @@ def checked_files(
     read = models.check_files(list(paths), standard_input)
     for model in read:
         check_fields(model)
-    return [*read, *checked_missions(list(missions), palettes, tell, library=library, main=main, enums=enums)]
+    return [*read, *_checked_missions(list(missions), list(map(Path, palettes)), library, main, enums, tell)]
 
 
 def prove_files(files: Sequence[ModelFile], timeout_s: float, *, closed_world: bool = False, tell: Tell = ignore) -> None:
     """Add what the proofs find about each file that is free of errors."""
-    prove_models([file for file in files if not is_mission(file.path)], timeout_s, closed_world=closed_world, tell=tell)
-    prove_missions([file for file in files if is_mission(file.path)], timeout_s, tell)
+    prove_models([file for file in files if not isinstance(file, CheckedMission)], timeout_s, closed_world=closed_world, tell=tell)
+    prove_missions([file for file in files if isinstance(file, CheckedMission)], timeout_s, tell)
 
 
 # --- models -------------------------------------------------------------------------------------------------------------
@@ -178,15 +181,16 @@ def _not_begun(skillsets: Sequence[Skillset], timeout_s: float) -> Diagnostic:
 # --- missions -----------------------------------------------------------------------------------------------------------
 
 
-def checked_missions(
-    paths: Sequence[str],
-    palettes: Sequence[str] = (),
-    tell: Tell = ignore,
-    *,
-    library: Library | None = None,
-    main: str = "",
-    enums: Collection[str] = (),
-) -> list[ModelFile]:
+@dataclass
+class CheckedMission(ModelFile):
+    """A mission with its findings; ``source`` is where it is read from, for whoever proves or plays it."""
+
+    source: TreeSource = field(kw_only=True)
+
+
+def _checked_missions(
+    paths: Sequence[str], palettes: Sequence[Path], library: Library, main: str, enums: Mapping[str, float], tell: Tell
+) -> list[CheckedMission]:
     """Return each mission with its findings; what can't be read is told, too, in one line.
 
     Several are a library for one another; ``main`` is the main tree of the one that has it.
@@ -194,13 +198,16 @@ def checked_missions(
     if not paths:
         return []
     robot = _robot(tell)
-    library = library or Library()
     if len(paths) > 1:
         library.add(map(Path, paths))
-    files = {Path(path).resolve(): ModelFile(path) for path in paths}
-    for path, file in files.items():
-        mine = main if path in {Path(one.place.path).resolve() for one in library.trees.get(main, ())} or len(paths) == 1 else ""
-        for finding in _checked(file.path, robot, [Path(one) for one in palettes], library, mine, tell, enums):
+    types = _declared(palettes)
+    files: dict[Path, CheckedMission] = {}
+    for path in map(Path, paths):
+        mine = main if path.resolve() in {Path(one.place.path).resolve() for one in library.trees.get(main, ())} or len(paths) == 1 else ""
+        source = TreeSource(path, robot.library(path, library), mine, enums, types)
+        files[path.resolve()] = CheckedMission(str(path), source=source)
+    for file in files.values():
+        for finding in _checked(file.source, robot, palettes, tell):
             its = files.get(Path(finding.span.file).resolve(), file)  # one file's tree is checked in another, too, that uses it
             if finding not in its.findings:
                 its.findings.append(finding)
@@ -209,7 +216,15 @@ def checked_missions(
     return list(files.values())
 
 
-def prove_missions(files: Sequence[ModelFile], timeout_s: float, tell: Tell = ignore) -> None:
+def _declared(palettes: Sequence[Path]) -> list[NodeType]:
+    """Return the types of node of palettes; one that can't be read is told where a mission is checked with it."""
+    try:
+        return [one for palette in palettes for one in read_models(palette)]
+    except FileError:
+        return []
+
+
+def prove_missions(files: Sequence[CheckedMission], timeout_s: float, tell: Tell = ignore) -> None:
     """Look at all runs of the missions that are free of errors and use skills, and add what is found."""
     sound = [file for file in files if not has_errors(file.findings)]
     if not sound:
@@ -222,14 +237,12 @@ def prove_missions(files: Sequence[ModelFile], timeout_s: float, tell: Tell = ig
     robot = _robot(ignore)  # what is to be told of it was told when they were checked
     skillsets, part = robot.skillsets, robot.part or NO_PART
     faults = states_of_faults(skillsets, tell) if skillsets else {}
-    library = Library()
-    library.add(Path(file.path) for file in files if files[1:])
     for file in sound if skillsets else []:
-        path = Path(file.path)
-        if not robot.has(path, read_source(path)) or read_files(path, ignore_problem, library=library, whole=False).is_part:
+        source = file.source
+        if not robot.has(source.path, read_source(source.path)) or source.read(ignore_problem, whole=False).is_part:
             continue  # a tree of another program, or a part of other missions, which are looked at
         report = partial(_tell_runs, tell, file.path)
-        proved = prove_mission(Path(file.path), skillsets, part, faults=faults, timeout_s=timeout_s, tell=report)
+        proved = prove_mission(source, skillsets, part, faults=faults, timeout_s=timeout_s, tell=report)
         file.findings += [*proved.findings, *map(_accepted, proved.accepted)]
 
 
@@ -250,6 +263,13 @@ class _Robot:
     skillsets: tuple[Skillset, ...] = ()
     part: MissionPart | None = None
     messages: Messages = NO_MESSAGES
+    scenarios: Mapping[Path, Scenario] = field(default_factory=dict)
+    """By the files of their missions."""
+
+    def library(self, path: Path, library: Library) -> Library:
+        """Return the library of a mission: that of the command line, with that of the scenario that flies it."""
+        scenario = self.scenarios.get(path.resolve())
+        return library if scenario is None or not scenario.library else library.extended(scenario.library)
 
     def has(self, path: Path, source: bytes) -> bool:
         """Tell whether a file is a mission of this robot: it lies in its folder, or names a skillset or a node of it."""
@@ -267,21 +287,32 @@ def _robot(tell: Tell) -> _Robot:
         return _Robot()
     from alula.check.robot import models_of, part_of  # late, as in `_checked`
 
-    return _Robot(robot.root, models_of(robot, tell), part_of(robot, tell), messages_of(robot))
+    return _Robot(robot.root, models_of(robot, tell), part_of(robot, tell), messages_of(robot), _flown(tell))
 
 
-def _checked(
-    path: str, robot: _Robot, palettes: Sequence[Path], library: Library, main: str, tell: Tell, enums: Collection[str]
-) -> list[Diagnostic]:
+def _flown(tell: Tell) -> dict[Path, Scenario]:
+    from alula.missions.scenario import by_mission  # late, as in `_checked`
+
+    try:
+        return by_mission()
+    except ScenarioError as error:
+        tell(str(error))
+        return {}
+
+
+def _checked(mission: TreeSource, robot: _Robot, palettes: Sequence[Path], tell: Tell) -> list[Diagnostic]:
     from alula.check.findings import findings_of  # late: models are checked without it
     from alula.missions.part import NO_PART
 
+    path, library, enums = str(mission.path), mission.library, mission.enums
     try:
-        source = read_source(Path(path))
-        own = robot if robot.has(Path(path), source) else _Robot()
+        source = read_source(mission.path)
+        own = robot if robot.has(mission.path, source) else _Robot()
         others = own.root is None
         part = own.part or NO_PART
-        found = findings_of(path, source, own.skillsets, palettes, part, own.messages, library, main, of_others=others, enums=enums)
+        found = findings_of(
+            path, source, own.skillsets, palettes, part, own.messages, library, mission.main, of_others=others, enums=enums
+        )
     except FileError as error:
         found = [Diagnostic("ALU001", error.problem.message, Span(path, 0, 0, 0))]
     for finding in found:

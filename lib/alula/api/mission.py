@@ -23,7 +23,9 @@ from alula.odds.errors import OddsError
 from alula.odds.odds import Odds
 from alula.runtime.core.errors import SkillRuntimeError
 from alula.runtime.live.spec import FILE, RequestError, RunSpec
+from alula.trees.library import Library
 from alula.trees.node import Node
+from alula.trees.source import TreeSource
 
 Fault = str | FaultRequest
 """As on the command line, ``laser@20-30``, or as a value."""
@@ -88,6 +90,9 @@ class Mission:
         behaviour: Behaviour | Sequence[str | Path] = (),
         nodes: Sequence[type[Node]] = (),
         inputs: Mapping[str, object] | None = None,
+        library: Sequence[str | Path] = (),
+        main: str = "",
+        enums: Mapping[str, float] | None = None,
     ) -> Mission:
         """Return the mission of a tree's file that belongs to no robot.
 
@@ -97,13 +102,19 @@ class Mission:
             behaviour: what their mocks do, or files that say so; what nothing is said of lasts a second and ends with its first result.
             nodes: types of nodes of one's own, as `alula.trees.register` has them.
             inputs: for the input ports of its main tree that have no default.
+            library: folders and files whose trees it may use without including them.
+            main: the ID of its main tree, where the file does not say it.
+            enums: numbers of names that its scripts may use.
 
         Raises:
             AlulaError: the file can't be used, or one of the behaviour files is wrong.
         """
         file, models = Path(path), tuple(skillsets)
         does = behaviour if isinstance(behaviour, Behaviour) else load_behaviour(list(map(Path, behaviour)), models)
-        return cls(plan_of_file(file, file.stem, models, inputs or {}, MissionPart(tuple(nodes))), models, does, file)
+        others = Library()
+        others.add(map(Path, library))
+        source = TreeSource(file, others, main, enums or {})
+        return cls(plan_of_file(source, file.stem, models, inputs or {}, MissionPart(tuple(nodes))), models, does, file)
 
     def run(self, *faults: Fault, seed: int = 0, out: str | Path | None = None) -> MockedMission:
         """Run it over mocks to its end, in virtual time; return what it did.

@@ -10,6 +10,7 @@ from alula.common.robots import RobotError, find_robot
 from alula.common.scenarios import Scenario
 from alula.missions.part import NO_PART
 from alula.missions.plan import InputError
+from alula.missions.scenario import flown
 from alula.missions.treeview import path_of
 from alula.model.breaking import can_break
 from alula.model.execution_state import ExecutionState as S
@@ -85,10 +86,10 @@ def proved(
     deadline = Deadline.after(time_s, tell)
     try:
         robot = find_robot()
-        path = robot.root / scenario.mission
+        source = flown(robot.root / scenario.mission, scenario)
         part = robot.part("missions") or NO_PART
         regions, unproved = look_at(
-            lambda why: System.read(path, models, part, LOOKED_AT, deadline, why_any_order=why),
+            lambda why: System.read(source, models, part, LOOKED_AT, deadline, why_any_order=why),
             lambda system: _explored(Regions(system, deadline), time_s),
         )
     except (UndecidedError, InputError, RobotError) as error:

@@ -32,20 +32,20 @@ def main(arguments: Sequence[str] | None = None) -> int:
     """Check the files named on the command line; return the exit code."""
     options = parse("check", arguments)
     collect_seldom()
-    if options.play is not None:
-        from alula.cli import play  # it takes the counterexamples from here
-
-        return play.run(options)
-    try:
-        given = options.files or robot_models(find_robot())
-    except RobotError as error:
-        sys.stderr.write(f"{COMMAND}: no files are named, and {error}\n")
-        return 2
     warn = warner(COMMAND)
     try:
         enums = {} if options.enums is None else read_enums(options.enums)
     except TreeError as error:
         warn(str(error))
+        return 2
+    if options.play is not None:
+        from alula.cli import play  # it takes the counterexamples from here
+
+        return play.run(options, enums)
+    try:
+        given = options.files or robot_models(find_robot())
+    except RobotError as error:
+        sys.stderr.write(f"{COMMAND}: no files are named, and {error}\n")
         return 2
     files = checked_files(
         given, sys.stdin.buffer, palettes=options.palette, main=options.main, packages=options.package, enums=enums, tell=warn

@@ -8,7 +8,8 @@ from __future__ import annotations
 import argparse
 import json
 import sys
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
+from pathlib import Path
 
 from alula.api.checking import counterexamples_of, is_mission
 from alula.cli.play_mission import play_mission
@@ -17,13 +18,13 @@ from alula.language.models import check_files, models_in
 from alula.prove.skillset.play import PlayedStep, play
 
 
-def run(options: argparse.Namespace) -> int:
+def run(options: argparse.Namespace, enums: Mapping[str, float]) -> int:
     """Play the counterexample that ``alula check --play`` is asked for; return the exit code."""
     if not options.files:
         sys.stderr.write("alula check: --play needs the models or missions whose counterexample is meant\n")
         return 2
-    if any(map(is_mission, options.files)):
-        return play_mission(options)
+    if any(map(_has_trees, options.files)):
+        return play_mission(options, enums)
     paths = dict.fromkeys(path for given in options.files for path in models_in(given))
     files = check_files(list(paths), sys.stdin.buffer)
     counterexamples = counterexamples_of(files, options.time, closed_world=options.closed_world, tell=warner("alula check"))
@@ -36,6 +37,11 @@ def run(options: argparse.Namespace) -> int:
     title = f"{finding.span}: {finding.code}: {finding.message}"
     sys.stdout.write(_as_json(title, played, agrees=agrees) if options.json else _as_text(title, played, agrees=agrees))
     return 0 if agrees else 1
+
+
+def _has_trees(place: str) -> bool:
+    """Tell whether missions are meant: a file of one, or a folder that has no models."""
+    return is_mission(place) or (Path(place).is_dir() and models_in(place) == [place])
 
 
 def _as_text(title: str, played: Sequence[PlayedStep], *, agrees: bool) -> str:

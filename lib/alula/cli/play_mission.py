@@ -5,9 +5,10 @@ from __future__ import annotations
 import argparse
 import json
 import sys
+from collections.abc import Mapping
 from pathlib import Path
 
-from alula.api.checking import checked_missions, is_mission, prove_missions
+from alula.api.checking import CheckedMission, checked_files, prove_missions
 from alula.check.robot import part_of
 from alula.cli.run_request import run_folder
 from alula.cli.saying import warner
@@ -19,15 +20,24 @@ from alula.missions.part import NO_PART
 from alula.prove.mission.run import MissionFinding
 from alula.report.page.writing import write_report
 from alula.runtime.live.spec import RequestError
+from alula.trees.source import TreeSource
 
 COMMAND = "alula check"
 
 
-def play_mission(options: argparse.Namespace) -> int:
-    """Play the counterexample of a mission; return the exit code."""
-    if not all(map(is_mission, options.files)):
+def play_mission(options: argparse.Namespace, enums: Mapping[str, float]) -> int:
+    """Play the counterexample of a mission, whose scripts may use ``enums``; return the exit code."""
+    checked = checked_files(
+        options.files,
+        palettes=options.palette,
+        main=options.main,
+        packages=options.package,
+        enums=enums,
+        tell=warner(COMMAND),
+    )
+    files = [file for file in checked if isinstance(file, CheckedMission)]
+    if len(files) < len(checked):
         return _refused("--play takes missions or models, not both at once")
-    files = checked_missions(options.files, (), warner(COMMAND))
     if any(has_errors(file.findings) for file in files):
         return _refused(f"a mission has errors; `alula check {' '.join(options.files)}` shows them")
     prove_missions(files, options.time, warner(COMMAND))
@@ -38,12 +48,12 @@ def play_mission(options: argparse.Namespace) -> int:
     try:
         folder = run_folder(options.out, Path(file.path).stem)
         folder.mkdir(parents=True, exist_ok=True)
-        return _flown(Path(file.path), finding, folder, as_json=options.json)
+        return _flown(file.source, finding, folder, as_json=options.json)
     except (RequestError, OSError) as error:
         return _refused(str(error))
 
 
-def _flown(path: Path, finding: MissionFinding, folder: Path, *, as_json: bool) -> int:
+def _flown(source: TreeSource, finding: MissionFinding, folder: Path, *, as_json: bool) -> int:
     from alula.prove.mission.play import play  # with what it brings along
 
     assert finding.run is not None  # noqa: S101 - the caller has seen to it
@@ -51,9 +61,9 @@ def _flown(path: Path, finding: MissionFinding, folder: Path, *, as_json: bool) 
         part = part_of(find_robot(), warner(COMMAND))
     except RobotError:
         part = NO_PART
-    played = play(path, finding.run, part, folder)
+    played = play(source, finding.run, part, folder)
     note_mocked(folder, played.simulated_s, 0.0, (), [played.left] if played.left else [])
-    write_report(folder, title=f"{path.name}: {finding.code}, played")
+    write_report(folder, title=f"{source.path.name}: {finding.code}, played")
     title = f"{finding.span}: {finding.code}: {finding.message}"
     if as_json:
         told = {

@@ -12,7 +12,7 @@ from alula.common.robots import RobotError, find_robot
 from alula.common.suggestions import nearest
 
 NEEDED = ("about", "skillsets")
-KEYS = ("about", "world", "mission", "skillsets", "launch", "report", "faults", "processes", "fallback", "motion", "robots")
+KEYS = ("about", "world", "mission", "skillsets", "launch", "report", "faults", "processes", "fallback", "motion", "robots", "library")
 
 
 class ScenarioError(AlulaError):
@@ -37,6 +37,7 @@ class Scenario:
         fallback: the skill whose running means that the robot is safe again after a failure.
         motion: the skills that take it on then.
         robots: of a fleet, the scenario without a mission by which each robot serves its skills.
+        library: folders and files whose trees the mission may use without including them; the file says them from where it lies on.
     """
 
     name: str
@@ -51,6 +52,7 @@ class Scenario:
     fallback: str = ""
     motion: tuple[str, ...] = ()
     robots: tuple[tuple[str, str], ...] = ()
+    library: tuple[Path, ...] = ()
 
 
 def scenarios_folder() -> Path:
@@ -108,6 +110,7 @@ def load_scenario(name: str, folder: Path | None = None) -> Scenario:
         robots=tuple((name, one.text(f"the scenario of {name}")) for name, one in said["robots"].entries("`robots`").items())
         if "robots" in said
         else (),
+        library=_library(said.get("library"), path.parent),
     )
 
 
@@ -118,6 +121,14 @@ def _launch(part: Located | None) -> str:
     if text.count("/") != 1:
         raise part.wrong(f"`launch` should be package/file.launch, not {text}")
     return text
+
+
+def _library(part: Located | None, around: Path) -> tuple[Path, ...]:
+    found = {} if part is None else {around / one.text("an entry of `library`"): one for one in part.elements()}
+    for place, one in found.items():
+        if not place.exists():
+            raise one.wrong(f"there is no folder {place}; the path counts from this file on")
+    return tuple(found)
 
 
 def _words(said: dict[str, Located], key: str) -> tuple[str, ...]:

@@ -30,7 +30,8 @@ from alula.trees.errors import FileError, TreeError
 from alula.trees.factory import build_tree
 from alula.trees.node import Node
 from alula.trees.palette import Category, Direction, NodeType, Port, node_type
-from alula.trees.reading import TreeFiles, read_files
+from alula.trees.reading import TreeFiles
+from alula.trees.source import TreeSource, source_of
 from alula.trees.structure import verify
 from alula.trees.tree import Tree
 
@@ -84,12 +85,20 @@ class FiledMission:
 class Maker:
     """Makes the trees of a mission, over one blackboard."""
 
-    def __init__(self, files: TreeFiles, skillsets: Sequence[Skillset], part: MissionPart, crew: Crew, clock_ns: Clock) -> None:
+    def __init__(
+        self,
+        files: TreeFiles,
+        skillsets: Sequence[Skillset],
+        part: MissionPart,
+        crew: Crew,
+        clock_ns: Clock,
+        enums: Mapping[str, float],
+    ) -> None:
         self.files = files
         self.crew = crew
         self.board = TreeBoard(clock_ns)
         self._clock_ns = clock_ns
-        self._enums = states_of(skillsets)
+        self._enums = {**enums, **states_of(skillsets)}
         self._resources = frozenset(f"{one.name}.{resource}" for one in skillsets for resource in one.resource_index)
         self._data = frozenset(f"{one.name}.{data}" for one in skillsets for data in one.data_index)
         self._palette = palette_of(files, skillsets, part, crew)
@@ -108,10 +117,11 @@ class Maker:
         return tree
 
 
-def plan_of_file(path: Path, name: str, skillsets: Sequence[Skillset], inputs: Inputs, part: MissionPart) -> MissionPlan:
+def plan_of_file(mission: Path | TreeSource, name: str, skillsets: Sequence[Skillset], inputs: Inputs, part: MissionPart) -> MissionPlan:
     """Return the plan of a mission's file; raises InputError."""
+    source = source_of(mission)
     try:
-        files = read_files(path)
+        files = source.read()
         palette = palette_of(files, skillsets, part)
         verify(files, palette)
         if (problem := no_class(files, palette)) is not None:
@@ -119,13 +129,13 @@ def plan_of_file(path: Path, name: str, skillsets: Sequence[Skillset], inputs: I
     except TreeError as error:
         raise InputError(str(error)) from error
     model = files.models.get(files.main) or node_type(files.main, Category.SUBTREE)
-    parameters, own = _parameters(model), _inputs(model, inputs, path)
+    parameters, own = _parameters(model), _inputs(model, inputs, source.path)
     part.check_inputs(own)
     board: list[TreeBoard] = []
 
     def make(clients: Mapping[str, Client], clock_ns: Clock, values: Mapping[str, float]) -> tuple[FiledMission, Blackboard]:
         memory = part.memory(clock_ns=clock_ns, pending=PendingInterrupts(clock_ns))
-        maker = Maker(files, skillsets, part, Crew(clients, memory), clock_ns)
+        maker = Maker(files, skillsets, part, Crew(clients, memory), clock_ns, source.enums)
         for port in model.ports.values():
             if port.direction is not Direction.INPUT:
                 maker.board.set(port.name, _number(port))

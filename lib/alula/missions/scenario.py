@@ -6,12 +6,14 @@ from collections.abc import Iterable
 from pathlib import Path
 
 from alula.common.robots import find_robot, wrong_world
-from alula.common.scenarios import Scenario
+from alula.common.scenarios import Scenario, load_scenario, scenario_names
 from alula.missions.mission_file import plan_of_file
 from alula.missions.part import NO_PART
 from alula.missions.plan import InputError, Inputs, MissionPlan
 from alula.missions.serving import serving_plan
 from alula.model.model import Skillset
+from alula.trees.library import Library
+from alula.trees.source import TreeSource
 
 
 def plan_of(scenario: Scenario, inputs: Inputs, models: Iterable[Skillset]) -> MissionPlan:
@@ -25,6 +27,24 @@ def plan_of(scenario: Scenario, inputs: Inputs, models: Iterable[Skillset]) -> M
     if not scenario.mission.endswith(".xml"):
         raise InputError(f"the mission {scenario.mission} is no file of a tree; name one: missions/NAME.xml")
     return plan_of_mission_file(find_robot().root / scenario.mission, scenario, inputs, models)
+
+
+def flown(path: Path, scenario: Scenario) -> TreeSource:
+    """Return where a file is read from as a scenario's mission."""
+    library = Library()
+    library.add(scenario.library)
+    return TreeSource(path, library)
+
+
+def by_mission() -> dict[Path, Scenario]:
+    """Return the scenarios of the robot by the files of their missions (resolved paths), of several of one file the first.
+
+    Raises:
+        RobotError, ScenarioError: there is no robot, or a scenario is wrong.
+    """
+    root = find_robot().root
+    trees = [one for one in map(load_scenario, scenario_names()) if one.mission.endswith(".xml")]
+    return {(root / one.mission).resolve(): one for one in reversed(trees)}
 
 
 def inputs_of(scenario: Scenario, world: str = "") -> Inputs:
@@ -58,4 +78,4 @@ def plan_of_mission_file(path: Path, scenario: Scenario, inputs: Inputs, models:
     if missing:
         raise InputError(f"the robot has no skillset '{missing[0]}'")
     part = find_robot().part("missions") or NO_PART
-    return plan_of_file(path, scenario.name, [known[name] for name in scenario.skillsets], inputs, part)
+    return plan_of_file(flown(path, scenario), scenario.name, [known[name] for name in scenario.skillsets], inputs, part)

@@ -7,9 +7,7 @@ from pathlib import Path
 
 from alula.check.robot import Warn, models_of, part_of
 from alula.common.robots import FAULTS, RobotFolder, find_robot
-from alula.common.scenarios import load_scenario, scenario_names
-from alula.missions.plan import Inputs
-from alula.missions.scenario import inputs_of
+from alula.missions.scenario import by_mission, flown, inputs_of
 from alula.mock import load_behaviour
 from alula.model.model import Skillset
 from alula.odds.figures import Figures
@@ -48,11 +46,15 @@ def mission_of(
     models = models_of(robot, warn)
     figures, effects = _of_faults(robot, models)
     failures = Failures(refusals=False, hooks=False, aborts=False)
-    part, inputs, brought, departure = part_of(robot, warn), _inputs(path, world), _brought(robot, models), _departure(robot, models)
+    part, brought, departure = part_of(robot, warn), _brought(robot, models), _departure(robot, models)
+    scenario = by_mission().get(path.resolve())
+    inputs = None if scenario is None else inputs_of(scenario, world)
+    file = changed or path
+    source = file if scenario is None else flown(file, scenario)
     known = figures if others is None else others
 
     def read(why_any_order: str) -> System:
-        return System.read(changed or path, models, part, failures, few=COUNTED, known=inputs, why_any_order=why_any_order)
+        return System.read(source, models, part, failures, few=COUNTED, known=inputs, why_any_order=why_any_order)
 
     return read, lambda system: MissionSteps(system, effects, brought, departure, known), known
 
@@ -92,13 +94,6 @@ def graph_of(
     for finding in taken_as(system, exactly=False):
         warn(f"{finding.span}: {finding.message}")
     return graph, known
-
-
-def _inputs(path: Path, world: str) -> Inputs | None:
-    """Return the inputs of the scenario that flies a mission's file; None where there is no such scenario."""
-    found = [load_scenario(name) for name in scenario_names()]
-    scenario = next((one for one in found if one.mission.endswith(".xml") and (find_robot().root / one.mission).samefile(path)), None)
-    return None if scenario is None else inputs_of(scenario, world)
 
 
 def _of_faults(robot: RobotFolder, models: Sequence[Skillset]) -> tuple[Figures, Mapping[str, FaultEffects]]:

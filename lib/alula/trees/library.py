@@ -5,6 +5,7 @@ from __future__ import annotations
 import os
 import re
 from collections.abc import Iterable, Iterator, Mapping
+from copy import copy
 from pathlib import Path
 
 from alula.trees.document import Document, Element, read_document, read_source
@@ -46,6 +47,17 @@ class Library:
         self.broken: list[Problem] = []
         """What keeps files from being read at all."""
         self._packages = dict(packages or {})
+        self._read: dict[Path, Document] = {}
+        """What was read, by this one and by those that have more besides; nothing is read twice."""
+
+    def extended(self, places: Iterable[Path]) -> Library:
+        """Return one with more files, for those who use them; raises nothing, as ``add``."""
+        other = copy(self)
+        other.documents, other.models, other.broken = dict(self.documents), dict(self.models), list(self.broken)
+        other.trees = {name: list(found) for name, found in self.trees.items()}
+        other.used = {name: set(found) for name, found in self.used.items()}
+        other.add(places)
+        return other
 
     def add(self, places: Iterable[Path]) -> None:
         """Read files, and those in folders; what can't be read is noted in ``broken``."""
@@ -53,13 +65,20 @@ class Library:
             if path.resolve() in self.documents:
                 continue
             try:
-                document = modernised(read_document(path))
+                document = self.document(path)
             except FileError as error:
                 self.broken.append(error.problem)
                 continue
             if document.root.tag == "root":
                 self.documents[path.resolve()] = document
                 self._index(path.resolve(), document.root)
+
+    def document(self, path: Path) -> Document:
+        """Return a file, as format 4 has it; raises FileError."""
+        found = self._read.get(path.resolve())
+        if found is None:
+            found = self._read[path.resolve()] = modernised(read_document(path))
+        return found
 
     def files(self, place: Path) -> list[Path]:
         """Return the files of trees in a folder, in the order of their names; the place itself where it is none."""

@@ -84,8 +84,7 @@ def read_files(path: Path, report: Report = refuse, *, main: str = "", library: 
         FileError: a file can't be read or is no XML; all else goes to ``report``.
     """
     library = library or Library()
-    document = library.documents.get(path.resolve()) or modernised(read_document(path))
-    return _read(document, path, report, main, library, whole=whole)
+    return _read(library.document(path), path, report, main, library, whole=whole)
 
 
 def read_models(path: Path) -> Palette:
@@ -109,7 +108,8 @@ def _read(document: Document, path: Path, report: Report, main: str, library: Li
     for folder in folders:
         if not folder.exists():
             report(Problem(document.root.place_of(LIBRARY), f"there is no folder {folder}", "the path counts from this file on"))
-    library.add(folder for folder in folders if folder.exists())
+    if folders:
+        library = library.extended(folder for folder in folders if folder.exists())
     _Reader(files, report, library).add(document, (path.resolve(),))
     own = list(files.trees)
     _take_used(files, library, report)
@@ -216,7 +216,7 @@ class _Reader:
                 cure = "the path counts from the package on" if element.get("ros_pkg") else "the path counts from this file on"
                 self._report(Problem(element.place_of("path"), f"there is no file {path}", cure))
                 return
-            self.add(self._library.documents.get(path.resolve()) or modernised(read_document(path)), (*chain, path.resolve()))
+            self.add(self._library.document(path), (*chain, path.resolve()))
 
     def _define(self, element: Element, trees: int) -> None:
         if element.tag == "BehaviorTree":

@@ -38,7 +38,7 @@ from alula.runtime.client import Client
 from alula.runtime.core.execution import Execution
 from alula.runtime.handle import SkillHandle
 from alula.runtime.local import LocalManagers, LocalWorld
-from alula.trees.reading import read_files
+from alula.trees.source import TreeSource, source_of
 
 FLIPPED = {"<": ">", "<=": ">=", ">": "<", ">=": "<=", "==": "=="}
 STEP_S = 0.01
@@ -61,9 +61,9 @@ class Played:
     facts: Mapping[str, object]
 
 
-def play(path: Path, run: MissionRun, part: MissionPart, out: Path | None = None) -> Played:
+def play(mission: Path | TreeSource, run: MissionRun, part: MissionPart, out: Path | None = None) -> Played:
     """Fly a run of a mission's file; with ``out`` the mission is recorded there, as one over mocks."""
-    player = _Player(path, run, part, out)
+    player = _Player(mission, run, part, out)
     left = ""
     try:
         for number, event in enumerate(run.events, 1):
@@ -121,7 +121,7 @@ class _Told(MissionClient):
 
 
 class _Player:
-    def __init__(self, path: Path, run: MissionRun, part: MissionPart, out: Path | None) -> None:
+    def __init__(self, mission: Path | TreeSource, run: MissionRun, part: MissionPart, out: Path | None) -> None:
         self._run = run
         self._held: dict[str, Callable[[], None]] = {}
         self._running: dict[str, Execution] = {}
@@ -137,10 +137,11 @@ class _Player:
         self._data = {one.skillset.name: one.data for one in playables}
         self._served = {one.skillset.name: one.skillset for one in playables}
         self.world = LocalWorld(self._served.values(), self._functions)
-        declared = nowhere_made(read_files(path), run.skillsets, part)
+        source = source_of(mission)
+        declared = nowhere_made(source.read(), run.skillsets, part)
         own = own_nodes(Robot(self._oracle), part, declared, run.why_any_order)
         nodes = MissionPart(own.part.nodes, memory=part.memory)
-        plan = plan_of_file(path, path.stem, run.skillsets, _Unknown(), nodes)
+        plan = plan_of_file(source, source.path.stem, run.skillsets, _Unknown(), nodes)
         plan = replace(plan, inputs={})
         self._facts = plan.facts
         clock_ns = lambda: self.world.clock.now_ns  # noqa: E731

@@ -24,6 +24,7 @@ from alula.prove.mission.regions import Regions
 from alula.prove.mission.system import System, look_at
 from alula.prove.mission.waits import Waits
 from alula.prove.mission.wanted import wanted
+from alula.trees.source import TreeSource, source_of
 
 LOOKED_AT = Failures(hooks=False, aborts=False)
 """What the models say can fail, and functions that refuse inputs."""
@@ -52,7 +53,7 @@ class Proved:
 
 
 def prove_mission(
-    path: Path,
+    mission: Path | TreeSource,
     models: Sequence[Skillset],
     part: MissionPart,
     *,
@@ -66,7 +67,7 @@ def prove_mission(
     ``faults`` says in which states faults show, for properties that name them. ``tell`` hears now and then how far a long search is.
     Ctrl-C ends the search as the end of the time does: what was found by then is returned.
     """
-    search = _Search(path, models, part, faults)
+    search = _Search(mission, models, part, faults)
     seen = search.within(Deadline.after(timeout_s, tell), f"{timeout_s:.3g} s")
     share_s = timeout_s * SHARE
     return search.also(seen, Deadline.after(share_s, tell), f"{share_s:.3g} s").proved()
@@ -74,7 +75,7 @@ def prove_mission(
 
 def prove_within(
     deadline: Deadline,
-    path: Path,
+    mission: Path | TreeSource,
     models: Sequence[Skillset],
     part: MissionPart,
     *,
@@ -82,7 +83,7 @@ def prove_within(
     given: str,
 ) -> Proved:
     """Return what the models alone make go wrong, within a deadline; ``given`` is what messages call it."""
-    return _Search(path, models, part, faults).within(deadline, given).proved()
+    return _Search(mission, models, part, faults).within(deadline, given).proved()
 
 
 @dataclass(frozen=True)
@@ -108,8 +109,9 @@ class _Seen:
 class _Search:
     """Looks at the runs of one mission."""
 
-    def __init__(self, path: Path, models: Sequence[Skillset], part: MissionPart, faults: Faults) -> None:
-        self._path = path
+    def __init__(self, mission: Path | TreeSource, models: Sequence[Skillset], part: MissionPart, faults: Faults) -> None:
+        self._source = source_of(mission)
+        self._path = self._source.path
         self._models = models
         self._part = part
         self._faults = faults
@@ -150,7 +152,7 @@ class _Search:
             _explore(regions)
             return regions, several
 
-        return look_at(lambda why: System.read(self._path, self._models, self._part, LOOKED_AT, deadline, why_any_order=why), look)
+        return look_at(lambda why: System.read(self._source, self._models, self._part, LOOKED_AT, deadline, why_any_order=why), look)
 
     def also(self, before: _Seen, deadline: Deadline, given: str) -> _Seen:
         """Look at runs in which hooks raise, managers die, or somebody aborts or pauses the mission; of those, what is new."""

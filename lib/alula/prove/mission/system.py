@@ -46,7 +46,8 @@ from alula.prove.mission.ticking import Outcome as Ticked
 from alula.prove.mission.unknown import UNKNOWN
 from alula.trees.node import Node, pointer
 from alula.trees.palette import Direction, NodeType, Port
-from alula.trees.reading import TreeFiles, read_files, type_name
+from alula.trees.reading import TreeFiles, type_name
+from alula.trees.source import TreeSource, source_of
 
 _GIVEN_S = 30.0
 T = TypeVar("T")
@@ -78,7 +79,7 @@ class System:
     @classmethod
     def read(
         cls,
-        path: Path,
+        mission: Path | TreeSource,
         models: Sequence[Skillset],
         part: MissionPart,
         failures: Failures = Failures(),  # noqa: B008 - a value
@@ -94,22 +95,23 @@ class System:
 
         Raises InputError where the file can't be used, UndecidedError where the search can't look at it.
         """
-        files = read_files(path)
+        source = source_of(mission)
+        files, path = source.read(), source.path
         skillsets = [one for one in models if one.name in _named(files)]
         oracle = Oracle()
         palette = palette_of(files, models, part)
         robot = Robot(oracle, Conditions.of(files, palette, skillsets), Compared.of(files, palette, skillsets))
         inputs = {port.name: UNKNOWN for port in _ports(files)} if known is None else known
         own = own_nodes(robot, part, nowhere_made(files, models, part), why_any_order, known=known is not None)
-        plan = plan_of_file(path, path.stem, skillsets, inputs, own.part)
+        plan = plan_of_file(source, path.stem, skillsets, inputs, own.part)
         clients = {one.name: Client(robot, one) for one in skillsets}
         oracle.begin(lambda _: None)
-        mission, board = plan.make(clients, robot.clock_ns, plan.parameters)  # type: ignore[arg-type]  # a client as far as missions use it
-        if not isinstance(mission, FiledMission) or not isinstance(board, Memory):
+        filed, board = plan.make(clients, robot.clock_ns, plan.parameters)  # type: ignore[arg-type]  # a client as far as missions use it
+        if not isinstance(filed, FiledMission) or not isinstance(board, Memory):
             raise InputError(f"{path}: is no mission in a file")
-        stop = mission.stop_tree() if STOP_HERE in files.trees else None
-        trees = (mission.tree, *([stop] if stop else []))
-        director = Director(OneStop(mission, stop), board)
+        stop = filed.stop_tree() if STOP_HERE in files.trees else None
+        trees = (filed.tree, *([stop] if stop else []))
+        director = Director(OneStop(filed, stop), board)
         unread = [*own.unread, *(f"{one.name}.{skill.name}" for one in skillsets for skill in one.skills)]
         read = what_is_read(files, palette, unread, plan.parameters, oracle, own.free)
         body = Body(robot, director, board, trees, {one.name: one for one in skillsets}, read, few)

@@ -1,0 +1,42 @@
+"""Where a tree is read from: its file, and what is needed besides to read it whole."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, field
+from pathlib import Path
+
+from alula.trees.errors import Report, refuse
+from alula.trees.library import Library
+from alula.trees.palette import NodeType
+from alula.trees.reading import TreeFiles, read_files
+
+
+@dataclass(frozen=True)
+class TreeSource:
+    """What whoever reads, checks, proves or runs a tree is handed, so that all of them read the same.
+
+    Attributes:
+        path: its file.
+        library: the files whose trees it may use without including them, and the folders of ROS packages.
+        main: the ID of its main tree, instead of what the file says itself.
+        enums: numbers of names that its scripts use, which a program registers.
+        types: types of node that are declared in other files (palettes).
+    """
+
+    path: Path
+    library: Library = field(default_factory=Library)
+    main: str = ""
+    enums: Mapping[str, float] = field(default_factory=dict)
+    types: Sequence[NodeType] = ()
+
+    def read(self, report: Report = refuse, *, whole: bool = True) -> TreeFiles:
+        """Read it, as `read_files` does; what other files declare of nodes is there as if it stood in its own."""
+        files = read_files(self.path, report, main=self.main, library=self.library, whole=whole)
+        files.models = {**{one.name: one for one in self.types}, **files.models}
+        return files
+
+
+def source_of(mission: Path | TreeSource) -> TreeSource:
+    """Return where a mission is read from; a path is that of a file that needs nothing else."""
+    return mission if isinstance(mission, TreeSource) else TreeSource(mission)
