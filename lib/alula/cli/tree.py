@@ -16,6 +16,7 @@ from alula.check.robot import models_of, part_of
 from alula.cli.options.models import TICKS
 from alula.cli.saying import warner
 from alula.cli.table import parse
+from alula.cli.tree_page import TreePage
 from alula.common.files import write_text
 from alula.common.robots import RobotError, find_robot
 from alula.missions.drawing import draw, drawn_as_text
@@ -28,6 +29,7 @@ from alula.trees.format3 import DECLARED, OLD, convert
 from alula.trees.library import Library
 from alula.trees.palette import Palette
 from alula.trees.reading import TreeFiles, read_files
+from alula.trees.tree import Tree
 from alula.trees.view import view_of
 
 COMMAND = "alula tree"
@@ -48,15 +50,18 @@ def run(given: argparse.Namespace) -> int:
     """Do what is asked for; raises AnswersError, TreeError, OSError."""
     if given.ticks is not None and (given.ticks < 0 or given.answers is None):
         raise AnswersError(f"--ticks {given.ticks}: is a number of ticks, and goes with --answers FILE")
+    for option in ("seed", "trace", "html"):
+        if given.answers is None and getattr(given, option) not in {None, False}:
+            raise AnswersError(f"--{option}: goes with --answers FILE")
     if given.to is not None or given.out is not None:
         return converted(given)
     wrong: list[TreeError] = []
     found = list(mains(given.files, given.main, given.package, wrong.append))
-    for option in ("svg", "answers"):
+    for option in ("svg", "answers", "html"):
         if getattr(given, option) is not None and found[1:]:
             raise TreeError(f"--{option}: is of one tree; choose it with `--main`: {', '.join(files.main for files in found)}")
     enums = {} if given.enums is None else read_enums(given.enums)
-    answers = Answers({}) if given.answers is None else read_answers(given.answers)
+    answers = Answers({}) if given.answers is None else read_answers(given.answers, given.seed or 0)
     for files in found:
         clock = StepClock()
         try:
@@ -64,10 +69,9 @@ def run(given: argparse.Namespace) -> int:
         except TreeError as error:
             wrong.append(error)
             continue
-        if given.answers is not None:
-            for tick in ticks(tree, answers, TICKS if given.ticks is None else given.ticks, clock):
-                sys.stdout.write((tick.as_json() if given.json else tick.as_text()) + "\n")
         view, title = view_of(tree.root), f"{Path(files.path).name}: {files.main}"
+        if given.answers is not None:
+            tick_through(tree, answers, clock, given, title)
         if given.svg is not None:
             write_text(given.svg, draw(view, title))
         if given.answers is None:
@@ -75,6 +79,20 @@ def run(given: argparse.Namespace) -> int:
     for one in wrong:  # a file of a folder keeps no other from being drawn
         sys.stderr.write(f"{COMMAND}: {one}\n")
     return WRONG if wrong else 0
+
+
+def tick_through(tree: Tree, answers: Answers, clock: StepClock, given: argparse.Namespace, title: str) -> None:
+    """Tick it, tell of each tick, and write the page of them; that has all ticks up to an error, too. Raises TreeError, OSError."""
+    told = None if given.html is None else TreePage(tree)
+    try:
+        for tick in ticks(tree, answers, TICKS if given.ticks is None else given.ticks, clock):
+            text = tick.as_json(trace=given.trace) if given.json else tick.as_text(trace=given.trace)
+            sys.stdout.write(text + "\n")
+            if told is not None:
+                told.add(tick, clock())
+    finally:
+        if told is not None:
+            write_text(given.html, told.text(title))
 
 
 def converted(given: argparse.Namespace) -> int:

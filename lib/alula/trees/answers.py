@@ -1,29 +1,47 @@
-"""Ticks a tree without any robot: its leaves answer what a file says, and what they were asked is written down."""
+"""Ticks a tree without any robot: its leaves answer and write what a file says, and what they were asked is written down.
+
+The file is `{"leaf name": ["RUNNING", "SUCCESS"], ...}`, or has sections besides (docs/how-to/ticking-trees.md): ``answers`` with that,
+``entries`` that are on the blackboard beforehand, ``enums`` of scripts, ``stand_ins`` for nodes with children that only a program has.
+"""
 
 from __future__ import annotations
 
 import json
+import random
+import re
 from collections.abc import Callable, Collection, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from pathlib import Path
 
 from alula.common.errors import AlulaError
-from alula.trees.blackboard import Clock
+from alula.common.json_files import read_object
+from alula.trees.blackboard import Blackboard, Clock
 from alula.trees.document import Element
+from alula.trees.enums import enums_of
 from alula.trees.errors import TickError, did_you_mean
 from alula.trees.factory import make_tree
 from alula.trees.guessing import category_of
 from alula.trees.node import Action, Control, Node, Wiring
 from alula.trees.palette import CHILDREN, Category, Direction, NodeType, Palette, Port, node_type
 from alula.trees.reading import TreeFiles, is_port, node_name, type_name
-from alula.trees.status import ANSWERS, IDLE, NAMES, Answer
+from alula.trees.standard import standard_palette
+from alula.trees.status import ANSWERS, FAILURE, IDLE, NAMES, RUNNING, SUCCESS, Answer, Status
 from alula.trees.tree import Tree
+from alula.trees.values import literal
 
 TICK_NS = 100_000_000
 """Mission clock from one tick to the next, as where a robot is: 10 Hz."""
 SUBTREE = "SubTree"
 NO_CHILDREN = CHILDREN[Category.ACTION]
 WORDS = {name: answer for name, answer in ANSWERS.items() if answer is not IDLE}
+ANY_WORD = "ANY"
+"""An answer that chance gives, by the seed."""
+OTHERS = "*"
+"""The name of all leaves that the answers do not name."""
+SECTIONS = ("answers", "entries", "enums", "stand_ins")
+PASS_THROUGH, RETRY = "pass-through", "retry"
+FORM = '{"leaf name": ["RUNNING", "SUCCESS"], ...}'
+STEP = '{"answer": "SUCCESS", "outputs": {"port": 1}}'
 
 
 class AnswersError(AlulaError):
@@ -31,81 +49,192 @@ class AnswersError(AlulaError):
 
 
 @dataclass(frozen=True)
+class Step:
+    """What a leaf does in one tick: ``answer`` None is any that chance gives; ``outputs`` are written to its ports."""
+
+    answer: Answer | None
+    outputs: Mapping[str, object] = field(default_factory=dict)
+
+
+@dataclass(frozen=True)
+class Change:
+    """A node that has another status after a tick's step than before; ``path`` as BehaviorTree.CPP has it."""
+
+    path: str
+    before: str
+    after: str
+
+    def as_text(self) -> str:
+        """Return it for people."""
+        return f"{self.path}: {self.before} -> {self.after}"
+
+
+@dataclass(frozen=True)
 class Tick:
-    """One tick: what the root answered, and what each leaf was asked: ("start" | "tick" | "halt", its name)."""
+    """One tick.
+
+    Attributes:
+        number: from 1.
+        root: what the root answered.
+        calls: what each leaf was asked: ("start" | "tick" | "halt", its name).
+        changes: of statuses, in their order: answers and halts.
+        written: the entries of the main blackboard that have another value than before.
+    """
 
     number: int
     root: str
     calls: Sequence[tuple[str, str]]
+    changes: Sequence[Change] = ()
+    written: Mapping[str, object] = field(default_factory=dict)
 
-    def as_json(self) -> str:
-        """Return the line that tells of it."""
-        return json.dumps({"tick": self.number, "root": self.root, "calls": self.calls})
+    def as_json(self, *, trace: bool = False) -> str:
+        """Return the line that tells of it; with ``trace`` also changes, and what was written."""
+        told: dict[str, object] = {"tick": self.number, "root": self.root, "calls": self.calls}
+        if trace:
+            told |= {"changes": [[one.path, one.before, one.after] for one in self.changes], "written": self.written}
+        return json.dumps(told, default=str)
 
-    def as_text(self) -> str:
-        """Return a line for people."""
-        return f"tick {self.number}: {self.root}" + "".join(f", {call} {leaf}" for call, leaf in self.calls)
+    def as_text(self, *, trace: bool = False) -> str:
+        """Return a line for people; with ``trace`` also a line for each change, and for each entry that was written."""
+        lines = [f"tick {self.number}: {self.root}" + "".join(f", {call} {leaf}" for call, leaf in self.calls)]
+        if trace:
+            lines += [f"  {one.as_text()}" for one in self.changes]
+            lines += [f"  {name} := {json.dumps(value, default=str)}" for name, value in self.written.items()]
+        return "\n".join(lines)
 
 
 @dataclass
 class Answers:
     """What leaves answer, by their names: one answer a tick of the leaf, the last one from then on."""
 
-    script: Mapping[str, Sequence[Answer]]
+    script: Mapping[str, Sequence[Answer | Step]]
     calls: list[tuple[str, str]] = field(default_factory=list)
+    entries: Mapping[str, object] = field(default_factory=dict)
+    enums: Mapping[str, float] = field(default_factory=dict)
+    stand_ins: Mapping[str, str] = field(default_factory=dict)
+    """What ticks nodes with children that only a program has, by their types: a node of BehaviorTree.CPP, pass-through, or retry."""
+    seed: int = 0
     _given: dict[str, int] = field(default_factory=dict)
 
-    def next(self, leaf: Node, call: str) -> Answer:
-        """Return a leaf's next answer; raises TickError where the file has none for it."""
-        script = self.script.get(leaf.name)
+    def __post_init__(self) -> None:
+        """Have chance begin as the seed says."""
+        self._chance = random.Random(self.seed)  # noqa: S311 - no secret: a run that can be had again
+
+    def of(self, name: str) -> Sequence[Answer | Step] | None:
+        """Return what a leaf answers, None where nothing is said of it."""
+        return self.script.get(name, self.script.get(OTHERS))
+
+    def next(self, leaf: Node, call: str) -> Step:
+        """Return what a leaf does next; raises TickError where the file has nothing for it."""
+        script = self.of(leaf.name)
         if script is None:
-            raise TickError(f'{leaf.place()}: the answers say nothing of \'{leaf.name}\'; add "{leaf.name}": ["SUCCESS"]')
+            cure = f'add "{leaf.name}": ["SUCCESS"], or "{OTHERS}": ["{ANY_WORD}"] for all others'
+            raise TickError(f"{leaf.place()}: the answers say nothing of '{leaf.name}'; {cure}")
         number = self._given.get(leaf.name, 0)
         self._given[leaf.name] = number + 1
         self.calls.append((call, leaf.name))
-        return script[min(number, len(script) - 1)]
+        step = script[min(number, len(script) - 1)]
+        step = step if isinstance(step, Step) else Step(step)
+        return step if step.answer is not None else replace(step, answer=self._any(leaf))
+
+    def _any(self, leaf: Node) -> Answer:
+        is_condition = leaf.wiring.type.category is Category.CONDITION
+        return self._chance.choice((SUCCESS, FAILURE) if is_condition else (RUNNING, SUCCESS, FAILURE))
 
 
-def read_answers(path: Path) -> Answers:
-    """Read ``{"leaf name": ["RUNNING", "SUCCESS"], ...}``; raises AnswersError."""
-    try:
-        content = json.loads(path.read_text(encoding="utf-8"))
-    except OSError as error:
-        raise AnswersError(f"{path}: {error.strerror or error}") from error
-    except (ValueError, RecursionError) as error:
-        raise AnswersError(f"{path}: is no JSON: {error}") from error
-    if not isinstance(content, dict):
-        raise AnswersError(f'{path}: is no object; write {{"leaf name": ["RUNNING", "SUCCESS"], ...}}')
-    return Answers({name: _script(words, f"{path}: '{name}'") for name, words in content.items()})
+def read_answers(path: Path, seed: int = 0) -> Answers:
+    """Read a file of answers, with or without sections; ``seed`` is of those that chance gives. Raises AnswersError."""
+    content = read_object(path, AnswersError, FORM)
+    if not any(isinstance(value, dict) for value in content.values()):
+        return Answers(_scripts(content, str(path)), seed=seed)
+    parts: dict[str, dict[str, object]] = {name: {} for name in SECTIONS}
+    for name, value in content.items():
+        if name not in SECTIONS:
+            raise AnswersError(f"{path}: '{name}' is no section; there are {', '.join(SECTIONS)}")
+        if not isinstance(value, dict):
+            raise AnswersError(f"{path}: the section '{name}' is no object")
+        parts[name] = value
+    for name, value in parts["stand_ins"].items():
+        if not isinstance(value, str):
+            raise AnswersError(f"{path}: stand_ins: '{name}' is {json.dumps(value)}; write {_stands()}")
+    stand_ins = {name: str(value) for name, value in parts["stand_ins"].items()}
+    enums = enums_of(parts["enums"], f"{path}: enums", AnswersError)
+    return Answers(_scripts(parts["answers"], str(path)), entries=parts["entries"], enums=enums, stand_ins=stand_ins, seed=seed)
 
 
-def _script(words: object, where: str) -> list[Answer]:
+def _stands() -> str:
+    return f'"{PASS_THROUGH}", "{RETRY} 3", or the name of a node of BehaviorTree.CPP, as "Fallback"'
+
+
+def _scripts(content: Mapping[str, object], where: str) -> dict[str, list[Answer | Step]]:
+    return {name: _script(words, f"{where}: '{name}'") for name, words in content.items()}
+
+
+def _script(words: object, where: str) -> list[Answer | Step]:
     if not isinstance(words, list) or not words:
         raise AnswersError(f'{where}: is no list of answers; write ["RUNNING", "SUCCESS"]')
-    for word in words:
-        if not isinstance(word, str) or word not in WORDS:
-            raise AnswersError(f"{where}: {json.dumps(word)} is no answer; there are {', '.join(WORDS)}")
-    return [WORDS[word] for word in words]
+    return [_step(word, where) for word in words]
+
+
+def _step(said: object, where: str) -> Step:
+    word, outputs = (said.get("answer"), said.get("outputs", {})) if isinstance(said, dict) else (said, {})
+    if isinstance(said, dict) and (set(said) - {"answer", "outputs"} or not isinstance(outputs, dict)):
+        raise AnswersError(f"{where}: {json.dumps(said)} is no answer; write {STEP}")
+    if not isinstance(word, str) or word not in (*WORDS, ANY_WORD):
+        raise AnswersError(f"{where}: {json.dumps(word)} is no answer; there are {', '.join(WORDS)}, {ANY_WORD}")
+    return Step(WORDS.get(word), outputs)
 
 
 class ScriptedLeaf(Action):
-    """A leaf that answers what a script says."""
+    """A leaf that answers and writes what a script says."""
 
     def __init__(self, wiring: Wiring, answers: Answers) -> None:
         super().__init__(wiring)
         self._answers = answers
 
+    def setup(self) -> None:
+        """Refuse outputs that the node has no port for."""
+        for step in self._answers.of(self.name) or ():
+            for port in step.outputs if isinstance(step, Step) else ():
+                known = self.wiring.type.ports.get(port)
+                outputs = [one.name for one in self.wiring.type.ports.values() if one.direction is not Direction.INPUT]
+                if known is None or port not in outputs:
+                    cure = did_you_mean(port, outputs) or f"its outputs are {', '.join(outputs) or 'none'}"
+                    raise AnswersError(f"the answers have '{self.name}' write the port '{port}', which is no output of it; {cure}")
+
     def on_start(self) -> Answer:
-        """Give the next answer."""
-        return self._answers.next(self, "start")
+        """Do the next step."""
+        return self._do("start")
 
     def on_running(self) -> Answer:
-        """Give the next answer."""
-        return self._answers.next(self, "tick")
+        """Do the next step."""
+        return self._do("tick")
 
     def on_halted(self) -> None:
         """Write it down."""
         self._answers.calls.append(("halt", self.name))
+
+    def _do(self, call: str) -> Answer:
+        step = self._answers.next(self, call)
+        for port, value in step.outputs.items():
+            type_ = self.wiring.type.ports[port].type
+            try:
+                self.put(port, type_.parse(value) if isinstance(value, str) else type_.read(value))
+            except ValueError as error:
+                raise TickError(f"{self.place()}: the answers write the port '{port}': {error}") from None
+        assert step.answer is not None  # noqa: S101 - `next` has chosen
+        return step.answer
+
+
+class PassThrough(Control):
+    """Answers what its only child answers."""
+
+    def update(self) -> Answer:
+        """Tick the child."""
+        answer = self.children[0].execute()
+        if isinstance(answer, Status) and answer is not RUNNING:
+            self.reset_children()
+        return answer
 
 
 class UnknownNode(Control):
@@ -113,22 +242,33 @@ class UnknownNode(Control):
 
     def update(self) -> Answer:
         """Raise TickError."""
-        raise TickError(f"{self.place()}: nothing here ticks a '{self.wiring.type.name}'; only leaves can be scripted")
+        name = self.wiring.type.name
+        stands = f'say in the answers what stands in: "stand_ins": {{"{name}": ...}} with {_stands()}'
+        raise TickError(f"{self.place()}: nothing here ticks a '{name}'; {stands}")
 
 
 def scripted_tree(files: TreeFiles, palette: Palette, answers: Answers, clock: Clock, enums: Mapping[str, float] | None = None) -> Tree:
-    """Build a tree of any file: what the palette does not know is an action, or with children a node that can only be drawn.
+    """Build a tree of any file: what the palette does not know is an action, or with children what stands in for it, or can be drawn.
 
     By the script answer the leaves that it names, and all that only a robot could make. ``enums`` are the numbers of names in scripts.
+    On the blackboard are the answers' entries, and the defaults that the model of the main tree has for its inputs.
 
     Raises:
-        AnswersError: it names what is no leaf of the tree.
+        AnswersError: it names what is no leaf of the tree, no output of a leaf, or what can't stand in.
         TreeError: something is wrong in a file.
     """
-    tree = make_tree(files, _scripted(files, palette, answers), clock, enums=enums)
+    board = Blackboard(clock)
+    model = files.models.get(files.main)
+    for port in () if model is None else model.ports.values():
+        if port.direction is Direction.INPUT and port.default is not None and port.name not in answers.entries:
+            board.set(port.name, literal(port.default))
+    for name, value in answers.entries.items():
+        board.set(name, value)
+    known = {**(enums or {}), **answers.enums}
+    tree = make_tree(files, _scripted(files, palette, answers), clock, enums=known, blackboard=board)
     leaves = {node.name for node in tree.nodes if not node.children}
     for name in answers.script:
-        if name not in leaves:
+        if name not in leaves and name != OTHERS:
             cure = did_you_mean(name, leaves) or f"its leaves are {', '.join(sorted(leaves))}"
             raise AnswersError(f"the answers name '{name}', which is no leaf of the tree; {cure}")
     return tree
@@ -136,11 +276,26 @@ def scripted_tree(files: TreeFiles, palette: Palette, answers: Answers, clock: C
 
 def ticks(tree: Tree, answers: Answers, count: int, clock: StepClock) -> Iterator[Tick]:
     """Tick a tree; raises TreeError when it can't be."""
-    for number in range(1, count + 1):
-        clock.step()
-        answer = tree.tick()
-        yield Tick(number, NAMES[answer], tuple(answers.calls))
-        answers.calls.clear()
+    changes: list[Change] = []
+
+    def note(node: Node, before: Answer, after: Answer) -> None:
+        if after is not IDLE or before is RUNNING:  # what has ended is reset by its parent, which tells nothing
+            changes.append(Change(node.wiring.path, NAMES[before], NAMES[after]))
+
+    unwatch = tree.watch(note)
+    known = dict(tree.blackboard.values())
+    try:
+        for number in range(1, count + 1):
+            clock.step()
+            answer = tree.tick()
+            now = tree.blackboard.values()
+            written = {name: value for name, value in now.items() if name not in known or known[name] != value}
+            known = dict(now)
+            yield Tick(number, NAMES[answer], tuple(answers.calls), tuple(changes), written)
+            answers.calls.clear()
+            changes.clear()
+    finally:
+        unwatch()
 
 
 class StepClock:
@@ -165,10 +320,44 @@ def _scripted(files: TreeFiles, palette: Palette, answers: Answers) -> Palette:
             continue  # a mistake, told when the tree is made
         known = types.get(name) or _guessed(name, uses)
         if known.children != NO_CHILDREN:
-            types[name] = known if known.make is not None else replace(known, make=UnknownNode)
+            types[name] = known if known.make is not None and name not in answers.stand_ins else _standing_in(known, uses, answers)
         elif known.make is None or any(node_name(use) in answers.script for use in uses):
             types[name] = replace(known, make=_leaf_maker(known.make, answers))
+    for name in answers.stand_ins:
+        if name not in types or types[name].children == NO_CHILDREN:
+            having = [one.name for one in types.values() if one.children != NO_CHILDREN and one.make is UnknownNode]
+            cure = did_you_mean(name, having) or f"those that nothing ticks are {', '.join(sorted(having)) or 'none'}"
+            raise AnswersError(f"stand_ins: the tree has no node with children of the type '{name}'; {cure}")
     return Palette(types.values())
+
+
+def _standing_in(known: NodeType, uses: Collection[Element], answers: Answers) -> NodeType:
+    """Return a type with children whose nodes are ticked as the answers say, else not at all."""
+    said = answers.stand_ins.get(known.name, "")
+    if not said:
+        return replace(known, make=UnknownNode)
+    other = _stand_in(said)
+    if other is None:
+        raise AnswersError(f"stand_ins: '{said}' can't stand in for {known.name}; write {_stands()}")
+    least, most = other.children
+    for use in uses:
+        count = len(use.children)
+        if count < least or (most is not None and count > most):
+            wanted = f"{least}" if least == most else f"{least} to {'any number' if most is None else most}"
+            raise AnswersError(f"stand_ins: {said} takes {wanted} children, and {known.name} has {count} at {use.place}")
+    return replace(known, ports={**known.ports, **other.ports}, make=other.make)
+
+
+def _stand_in(said: str) -> NodeType | None:
+    """Return the type that a stand-in names, None where it names none with children."""
+    if said == PASS_THROUGH:
+        return NodeType(PASS_THROUGH, Category.DECORATOR, {}, "", PassThrough, (1, 1))
+    retry = re.fullmatch(rf"{RETRY} ([1-9]\d*|-1)", said)
+    other = standard_palette().get("RetryUntilSuccessful" if retry else said)
+    if other is None or other.make is None or other.children == NO_CHILDREN:
+        return None
+    ports = {one.name: replace(one, default=retry[1]) if retry and one.name == "num_attempts" else one for one in other.ports.values()}
+    return replace(other, ports=ports)
 
 
 def _leaf_maker(make: Callable[[Wiring], Node] | None, answers: Answers) -> Callable[[Wiring], Node]:

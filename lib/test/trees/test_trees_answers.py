@@ -10,6 +10,8 @@ import pytest
 pytest.importorskip("py_trees")
 
 from alula.cli import tree
+from alula.report.page.embedded import entries_inside
+from alula_testing.waits import until as wait_until
 
 FILE = """<root BTCPP_format="4">
   <BehaviorTree ID="Main">
@@ -186,3 +188,142 @@ def test_as_json_each_node_has_its_type_ports_conditions_and_line(alula):
         "conditions": {"_skipIf": "near == 1"},
         "place": "mission.xml:5",
     }
+
+
+# --- context -------------------------------------------------------------------------------------------------------------
+
+CUSTOM = """<root BTCPP_format="4" main_tree_to_execute="Main"><BehaviorTree ID="Main">
+  <Sequence name="fly">{}</Sequence></BehaviorTree>
+  <TreeNodesModel>
+    <Action ID="Find"><output_port name="goal" type="int"/><input_port name="at"/></Action>
+    <Decorator ID="Hold"/><Control ID="Choose"/>
+    <SubTree ID="Main"><input_port name="tries" default="3"/></SubTree>
+  </TreeNodesModel></root>"""
+
+
+def roots(done) -> list[str]:
+    return [one["root"] for one in lines(done)]
+
+
+def test_entries_and_enums_are_there_before_the_first_tick(alula):
+    text = CUSTOM.format('<ScriptCondition code="near + tries == LEADER"/>')
+    answers = {"entries": {"near": 2}, "enums": {"LEADER": 5}}
+    assert roots(alula(text, "--ticks", "1", "--json", answers=answers)) == ["SUCCESS"]
+    assert roots(alula(text, "--ticks", "1", "--json", answers={**answers, "entries": {"near": 2, "tries": 4}})) == ["FAILURE"]
+
+
+def test_a_leaf_writes_its_outputs(alula):
+    text = CUSTOM.format('<Find goal="{goal}" at="x"/><ScriptCondition code="goal == 7"/>')
+    once = {"answer": "SUCCESS", "outputs": {"goal": "7"}}
+    done = alula(
+        text, "--ticks", "2", "--json", "--trace", answers={"answers": {"Find": [once, {"answer": "SUCCESS", "outputs": {"goal": 8}}]}}
+    )
+    first, second = lines(done)
+    assert (first["root"], first["written"], second["root"], second["written"]) == ("SUCCESS", {"goal": 7}, "FAILURE", {"goal": 8})
+
+
+def test_a_trace_tells_answers_halts_and_what_was_written(alula):
+    text = CUSTOM.format('<Find name="find it" goal="{goal}" at="x"/><b/>')
+    found = {"answer": "SUCCESS", "outputs": {"goal": "7"}}
+    code, out, _ = alula(text, "--ticks", "1", "--trace", answers={"answers": {"find it": [found], "b": ["RUNNING"]}})
+    assert code == 0
+    assert out.splitlines() == [
+        "tick 1: RUNNING, start find it, start b",
+        "  fly: IDLE -> RUNNING",
+        "  find it: IDLE -> SUCCESS",
+        "  b::3: IDLE -> RUNNING",
+        "  goal := 7",
+    ]
+    code, out, _ = alula(PLAIN, "--ticks", "2", "--trace", answers={"a": ["SUCCESS", "FAILURE"], "b": ["RUNNING"]})
+    assert "  b::3: RUNNING -> IDLE" in out.splitlines()
+
+
+def test_other_nodes_stand_in_for_those_that_only_a_program_has(alula):
+    held = CUSTOM.format("<Hold><a/></Hold>")
+    answers = {"a": ["FAILURE", "FAILURE", "SUCCESS"]}
+    for stand_in, expected in (("pass-through", "FAILURE"), ("Inverter", "SUCCESS"), ("retry 2", "RUNNING")):
+        found = roots(alula(held, "--ticks", "1", "--json", answers={"answers": answers, "stand_ins": {"Hold": stand_in}}))
+        assert found == [expected], stand_in
+    chosen = CUSTOM.format("<Choose><a/><b/></Choose>")
+    for stand_in, expected in (("Fallback", "SUCCESS"), ("Sequence", "FAILURE")):
+        said = {"answers": {"a": ["FAILURE"], "b": ["SUCCESS"]}, "stand_ins": {"Choose": stand_in}}
+        assert roots(alula(chosen, "--ticks", "1", "--json", answers=said)) == [expected]
+
+
+def test_chance_gives_what_the_seed_says(alula):
+    text = CUSTOM.format("<IsReady/><b/>")
+
+    def ticked(seed: str) -> list[str]:
+        return roots(alula(text, "--ticks", "40", "--json", "--seed", seed, answers={"*": ["ANY"]}))
+
+    assert ticked("1") == ticked("1") != ticked("2")
+    assert set(ticked("1")) == {"RUNNING", "SUCCESS", "FAILURE"}
+
+
+@pytest.mark.parametrize(
+    ("answers", "words"),
+    [
+        ({"entries": {}, "anwsers": {}}, "'anwsers' is no section; there are answers, entries, enums, stand_ins"),
+        ({"entries": {}, "answers": []}, "the section 'answers' is no object"),
+        ({"stand_ins": {"Hold": 1}}, "stand_ins: 'Hold' is 1; write \"pass-through\", "),
+        ({"stand_ins": {"Hold": "Fallbak"}}, "'Fallbak' can't stand in for Hold; write \"pass-through\", "),
+        ({"stand_ins": {"Hold": "retry"}}, "'retry' can't stand in for Hold"),
+        ({"stand_ins": {"Hold": "IfThenElse"}}, "IfThenElse takes 2 to 3 children, and Hold has 1 at "),
+        ({"stand_ins": {"Hol": "Inverter"}}, "no node with children of the type 'Hol'; did you mean Hold?"),
+        ({"enums": {"A B": 1}}, "enums: 'A B' is no name that a script can use"),
+        (
+            {"answers": {"find": [{"answer": "SUCCESS", "outputs": {"goa": 1}}]}},
+            "the port 'goa', which is no output of it; did you mean goal?",
+        ),
+        (
+            {"answers": {"find": [{"answer": "SUCCESS", "outputs": {"at": 1}}]}},
+            "the port 'at', which is no output of it; its outputs are goal",
+        ),
+        ({"answers": {"find": [{"answer": "SUCCESS", "output": {}}]}}, 'is no answer; write {"answer": "SUCCESS", "outputs": {"port": 1}}'),
+        ({"answers": {"*": ["ANY"]}}, "nothing here ticks a 'Hold'; say in the answers what stands in"),
+        ({"stand_ins": {"Hold": "Inverter"}, "answers": {"find": [{"answer": "FAILURE", "outputs": {"goal": "x"}}]}}, "the port 'goal': "),
+    ],
+)
+def test_wrong_sections_are_told_in_a_line(alula, answers, words):
+    text = CUSTOM.format('<Hold><Find name="find" goal="{goal}" at="x"/></Hold>')
+    code, out, err = alula(text, "--json", answers=answers)
+    assert (code, out) == (2, "")
+    assert err.startswith("alula tree: ")
+    assert err.count("\n") == 1
+    assert words in err
+
+
+def test_options_of_ticks_need_answers(alula, tmp_path):
+    for words in (("--trace",), ("--seed", "1"), ("--html", str(tmp_path / "x.html"))):
+        code, _, err = alula(PLAIN, *words)
+        assert code == 2
+        assert f"{words[0]}: goes with --answers FILE" in err
+
+
+def test_a_page_has_a_moment_for_each_tick(alula, tmp_path):
+    page = tmp_path / "ticks.html"
+    assert alula(PLAIN, "--ticks", "2", "--html", str(page), answers={"a": ["SUCCESS"], "b": ["RUNNING", "SUCCESS"]})[0] == 0
+    told = {topic: value for topic, _, value in entries_inside(page.read_text())}
+    assert told["/run"] == {"name": "mission.xml: Main"}
+    assert told["/ticked"] == {"number": 2, "root": "SUCCESS", "text": "tick 2: SUCCESS, start a, tick b"}
+    assert [name for _, _, name, *_ in told["/tree"]] == ["ReactiveSequence", "a", "b"]
+    assert told["/nodes"] == [[0, "SUCCESS", ""], [2, "SUCCESS", ""]]
+
+
+def test_a_page_has_the_ticks_before_an_error(alula, tmp_path):
+    page = tmp_path / "ticks.html"
+    text = CUSTOM.format('<a/><ScriptCondition code="nothing == 1"/>')
+    assert alula(text, "--html", str(page), answers={"a": ["RUNNING", "SUCCESS"]})[0] == 2
+    assert [value["number"] for topic, _, value in entries_inside(page.read_text()) if topic == "/ticked"] == [1]
+
+
+def test_a_reviewer_steps_through_the_ticks(alula, tmp_path, browser):
+    page = tmp_path / "ticks.html"
+    alula(PLAIN, "--ticks", "3", "--html", str(page), answers={"a": ["SUCCESS", "SUCCESS", "FAILURE"], "b": ["RUNNING"]})
+    browser.get(page.as_uri())
+    wait_until(lambda: "3 times" in browser.find_element("id", "headline").text, "the page tells of its ticks")
+    assert not browser.find_element("id", "map-card").is_displayed()
+    wait_until(lambda: "✗ failed" in browser.find_element("id", "tree").text, "the last tick failed")
+    browser.find_element("id", "previous").click()
+    wait_until(lambda: browser.find_element("id", "at").text.endswith("tick 2: RUNNING, start a, tick b"), "the tick before is shown")
+    assert "✗ failed" not in browser.find_element("id", "tree").text

@@ -110,10 +110,14 @@ def tree(parser: ArgumentParser) -> None:
     parser.add_argument("--svg", type=Path, metavar="FILE", help="write the drawing there, too")
     parser.add_argument("--palette", type=Path, action="append", default=[], metavar="FILE", help=PALETTE_HELP)
     _trees(parser)
-    parser.add_argument("--answers", type=Path, metavar="FILE", help='what leaves answer: {"leaf name": ["RUNNING", "SUCCESS"], ...}')
+    answers = 'what leaves answer: {"leaf name": ["RUNNING", "SUCCESS"], ...}, and entries, enums, stand-ins in sections'
+    parser.add_argument("--answers", type=Path, metavar="FILE", help=answers)
+    parser.add_argument("--seed", type=int, metavar="N", help="with answers, of those that chance gives: ANY (0)")
     parser.add_argument("--to", choices=[FORMAT], help="convert a file of BehaviorTree.CPP 3 instead, and tell what is left to decide")
     parser.add_argument("--out", type=Path, metavar="FILE", help="with --to, where it is written (default: the standard output)")
     parser.add_argument("--ticks", type=int, metavar="N", help=f"with answers, how often it is ticked ({TICKS})")
+    parser.add_argument("--trace", action="store_true", help="with answers, tell of each tick what changed: statuses, entries")
+    parser.add_argument("--html", type=Path, metavar="FILE", help="with answers, write a page that steps through the ticks")
     parser.add_argument("--json", action="store_true", help="print the tree, or each tick, as JSON")
 
 

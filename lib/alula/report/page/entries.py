@@ -51,6 +51,8 @@ FACTS = frozenset({RUN, ROUTE, AREAS, MAP, WORLD, SUMMARY, CAUSES, PARTS})
 """Topics of which the last entry counts."""
 NODES = "/nodes"
 """Nodes of the tree that changed: ``[[index, status, message], ...]``; index as in the last tree."""
+TICKED = "/ticked"
+"""A tick of a tree without a robot: ``{number, root, text}``."""
 
 PICTURE = "/picture"
 """A small picture of a camera: ``{camera, jpeg}``, base64; what each shows, the robot's ``page`` says."""

@@ -33,6 +33,7 @@ function headline(run) {
   }
   const mission = last(run.mission.v) ?? {};
   const summary = run.facts["/summary"];
+  if (run.ticked.length) return { text: `Ticked without a robot, ${run.ticked.length === 1 ? "once" : `${run.ticked.length} times`}`, tone: "now", reason: `the last tick: ${last(run.ticked).root}` };
   if (run.begin === null && run.mission.v.length) return { text: "The mission waits for its clock", tone: "now", reason: "" };
   if (run.begin === null) return { text: run.facts["/run"] ? "The run has recorded nothing yet" : "No run yet", tone: "now", reason: "" };
   const outcome = summary?.outcome ?? mission.outcome ?? "running";

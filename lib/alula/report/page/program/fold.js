@@ -63,6 +63,7 @@ function newRun() {
     health: new Map(),
     pictures: new Map(), // camera -> track of JPEGs, base64
     decisions: [],
+    ticked: [], // of a tree that was ticked without a robot: {t, number, root}
     operator: [],
     moments: [], // what the list of events shows: {t, kind, text, bad}
     departure: null, // when the robot left where it began
@@ -112,6 +113,10 @@ const FOLDERS = {
     const name = String(camera);
     if (!run.pictures.has(name)) run.pictures.set(name, newTrack());
     push(run.pictures.get(name), t, jpeg);
+  },
+  "/ticked": (run, t, value) => {
+    run.ticked.push({ t, ...value });
+    moment(run, t, "tick", String(value.text), value.root === "FAILURE");
   },
   "/decisions": (run, t, value) => run.decisions.push({ t, ...value }),
   "/operator": (run, t, value) => {

@@ -26,6 +26,7 @@ function draw() {
 
 function show() {
   const t = moment_();
+  document.body.classList.toggle("ticked", run.ticked.length > 0); // which has no skills, no map and no figures
   showAccount();
   showState(t);
   showScrub(t);
