@@ -122,7 +122,10 @@ def checked_files(
     read = models.check_files(list(paths), standard_input)
     for model in read:
         check_fields(model)
-    return [*read, *_checked_missions(list(missions), list(map(Path, palettes)), library, main, enums, tell)]
+    checked = _checked_missions(list(missions), list(map(Path, palettes)), library, main, enums, tell)
+    for file in checked:
+        file.named = file.path in {str(Path(place)) for place in places}
+    return [*read, *checked]
 
 
 def prove_files(files: Sequence[ModelFile], timeout_s: float, *, closed_world: bool = False, tell: Tell = ignore) -> None:
@@ -183,9 +186,15 @@ def _not_begun(skillsets: Sequence[Skillset], timeout_s: float) -> Diagnostic:
 
 @dataclass
 class CheckedMission(ModelFile):
-    """A mission with its findings; ``source`` is where it is read from, for whoever proves or plays it."""
+    """A mission with its findings.
+
+    Attributes:
+        source: where it is read from, for whoever proves or plays it.
+        named: it was asked for itself, and not found in a folder.
+    """
 
     source: TreeSource = field(kw_only=True)
+    named: bool = field(kw_only=True)
 
 
 def _checked_missions(
@@ -205,7 +214,7 @@ def _checked_missions(
     for path in map(Path, paths):
         mine = main if path.resolve() in {Path(one.place.path).resolve() for one in library.trees.get(main, ())} or len(paths) == 1 else ""
         source = TreeSource(path, robot.library(path, library), mine, enums, types)
-        files[path.resolve()] = CheckedMission(str(path), source=source)
+        files[path.resolve()] = CheckedMission(str(path), source=source, named=True)
     for file in files.values():
         for finding in _checked(file.source, robot, palettes, tell):
             its = files.get(Path(finding.span.file).resolve(), file)  # one file's tree is checked in another, too, that uses it
@@ -237,13 +246,24 @@ def prove_missions(files: Sequence[CheckedMission], timeout_s: float, tell: Tell
     robot = _robot(ignore)  # what is to be told of it was told when they were checked
     skillsets, part = robot.skillsets, robot.part or NO_PART
     faults = states_of_faults(skillsets, tell) if skillsets else {}
-    for file in sound if skillsets else []:
+    for file in sound:
         source = file.source
-        if not robot.has(source.path, read_source(source.path)) or source.read(ignore_problem, whole=False).is_part:
-            continue  # a tree of another program, or a part of other missions, which are looked at
+        own = robot.has(source.path, read_source(source.path))
+        if (own and not skillsets) or not (own or _is_known(file)) or source.read(ignore_problem, whole=False).is_part:
+            continue  # what can't be looked at, or a part of other missions, which are looked at
         report = partial(_tell_runs, tell, file.path)
-        proved = prove_mission(source, skillsets, part, faults=faults, timeout_s=timeout_s, tell=report)
+        proved = prove_mission(source, skillsets if own else (), part if own else NO_PART, faults=faults, timeout_s=timeout_s, tell=report)
         file.findings += [*proved.findings, *map(_accepted, proved.accepted)]
+
+
+_UNKNOWN = frozenset({"ALU601", "ALU607"})
+"""What a tree of another program lacks: nodes that nobody declares, entries that the program writes."""
+
+
+def _is_known(file: CheckedMission) -> bool:
+    """Tell whether the runs of a tree of another program are looked at: it is named, has a main tree, and lacks no node and no entry."""
+    files = file.source.read(ignore_problem, whole=False)
+    return file.named and bool(files.main) and not any(one.code in _UNKNOWN for one in file.findings)
 
 
 def _accepted(finding: Diagnostic) -> Diagnostic:

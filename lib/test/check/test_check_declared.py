@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import pytest
 
+from alula.api.checking import checked_files, prove_files
 from alula.check.findings import findings_of
 from alula.language.errors import Severity
 from alula.language.models import ModelFile, check_texts
@@ -113,3 +114,45 @@ def test_proofs_take_it_for_a_node_that_may_do_anything(robot, tmp_path):
     codes = [one.code for one in (*proved.findings, *proved.accepted)]
     assert "ALU711" not in codes
     assert not [one for one in proved.findings if "never ticked" in one.message]
+
+
+OTHERS = """<root BTCPP_format="4" main_tree_to_execute="Main"><BehaviorTree ID="Main">
+  <Sequence><Script code="x := 1"/><Find goal="{goal}"/><ScriptCondition code="x == 1"/><Goto goal="{goal}"/></Sequence>
+  </BehaviorTree></root>"""
+NODES = """<root BTCPP_format="4"><TreeNodesModel>
+  <Action ID="Find"><output_port name="goal"/></Action><Action ID="Goto"><input_port name="goal"/></Action>
+  </TreeNodesModel></root>"""
+
+
+def proved_of_others(folder, text, *palettes, place=None):
+    """Return codes and severities of what is found about a tree of another program."""
+    path = folder / "tree.xml"
+    path.write_text(text)
+    files = checked_files([str(place or path)], palettes=list(map(str, palettes)))
+    prove_files(files, 20.0)
+    return [(one.code, one.severity.value) for file in files for one in file.findings]
+
+
+def test_the_runs_of_a_tree_of_others_are_looked_at_where_it_is_named_and_lacks_nothing(tmp_path):
+    palette = tmp_path / "palettes/nodes.xml"
+    palette.parent.mkdir()
+    palette.write_text(NODES)
+    (tmp_path / "trees").mkdir()
+    found = proved_of_others(tmp_path / "trees", OTHERS, palette)
+    assert sorted(found) == [("ALU706", "warning"), ("ALU715", "note"), ("ALU715", "note")]  # always true; Find, Goto
+    assert proved_of_others(tmp_path / "trees", OTHERS, palette, place=tmp_path / "trees") == []
+    assert "ALU711" not in {code for code, _ in proved_of_others(tmp_path / "trees", OTHERS)}
+    unwritten = OTHERS.replace('<Goto goal="{goal}"/>', '<ScriptCondition code="unwritten == 1"/>')
+    assert not {"ALU706", "ALU711"} & {code for code, _ in proved_of_others(tmp_path / "trees", unwritten, palette)}
+
+
+def test_the_time_of_a_search_bounds_a_tick_of_many_leaves_that_may_answer_anything(tmp_path):
+    """Twenty leaves that may be skipped or succeed are a million ways of one tick."""
+    leaves = "".join(f'<Find goal="{{g{number}}}"/>' for number in range(20))
+    models = '<TreeNodesModel><Action ID="Find"><output_port name="goal"/></Action></TreeNodesModel>'
+    body = f'<BehaviorTree ID="Main"><Sequence>{leaves}</Sequence></BehaviorTree>'
+    text = f'<root BTCPP_format="4" main_tree_to_execute="Main">{body}{models}</root>'
+    path = tmp_path / "tree.xml"
+    path.write_text(text)
+    proved = prove_mission(path, (), NO_PART, timeout_s=1.0)
+    assert "ALU710" in {one.code for one in proved.findings}

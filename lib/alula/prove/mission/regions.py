@@ -127,7 +127,7 @@ class Regions:
 
         Those that few ticks lead to come first; the last is the one that was looked for.
         """
-        self.system.ticker.deadline = self.deadline if self.system.own.names_of_any_order else None
+        self.system.ticker.deadline = self.deadline if any(one.why_not for one in self.system.own.taken) else None
         try:
             self.complete = self._explore(begin or self.system.initial(), until)
         finally:
