@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import re
-from collections.abc import Iterator
+from collections.abc import Iterator, Mapping
 from contextlib import suppress
 from dataclasses import replace
 from pathlib import Path
@@ -12,6 +12,7 @@ from alula.check.findings import findings_of
 from alula.check.skills import Skills
 from alula.common.robots import RobotError, find_robot
 from alula.editor.completion import Completion, Place
+from alula.editor.tree_names import TreeFolder
 from alula.language.errors import Diagnostic, Severity
 from alula.language.messages import FieldError, messages_of
 from alula.language.models import ModelFile, check_files, models_in
@@ -20,14 +21,18 @@ from alula.missions.part import NO_PART, MissionPart
 from alula.missions.skill_types import SUCCESS_PORT
 from alula.missions.world import FUNCTIONS
 from alula.model.model import ResultKind, Skill, Skillset
-from alula.trees.palette import NodeType
+from alula.trees.palette import Category, NodeType, Palette
 from alula.trees.reading import POSTCONDITIONS, PRECONDITIONS
 
 SUFFIX = ".xml"
 UNKNOWN_NODE = "ALU601"
+Opened = Mapping[Path, tuple[object, str]]
+"""The texts that the editor has, by their paths, each with its version."""
+NOTHING_OPEN: Opened = {}
 _TAG = re.compile(r"<([\w.]*)$")
 _VALUE = re.compile(r"""([\w:]+)\s*=\s*(?:"([^"]*)|'([^']*))$""")
 _OPEN = re.compile(r"""<([\w.]+)((?:\s+[\w:]+\s*=\s*(?:"[^"]*"|'[^']*'))*)\s*([^<>]*)$""")
+_ID = re.compile(r"""\bID\s*=\s*["']([^"']*)""")
 _STATE = re.compile(r"(\w+)\.(\w+)\s*(?:==|!=)\s*'?\w*$")
 _CALL = re.compile(r"(\w+)\(\s*[\w.]*$")
 _MEMBER = re.compile(r"(\w+)\.((?:\w+\.)*)\w*$")
@@ -44,14 +49,26 @@ class Missions:
 
     def __init__(self, *, trusted: bool = False) -> None:
         self.trusted = trusted
+        self._folders: dict[Path, TreeFolder] = {}
         self._read: dict[tuple[tuple[str, int], ...], tuple[Skillset, ...]] = {}
 
-    def checked(self, path: str, text: str) -> ModelFile:
-        """Return a mission with its findings."""
+    def folder(self, path: str, opened: Opened) -> TreeFolder:
+        """Return the trees around a file as they are now; ``opened`` are the texts that the editor has."""
+        made = TreeFolder.around(Path(path))
+        folder = self._folders.setdefault(made.place, made)
+        folder.refresh(opened)
+        return folder
+
+    def checked(self, path: str, text: str, opened: Opened = NOTHING_OPEN) -> ModelFile:
+        """Return a mission with its findings; the trees around it are a library for it."""
         file = ModelFile(path, text)
         skills = self.skills(path)
         skillsets = tuple(skills.skillsets.values())
-        found = findings_of(path, text.encode("utf-8", "replace"), skillsets, part=self._part(path), messages=skills.messages)
+        library = self.folder(path, opened).library() if Path(path).is_absolute() else None
+        others = not self._has_robot(path)
+        part, source = self._part(path), text.encode("utf-8", "replace")
+        found = findings_of(path, source, skillsets, part=part, messages=skills.messages, library=library, of_others=others)
+        found = [one for one in found if one.span.file == path]  # what is wrong in another file is told there
         file.findings = [_perhaps_own(one) for one in found] if self._has_untrusted_part(path) else found
         return file
 
@@ -67,11 +84,12 @@ class Missions:
             self._read = {stamps: tuple(skillset for file in check_files(places) for skillset in file.skillsets)}
         return Skills(self._read[stamps], messages_of(robot))
 
-    def completions(self, file: ModelFile, place: Place) -> list[Completion]:
+    def completions(self, file: ModelFile, place: Place, opened: Opened = NOTHING_OPEN) -> list[Completion]:
         """Return what may stand at a place."""
+        folder = self.folder(file.path, opened)
         lines = file.text.split("\n")[: place.line]
         before = "\n".join([*lines[:-1], lines[-1][: place.column - 1]]) if lines else ""
-        return list(_candidates(before, self.skills(file.path), self._part(file.path)))
+        return list(_candidates(before, self.skills(file.path), self._part(file.path), folder))
 
     def description(self, file: ModelFile, place: Place) -> tuple[str, int, int] | None:
         """Return what the name at a place stands for, with its first column and the one behind it; None where nothing is known."""
@@ -91,6 +109,12 @@ class Missions:
         except RobotError:
             return NO_PART
 
+    def _has_robot(self, path: str) -> bool:
+        try:
+            return find_robot(Path(path).parent) is not None
+        except RobotError:
+            return False
+
     def _has_untrusted_part(self, path: str) -> bool:
         try:
             return not self.trusted and "missions" in find_robot(Path(path).parent).parts
@@ -105,8 +129,10 @@ def _perhaps_own(finding: Diagnostic) -> Diagnostic:
     return replace(finding, severity=Severity.NOTE, message=f"{finding.message}, unless it is the robot's own", hint=cure)
 
 
-def _candidates(before: str, skills: Skills, part: MissionPart) -> Iterator[Completion]:
+def _candidates(before: str, skills: Skills, part: MissionPart, folder: TreeFolder) -> Iterator[Completion]:
     types = mission_palette(tuple(skills.skillsets.values()), part)
+    declared = [one for one in folder.models.values() if one.category is not Category.SUBTREE and types.get(one.name) is None]
+    types = types | Palette(declared)
     if _TAG.search(before):
         yield from (Completion(one.name, "skill" if skills.get(one.name) else "keyword", one.doc) for one in types)
         return
@@ -114,6 +140,12 @@ def _candidates(before: str, skills: Skills, part: MissionPart) -> Iterator[Comp
     if opened is None:
         return
     node, value = types.get(opened[1]), _VALUE.search(before)
+    if opened[1] == Category.SUBTREE.value:
+        used = _ID.search(opened[2])
+        node = folder.models.get(used[1]) if used else None
+        if value is not None and value[1] == "ID":
+            yield from (Completion(name, "skill", str(found[0].place)) for name, found in sorted(folder.trees.items()))
+            return
     if value is not None:
         yield from _values(value[1], value[2] or value[3] or "", opened[1], skills)
     elif node is not None:

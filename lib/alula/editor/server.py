@@ -1,8 +1,8 @@
 """`alula editor`: a language server over the standard streams, for editors.
 
 It tells the checker's findings on every change and the proofs' when a file is saved, completes, shows and renames names, finds where
-they are defined and used, lists symbols, indents, and offers the hints of findings as changes. Of missions (*.xml) it tells the
-findings, completes and shows names.
+they are defined and used, lists symbols, indents, and offers the hints of findings as changes. Of missions (*.xml) it does
+so with the trees of the whole folder, too.
 """
 
 from __future__ import annotations
@@ -17,9 +17,10 @@ from pygls.lsp.server import LanguageServer
 from pygls.uris import from_fs_path, to_fs_path
 
 from alula.editor import names
-from alula.editor.completion import Place, completions
+from alula.editor.completion import Completion, Place, completions
 from alula.editor.missions import SUFFIX, Missions
 from alula.editor.occurrences import Occurrence
+from alula.editor.tree_names import TreeFolder, TreeName
 from alula.language.check.fields import check_fields
 from alula.language.errors import Diagnostic, Severity, has_errors
 from alula.language.layout import formatted
@@ -74,9 +75,19 @@ class SkillLanguageServer(LanguageServer):
         known = self._files.get(uri)
         if known is None or known[0] != document.version:
             path, text = self._text(uri)
-            file = self.missions.checked(path, text) if is_mission(uri) else _checked(ModelFile(path, text))
+            file = self.missions.checked(path, text, self.opened()) if is_mission(uri) else _checked(ModelFile(path, text))
             known = self._files[uri] = (document.version, file)
         return known[1]
+
+    def opened(self) -> dict[Path, tuple[object, str]]:
+        """Return the missions that are open, by their paths, each with its version and text."""
+        missions = [(uri, one) for uri, one in self.workspace.text_documents.items() if is_mission(uri)]
+        return {Path(path): (one.version, self._text(uri)[1]) for uri, one in missions if (path := to_fs_path(uri))}
+
+    def model_file(self, path: str) -> tuple[str, ModelFile]:
+        """Return the URI and the text of a file, as the editor or else the disk has it."""
+        uri = from_fs_path(path) or path
+        return uri, ModelFile(*self._text(uri))
 
     def robot(self, uri: str) -> dict[str, ModelFile]:
         """Return all models of a document's folder by their URI, as the editor or else the disk has them, read together."""
@@ -124,6 +135,23 @@ def _asked(ls: SkillLanguageServer, document: lsp.TextDocumentIdentifier, positi
     place = _place(file, position)
     found = names.occurrence_at(file, place.line, place.column)
     return None if found is None else _Asked(document.uri, file, found)
+
+
+def _asked_in_trees(
+    ls: SkillLanguageServer, document: lsp.TextDocumentIdentifier, position: lsp.Position
+) -> tuple[TreeFolder, TreeName] | None:
+    """Return the name of a tree, a node or an entry in a mission that a request is about, with the trees around the file."""
+    file = ls.file(document.uri) if is_mission(document.uri) else None
+    if file is None:
+        return None
+    folder, place = ls.missions.folder(file.path, ls.opened()), _place(file, position)
+    found = folder.at(Path(file.path), place.line, place.column)
+    return None if found is None else (folder, found)
+
+
+def _location(ls: SkillLanguageServer, span: Span) -> lsp.Location:
+    uri, file = ls.model_file(span.file)
+    return lsp.Location(uri=uri, range=_range(file, span))
 
 
 # --- findings ---------------------------------------------------------------------------------------------------------
@@ -188,8 +216,10 @@ def _diagnostic(file: ModelFile, finding: Diagnostic) -> lsp.Diagnostic:
 def completion(ls: SkillLanguageServer, params: lsp.CompletionParams) -> lsp.CompletionList:
     """Return the names that may stand at the cursor."""
     file = ls.file(params.text_document.uri)
-    complete = ls.missions.completions if is_mission(params.text_document.uri) else completions
-    found = complete(file, _place(file, params.position)) if file is not None else []
+    found: list[Completion] = []
+    if file is not None:
+        place = _place(file, params.position)
+        found = ls.missions.completions(file, place, ls.opened()) if is_mission(params.text_document.uri) else completions(file, place)
     items = [lsp.CompletionItem(label=c.label, kind=_COMPLETION_KIND[c.kind], detail=c.detail or None) for c in found]
     return lsp.CompletionList(is_incomplete=False, items=items)
 
@@ -221,6 +251,9 @@ def _hover_in_mission(ls: SkillLanguageServer, params: lsp.HoverParams) -> lsp.H
 @server.feature(lsp.TEXT_DOCUMENT_DEFINITION)
 def go_to_definition(ls: SkillLanguageServer, params: lsp.DefinitionParams) -> lsp.Location | None:
     """Return where the name under the pointer is defined."""
+    if (in_trees := _asked_in_trees(ls, params.text_document, params.position)) is not None:
+        place = in_trees[0].definition(in_trees[1])
+        return None if place is None else _location(ls, place)
     asked = _asked(ls, params.text_document, params.position)
     span = names.definition(asked.file, asked.name.entity) if asked else None
     return lsp.Location(uri=asked.uri, range=_range(asked.file, span)) if asked and span else None
@@ -229,6 +262,9 @@ def go_to_definition(ls: SkillLanguageServer, params: lsp.DefinitionParams) -> l
 @server.feature(lsp.TEXT_DOCUMENT_REFERENCES)
 def find_references(ls: SkillLanguageServer, params: lsp.ReferenceParams) -> list[lsp.Location]:
     """Return all places of what the name under the pointer stands for."""
+    if (in_trees := _asked_in_trees(ls, params.text_document, params.position)) is not None:
+        uses = in_trees[0].uses(in_trees[1])
+        return [_location(ls, one.span) for one in uses if params.context.include_declaration or not one.defining]
     asked = _asked(ls, params.text_document, params.position)
     if asked is None:
         return []
@@ -240,6 +276,8 @@ def find_references(ls: SkillLanguageServer, params: lsp.ReferenceParams) -> lis
 @server.feature(lsp.TEXT_DOCUMENT_RENAME)
 def rename(ls: SkillLanguageServer, params: lsp.RenameParams) -> lsp.WorkspaceEdit | None:
     """Return the changes that give the name under the pointer another one."""
+    if (in_trees := _asked_in_trees(ls, params.text_document, params.position)) is not None:
+        return _renamed_in_trees(ls, *in_trees, params.new_name)
     asked = _asked(ls, params.text_document, params.position)
     if asked is None:
         return None
@@ -252,6 +290,18 @@ def rename(ls: SkillLanguageServer, params: lsp.RenameParams) -> lsp.WorkspaceEd
     changed = {uri: (file, places[file.path]) for uri, file in files.items() if file.path in places}
     edits = {uri: [lsp.TextEdit(_range(file, one), name) for one in spans] for uri, (file, spans) in changed.items()}
     return lsp.WorkspaceEdit(changes=edits | (_types_renamed(asked.uri, entity.name, name) if entity.kind == "type" else {}))
+
+
+def _renamed_in_trees(ls: SkillLanguageServer, folder: TreeFolder, asked: TreeName, name: str) -> lsp.WorkspaceEdit:
+    try:
+        changes = folder.renamed(asked, name)
+    except names.RenameError as error:
+        raise JsonRpcInvalidParams(str(error)) from error
+    edits: dict[str, list[lsp.TextEdit]] = {}
+    for path, places in changes.items():
+        uri, file = ls.model_file(path)
+        edits[uri] = [lsp.TextEdit(_range(file, span), text) for span, text in places]
+    return lsp.WorkspaceEdit(changes=edits)
 
 
 def _types_renamed(uri: str, before: str, after: str) -> dict[str, list[lsp.TextEdit]]:
