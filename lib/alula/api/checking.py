@@ -330,9 +330,7 @@ def _checked(mission: TreeSource, robot: _Robot, palettes: Sequence[Path], tell:
         own = robot if robot.has(mission.path, source) else _Robot()
         others = own.root is None
         part = own.part or NO_PART
-        found = findings_of(
-            path, source, own.skillsets, palettes, part, own.messages, library, mission.main, of_others=others, enums=enums
-        )
+        found = findings_of(path, source, own.skillsets, palettes, part, own.messages, library, mission.main, of_others=others, enums=enums)
     except FileError as error:
         found = [Diagnostic("ALU001", error.problem.message, Span(path, 0, 0, 0))]
     for finding in found:
