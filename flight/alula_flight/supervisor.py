@@ -30,7 +30,7 @@ from alula_flight.launch import launch_arguments, launch_file
 from alula_flight.mission_clock import MissionClock
 from alula_flight.outcome import GIVEN_UP, finish
 from alula_flight.process_faults import ProcessFaults, Started, process_faults_of
-from alula_flight.waits import Beginning
+from alula_flight.waits import Beginning, Held
 
 OF_EVERY_ROBOT = {"mission": Consequence.REST, "master": Consequence.ABORT}
 """What the death of a process means whose name is the same in every run; the robot's part knows of the others."""
@@ -118,6 +118,7 @@ class Supervisor:
         self._asked_to_end: signal.Signals | None = None
         self._began_s: float | None = None  # mission clock
         self._beginning = Beginning(spec, part, self._clock)
+        self._held = Held(spec, part, self._clock)
         self._departure = Departure(self._out)
         self._front = os.getppid()
         self._front_died = False
@@ -199,15 +200,12 @@ class Supervisor:
     def _until_over(self, launch: Any) -> int:
         abort_since: float | None = None
         while True:
-            self._watch.changed.wait(timeout=0.2)
-            self._watch.changed.clear()
-            self._look_for_the_front()
+            self._look()
             self._beginning.look()
-            self._apply_faults()
-            self._watch.look()
+            held = self._held.look()
             if self._watch.mission_exit is not None:
-                if self._watch.mission_exit != 0 or self._serves:
-                    self._part.bring_to_rest(self._clock)  # what the mission could not, or there was none
+                if self._watch.mission_exit != 0 or self._serves or held:
+                    self._bring_to_rest()  # what the mission could not, or there was none
                 return self._watch.mission_exit if self._watch.worst is Consequence.GO_ON else GIVEN_UP
             if self._clock.stands_still:
                 self._ends(f"{self._clock.standstill}: nothing came from {self._part.clock_source(self._spec)}")
@@ -218,16 +216,45 @@ class Supervisor:
             if self._watch.worst is Consequence.REST:
                 if process_of(launch.pm, "mission") is not None:
                     self._ends(self._watch.worst_death)
-                self._part.bring_to_rest(self._clock)
+                self._bring_to_rest()
                 return GIVEN_UP
-            asked = self._asked_to_end is not None or self._front_died or self._watch.worst is Consequence.ABORT or self._over_time
-            if asked and abort_since is None:
+            if (self._told_to_end or self._watch.worst is Consequence.ABORT) and abort_since is None:
                 abort_since = time.monotonic()
                 self._note_abort()
                 self._abort_mission(launch)
             if abort_since is not None and time.monotonic() - abort_since > ABORT_TIMEOUT_S:
                 log.error("the mission did not end within %.0f s after it was told to", ABORT_TIMEOUT_S)
                 return GIVEN_UP
+
+    @property
+    def _told_to_end(self) -> bool:
+        """Tell whether somebody, or the run's limit, wants the run to end."""
+        return self._asked_to_end is not None or self._front_died or self._over_time
+
+    def _look(self) -> None:
+        """Wait a moment, and look what is new."""
+        self._watch.changed.wait(timeout=0.2)
+        self._watch.changed.clear()
+        self._look_for_the_front()
+        self._apply_faults()
+        self._watch.look()
+
+    def _bring_to_rest(self) -> None:
+        """Have the part bring the robot to rest; where somebody else has it, go on until it is at rest, or it can be brought there.
+
+        No run that was told to end before does so, and being told ends it: then somebody knows how it is.
+        """
+        told_before = self._told_to_end
+        while True:
+            held = self._held.look()
+            self._part.bring_to_rest(self._clock)
+            # Looked at before and after: it may have been given back just after the part had found that it was not ours.
+            if not (held or self._held.look()) or told_before or self._clock.stands_still or self._watch.worst is Consequence.END:
+                return
+            if self._told_to_end:
+                self._note_abort()
+                return
+            self._look()
 
     def _apply_faults(self) -> None:
         """Have faults of processes begin and end, as far as the ticks of the mission clock don't."""

@@ -1,16 +1,17 @@
-"""What a run waits for before it can begin: found by the supervisor, said by the front and by the verdict."""
+"""What a run waits for before it can begin, and who else has the robot at its end: found by the supervisor, said by the front."""
 
 from __future__ import annotations
 
 import time
 from pathlib import Path
 
-from alula.common.run_log import note_wait
+from alula.common.run_log import note_held, note_wait
 from alula.runtime.live.part import RunPart
 from alula.runtime.live.spec import RunSpec
 from alula_flight.mission_clock import MissionClock
 
 TELL_CLOCK_S, LOOK_S = 5.0, 1.0  # wall clock until it is told that time has not begun, and how often it is looked
+TELL_HELD_S = 10.0  # mission clock; how often it is told that somebody else has the robot
 
 
 class Beginning:
@@ -42,3 +43,27 @@ class Beginning:
         if self._clock.simulated and not self._clock.began and time.monotonic() >= self._began_s + TELL_CLOCK_S:
             words = [f"{self._part.clock_source(self._spec)}, whose first step begins the mission clock", *words]
         return words
+
+
+class Held:
+    """Follows a robot that somebody else has, and writes down how it is: every 10 s, the first time after as many."""
+
+    def __init__(self, spec: RunSpec, part: RunPart, clock: MissionClock) -> None:
+        self._out = Path(spec.out_dir)
+        self._part = part
+        self._clock = clock
+        self._since_s = 0.0
+        self._told_s: float | None = None
+        """When it was told last, or when it began; None: nobody else has the robot."""
+
+    def look(self) -> bool:
+        """Write down what is due; return whether somebody else has the robot."""
+        words, now_s = self._part.held(self._clock), self._clock.now_s
+        if not words or now_s is None:
+            self._told_s = None
+        elif self._told_s is None:
+            self._since_s = self._told_s = now_s
+        elif now_s - self._told_s >= TELL_HELD_S:
+            self._told_s = now_s
+            note_held(self._out, now_s, f"{words}, for {now_s - self._since_s:.0f} s")
+        return bool(words)

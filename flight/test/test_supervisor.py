@@ -3,15 +3,17 @@
 from __future__ import annotations
 
 import signal
-from collections.abc import Mapping
+from collections.abc import Callable, Iterator, Mapping
 from dataclasses import dataclass, field
 from pathlib import Path
 from types import SimpleNamespace
 
 import pytest
 
+from alula.common.run_log import read_held
 from alula.report.deaths import read_deaths
 from alula.report.ends import OPERATOR, SIGNAL, SUPERVISOR, ReportedEnd, note_end, read_end
+from alula.report.live import LiveEvents
 from alula.runtime.live.part import DEAD_S, Clock, Consequence, RunPart
 from alula.runtime.live.spec import RunSpec
 from alula_flight import mission_clock, supervisor
@@ -47,9 +49,14 @@ class Part(RunPart):
     stays_dead: Mapping[str, Consequence] = {"ros_bridge": Consequence.REST}
 
     rested = 0
+    hold: Iterator[str] = iter(())
+    """What is said of who else has it, one a look; at the end nobody has."""
 
     def clock_source(self, spec: RunSpec) -> str:
         return "the simulator"
+
+    def held(self, clock: Clock) -> str:
+        return next(self.hold, "")
 
     def bring_to_rest(self, clock: Clock) -> None:
         self.rested += 1
@@ -158,3 +165,67 @@ def test_a_front_that_has_died_is_named(flight: Flight, tmp_path: Path) -> None:
     flight.signalled(signal.SIGTERM)  # by the kernel
     flight.ends()
     assert read_end(tmp_path) == ReportedEnd(SUPERVISOR, "the front has died")
+
+
+BRAKE = "a failsafe has it, in BRAKE"
+
+
+class Hovering:
+    """Somebody else has the robot: each look is two seconds of mission clock later, and after some of them something happens."""
+
+    def __init__(self, flight: Flight, looks: int, then: Callable[[], object] = lambda: None) -> None:
+        self.flight, self.looks, self.then = flight, looks, then
+        self.seen = 0
+
+    def __iter__(self) -> Iterator[str]:
+        while self.seen < self.looks:
+            self.seen += 1
+            self.flight.clock(100.0 + 2.0 * self.seen)
+            yield BRAKE
+        self.then()
+
+
+@pytest.mark.parametrize("code", [0, 1])
+def test_a_run_goes_on_as_long_as_somebody_else_has_the_robot(code: int, flight: Flight, tmp_path: Path) -> None:
+    flight.part.hold = iter(Hovering(flight, 16))
+    flight.supervisor._watch.mission_exit = code
+    assert flight.ends() == code
+    assert flight.part.rested >= 8, "it is tried at each look, for it may be given back"
+    assert read_held(tmp_path) == [f"{BRAKE}, for 10 s", f"{BRAKE}, for 20 s", f"{BRAKE}, for 30 s"]
+    said: list[str] = []
+    live = LiveEvents(tmp_path, said.append)
+    for _ in range(2):
+        live.show_new()
+    assert said == [f"waiting: {how}" for how in read_held(tmp_path)], "each is said once"
+
+
+def test_who_wants_a_run_to_end_that_watches_ends_it(flight: Flight, tmp_path: Path) -> None:
+    def stop() -> Iterator[str]:
+        yield from Hovering(flight, 5, lambda: flight.signalled(signal.SIGTERM))
+        while True:
+            yield BRAKE
+
+    flight.part.hold = stop()
+    flight.supervisor._watch.mission_exit = 1
+    assert flight.ends() == 1
+    assert read_end(tmp_path) == ReportedEnd(SIGNAL, "SIGTERM to the supervisor", 110.0)
+
+
+def test_who_has_told_a_run_to_end_before_its_mission_ended_waits_no_longer(flight: Flight) -> None:
+    flight.part.hold = iter(Hovering(flight, 1000))
+    flight.signalled(signal.SIGINT)
+    flight.supervisor._watch.mission_exit = 1
+    assert flight.ends() == 1
+    assert flight.part.rested == 1
+
+
+def test_a_limit_ends_a_run_that_watches(tmp_path: Path) -> None:
+    flight = Flight(tmp_path, limit_s=20.0)
+    flight.clock(99.0)
+    assert not flight.supervisor._over_time
+    flight.part.hold = iter(Hovering(flight, 1000))
+    flight.supervisor._watch.mission_exit = 1
+    assert flight.ends() == 1
+    end = read_end(tmp_path)
+    assert end is not None
+    assert end.why == "its limit of 20 s is over"

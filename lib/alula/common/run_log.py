@@ -19,8 +19,9 @@ from alula.common.record import Entry
 FILE = "run_log.jsonl"
 PICTURES_FILE = "pictures.jsonl"
 """Beside it: small pictures of what the robot's cameras see, a line each, ``{stamp_s, camera, jpeg}``."""
-DEATH, AGAIN, FAULT, WAIT, ACT, END, MOCKED, MISSION = "death", "again", "fault", "wait", "act", "end", "mocked", "mission"
-"""The kinds of lines: see ``alula.report.deaths``, ``alula.common.faults.FaultChange``, ``read_waits``, ``note_act``,
+DEATH, AGAIN, FAULT, WAIT, HELD, ACT = "death", "again", "fault", "wait", "held", "act"
+END, MOCKED, MISSION = "end", "mocked", "mission"
+"""The kinds of lines: see ``alula.report.deaths``, ``alula.common.faults.FaultChange``, ``read_waits``, ``note_held``, ``note_act``,
 ``alula.report.ends``, ``note_mocked`` and ``account``."""
 
 
@@ -53,6 +54,16 @@ def note_wait(out: Path, what: str, *, over: bool) -> None:
 def read_waits(out: Path) -> dict[str, bool]:
     """Return what a run waited for, each with whether it came."""
     return {str(one.get("for")): bool(one.get("over")) for one in read(out, WAIT)}
+
+
+def note_held(out: Path, stamp_s: float, how: str) -> None:
+    """Note that somebody else has the robot, which is not at rest, and how it is; seconds of mission clock."""
+    note(out, HELD, {"stamp_s": round(stamp_s, 3), "how": how})
+
+
+def read_held(out: Path) -> list[str]:
+    """Return what was noted of a robot that somebody else had, in order."""
+    return [str(one.get("how")) for one in read(out, HELD)]
 
 
 def note_act(out: Path, stamp_s: float | None, act: Mapping[str, object]) -> None:

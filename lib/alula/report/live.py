@@ -6,7 +6,7 @@ from collections.abc import Callable, Mapping
 from pathlib import Path
 
 from alula.common.record import EVENTS, FILE, RecordFollower
-from alula.common.run_log import read_waits
+from alula.common.run_log import read_held, read_waits
 from alula.model.execution_state import ExecutionState
 from alula.records.conformance import Monitor
 from alula.records.run import departure
@@ -43,7 +43,7 @@ class LiveEvents:
         self._begun_s: float | None = None
         self._lift_off_s: float | None = None
         self._departure = departure()
-        self._deaths_shown = self._waits_shown = 0
+        self._deaths_shown = self._waits_shown = self._held_shown = 0
 
     def show_new(self) -> None:
         """Say what was written since the last call; what is written in part waits for the rest."""
@@ -54,6 +54,10 @@ class LiveEvents:
         for wait in waits[self._waits_shown :]:
             self._say(f"waiting for {wait}")
         self._waits_shown = len(waits)
+        held = read_held(self._out)
+        for how in held[self._held_shown :]:
+            self._say(f"waiting: {how}")
+        self._held_shown = len(held)
         deaths = read_deaths(self._out)
         for death in deaths[self._deaths_shown :]:
             self._say(death.sentence())

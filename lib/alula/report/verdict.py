@@ -38,7 +38,8 @@ def came_back(summary: Mapping[str, Any]) -> list[str]:
         return [f"{words['back']}: no, it crashed: {summary['crash']}"]
     if back is None and home() is None:
         return []
-    return [f"{words['back']}: " + {True: "yes", False: "no", None: f"no {words['departure']} is known"}[back]]
+    left = f", {summary['left']}" if summary.get("left") else ""
+    return [f"{words['back']}: " + {True: "yes", False: "no", None: f"no {words['departure']} is known"}[back] + left]
 
 
 def duration_words(summary: Mapping[str, Any]) -> str:

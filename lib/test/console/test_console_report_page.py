@@ -204,6 +204,15 @@ def test_a_vehicle_that_crashed_is_not_told_as_landed(browser: Any, tmp_path: Pa
     assert page.complaints() == []
 
 
+def test_a_vehicle_that_is_left_in_the_air_is_told_so(browser: Any, tmp_path: Path) -> None:
+    left = {"outcome": "given_up", "reason": "", "landed": False, "left": "still in the air, in BRAKE, at 3.0 m"}
+    page = Page(browser, make_story_report(tmp_path, lost_video(), left))
+    page.wait(DRAWN)
+    assert page.run(ANSWERS)[-1].split(" | ")[2] == "mission given up; not landed, still in the air, in BRAKE, at 3.0 m"
+    assert "no: still in the air, in BRAKE, at 3.0 m" in page.text("#figures-row")
+    assert page.complaints() == []
+
+
 def test_what_follows_from_one_failure_is_one_row_with_what_the_autopilot_did(browser: Any, tmp_path: Path) -> None:
     page = Page(browser, make_story_report(tmp_path, lost_video(), {"outcome": "given_up", "reason": "", "landed": True, "collisions": 0}))
     page.wait(DRAWN)

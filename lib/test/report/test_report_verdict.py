@@ -140,6 +140,11 @@ def test_a_mission_that_had_come_to_its_end_keeps_its_outcome(tmp_path: Path) ->
     assert lines == ["", "mission accomplished", "  the run was aborted by the operator: Ctrl-C"]
 
 
+def test_how_a_robot_is_left_is_told_with_whether_it_came_back() -> None:
+    summary = {"outcome": "given_up", "landed": False, "left": "still in the air, in BRAKE, at 3.0 m", "duration_s": 9.0}
+    assert verdict_lines(summary, [], OUT)[2] == "  landed: no, still in the air, in BRAKE, at 3.0 m, duration 9.0 s"
+
+
 def test_what_a_run_still_waited_for_at_its_end_is_told(tmp_path: Path) -> None:
     for what, over in (("ArduPilot on UDP 9002", False), ("the autopilot", False), ("the autopilot", True)):
         note_wait(tmp_path, what, over=over)

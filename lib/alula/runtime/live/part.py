@@ -104,6 +104,14 @@ class RunPart:
         """Return what the run waits for before it can begin, besides its clock, in words. ``clock``: the mission clock has begun."""
         return []
 
+    def held(self, clock: Clock) -> str:  # noqa: ARG002
+        """Return who else has the robot while it is not at rest, and how it is, in words; empty: nobody has.
+
+        It is told every 10 s. A run whose mission is over goes on as long as there is something: until it is at rest, is ours again and is
+        brought to rest, or somebody ends the run.
+        """
+        return ""
+
     def bring_to_rest(self, clock: Clock) -> None:
         """Bring the robot to rest because no mission decides any more; return when it is, or when that takes too long."""
 

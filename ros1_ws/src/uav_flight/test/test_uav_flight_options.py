@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+from types import SimpleNamespace
 
 import pytest
 from uav_flight_requests import launch_arguments, parse
@@ -12,7 +13,7 @@ from alula.runtime.live.spec import RunSpec
 from alula_flight.outcome import CANNOT_START
 from alula_flight.process_faults import process_faults_of
 from alula_flight.run import main
-from uav_flight.part import Flight, sensors_words
+from uav_flight.part import DronePart, Flight, sensors_words
 from uav_simulator.world.config import find_world
 
 ARDUPILOT = ["mapping", "--autopilot", "tcp:127.0.0.1:5760", "--sensors", "simulated"]
@@ -132,3 +133,31 @@ def test_faults_go_to_the_program_that_applies_them(tmp_path):
         ("ground_station:hung@6", "ground_station", "hung"),
     ]
     assert {"faults:=zed@3", "radio_faults:=radio@4"} <= set(launch_arguments(spec))
+
+
+def state(**changes):
+    stamp = SimpleNamespace(to_sec=lambda: 30.0)
+    told = {"link": True, "authority": False, "armed": True, "landed_state": 2, "mode": "BRAKE", **changes}
+    return SimpleNamespace(header=SimpleNamespace(stamp=stamp), position_enu_m=SimpleNamespace(z=3.04), **told)
+
+
+@pytest.mark.parametrize(
+    ("last", "now_s", "held"),
+    [
+        (state(), 30.5, "the vehicle is to be landed, or given back by GUIDED: the pilot or a failsafe has it, in BRAKE, at 3.0 m"),
+        (state(landed_state=4, mode="LAND"), 30.5, "in LAND, at 3.0 m"),
+        (state(authority=True), 30.5, ""),
+        (state(landed_state=1), 30.5, ""),
+        (state(armed=False), 30.5, ""),  # it falls, or its autopilot has restarted: nobody flies it
+        (state(link=False), 30.5, ""),  # nothing is known of it any more
+        (state(), 36.0, ""),  # nor where the guidance has died or hangs
+        (None, 36.0, ""),
+    ],
+)
+def test_somebody_else_has_a_vehicle_that_flies_and_is_not_ours(last, now_s, held):
+    part = DronePart()
+    if last is not None:
+        part._hear_guidance(last)
+    said = part.held(SimpleNamespace(now_s=now_s))
+    assert held in said
+    assert bool(held) == bool(said)

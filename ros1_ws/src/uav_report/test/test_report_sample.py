@@ -100,6 +100,7 @@ def write_bag(
         told = GuidanceState()
         told.header.stamp = genpy.Time.from_sec(values["t_s"])
         told.reference, told.mode, told.landed_state = values.get("reference", "idle"), values.get("mode", "GUIDED"), values["landed_state"]
+        told.armed, told.position_enu_m.z = values.get("armed", False), values.get("height_m", 0.0)
         bag.write("/uav_guidance/state", told, told.header.stamp)
     for t_s, fault in health:
         said = SensorHealth(sensor="zed", ok=not fault, fault=fault, reason=f"it is {fault}" if fault else "")

@@ -347,6 +347,26 @@ def test_nothing_is_said_to_have_landed_that_never_flew(folder):
     assert "landed: no lift-off is known" in "\n".join(verdict_lines(summary, [], folder))
 
 
+@pytest.mark.parametrize(
+    ("last", "by_skills", "left"),
+    [
+        ({"landed_state": 2, "height_m": 3.04, "armed": True}, False, "still in the air, in BRAKE, at 3.0 m"),
+        ({"landed_state": 2, "height_m": 3.04, "armed": True}, True, None),  # the recorder died before it came down
+        ({"landed_state": 1, "armed": True}, True, "on the ground with its motors on, in BRAKE"),
+        ({"landed_state": 1}, True, None),
+    ],
+)
+def test_how_the_vehicle_is_left_is_told(folder, last, by_skills, left):
+    (folder / "functional.bag").unlink()
+    if not by_skills:
+        (folder / RECORD).unlink()
+    told = [{"t_s": LIFT_OFF_S + since_s, "landed_state": 2 if since_s > 0.0 else 1} for since_s in range(-3, 30)]
+    state = {"lift_off_s": LIFT_OFF_S, "collisions": 0, "min_clearance_m": 1.1, "distance_m": 83.0, "faults": []}
+    write_bag(folder / "functional.bag", states=[state], guidance=[*told, {"t_s": LIFT_OFF_S + 30.0, "mode": "BRAKE", **last}])
+    summary = make_report(facts(folder))
+    assert (summary["landed"], summary["left"]) == (by_skills, left)
+
+
 def test_a_recording_that_broke_off_before_the_lift_off_says_nothing_of_a_landing(folder):
     log = Log()
     log.change(0.0, "navigation.flight_status", "ON_GROUND", "IN_AIR")

@@ -6,6 +6,7 @@ import pytest
 from pymavlink.dialects.v20 import ardupilotmega as mavlink
 from uav_simulator_link import (
     ACCEPTED,
+    BRAKE,
     GROUND,
     GUIDED,
     LAND,
@@ -19,6 +20,21 @@ from uav_simulator_link import (
 )
 
 from uav_simulator.autopilot.endpoint import Endpoint
+
+# --- 19 the fence ---
+
+
+@pytest.mark.parametrize(("action", "mode"), [(4.0, BRAKE), (1.0, RTL)])
+def test_a_breached_fence_says_so_and_brakes_or_returns(action, mode):
+    link = Link(params={"FENCE_ENABLE": 1.0, "FENCE_RADIUS": 5.0, "FENCE_ACTION": action}).flying()
+    link.run_until(lambda: link.pilot.mode == mode, timeout_s=20.0, each_tick=lambda: link.setpoint(POSITION, (12.0, 0.0, -3.0)))
+    assert [text.text for text in link.of("STATUSTEXT") if "Fence" in text.text] == ["Fence Breached"]
+    if mode == BRAKE:
+        link.run(20.0)
+        held = link.position
+        link.run(10.0, each_tick=lambda: link.setpoint(POSITION, (12.0, 0.0, -3.0)))
+        assert (link.pilot.mode, link.pilot.armed, link.distance_to(held) < 0.15) == (BRAKE, True, True), "it hovers for ever"
+
 
 # --- 10 failsafes --------------------------------------------------------------------------------------------------------
 

@@ -61,7 +61,8 @@ function keyFigures(run) {
   };
   const back = summary.landed ?? (comingBack(run) === null ? null : true);
   const crash = summary.crash && ["no, it crashed", restWhere(run), summary.crash].filter(Boolean).join(": ");
-  add(robotWords(run).back, crash || (back ? restWhere(run) || "yes" : back === false ? "no" : null));
+  const came = back ? restWhere(run) || "yes" : back === false ? "no" : null;
+  add(robotWords(run).back, crash || [came, summary.left].filter(Boolean).join(": ") || null);
   add(robotWords(run).away, summary.duration_s, "s");
   add(robotWords(run).moved, summary.distance_m, "m");
   const reached = last(run.blackboard.get("waypoints_reached")?.v ?? []) ?? mission.waypoints_reached;
@@ -225,9 +226,9 @@ function started(run, from, to) {
 function wholeDone(run) {
   const outcome = run.facts["/summary"]?.outcome ?? last(run.mission.v)?.outcome;
   if (!outcome || outcome === "running") return "";
-  const { landed: back, crash } = run.facts["/summary"] ?? {};
+  const { landed: back, crash, left } = run.facts["/summary"] ?? {};
   const down = crash ? "crashed" : back === true ? robotWords(run).back : back === false ? `not ${robotWords(run).back}` : "";
-  return [(OUTCOMES[outcome]?.[0] ?? words(outcome)).toLowerCase(), down].filter(Boolean).join("; ");
+  return [(OUTCOMES[outcome]?.[0] ?? words(outcome)).toLowerCase(), [down, left].filter(Boolean).join(", ")].filter(Boolean).join("; ");
 }
 
 /** What the whole mission lost, a sentence each. */

@@ -21,25 +21,25 @@ log = logging.getLogger("alula.landing")
 
 
 class Landing:
-    """One landing. Nothing is done where the vehicle is down already, or where the pilot has it."""
+    """Lands the vehicle where it is ours. Nothing is done where it is down already, or where the pilot or a failsafe has it."""
 
     def __init__(self, clock: Clock) -> None:
         self._clock = clock
         self._heard, self._down = threading.Event(), threading.Event()
         self._commanded, self._reference = False, ""
         self._heartbeat: Any = None
-
-    def land(self) -> None:
-        """Return when the vehicle is down, or when it takes too long."""
         if self._clock.simulated:
             self._end_heartbeats()
-        rospy.Subscriber("/uav_guidance/state", GuidanceState, self._look, queue_size=1)
-        if not self._heard.wait(STATE_TIMEOUT_S) or self._down.is_set() or not self._commanded:
+        self._subscriber = rospy.Subscriber("/uav_guidance/state", GuidanceState, self._look, queue_size=1)
+
+    def land(self) -> None:
+        """Return when the vehicle is down, when somebody else has it, or when it takes too long."""
+        if not self._heard.wait(STATE_TIMEOUT_S):
             return
         end_s = (self._clock.now_s or 0.0) + LANDING_TIMEOUT_S
         # Again where something else is followed instead: a skill that was running may have answered the first with a hover.
-        while not self._down.is_set() and (self._clock.now_s or 0.0) < end_s and not self._clock.stands_still:
-            if self._reference != "land" and self._commanded:
+        while self._commanded and not self._down.is_set() and (self._clock.now_s or 0.0) < end_s and not self._clock.stands_still:
+            if self._reference != "land":
                 self._command()
             self._down.wait(1.0)
 

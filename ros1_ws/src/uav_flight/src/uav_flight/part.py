@@ -23,6 +23,8 @@ from uav_simulator.settings import FOLLOWED
 from uav_simulator.world.config import load_world
 
 RADIO_PORT, RADIO_PORTS = 20_000, 10
+SILENT_S = 5.0  # mission clock; of an older state of the guidance, nobody knows whether it still holds
+OFF_GROUND = (2, 3, 4)  # uav_msgs/GuidanceState: in the air, taking off, landing
 SENSORS_MB_S = 4.0  # stereo pair, LiDAR and IMU, compressed; measured in the yard
 
 
@@ -71,6 +73,9 @@ class DronePart(RunPart):
 
     def __init__(self) -> None:
         self._linked = False
+        self._guidance: Any = None
+        """The last state of the guidance."""
+        self._landing: Any = None
         self._subscribers: list[Any] = []
 
     # --- in the front -------------------------------------------------------------------------------------------------
@@ -132,8 +137,8 @@ class DronePart(RunPart):
         vehicle = {"": {"simulate": "false"}, "simulated": {"vehicle": "ardupilot"}}.get(flight.sensors, {"vehicle": flight.sensors})
         return {**arguments, **vehicle, "autopilot": flight.autopilot}
 
-    def listen(self, spec: RunSpec, departed: Callable[[float], None]) -> None:
-        """Hear of the simulator's lift-off, and from the guidance whether the autopilot's heartbeats arrive."""
+    def listen(self, spec: RunSpec, departed: Callable[[float], None]) -> None:  # noqa: ARG002
+        """Hear of the simulator's lift-off, and from the guidance whether the autopilot's heartbeats arrive and who has the vehicle."""
         import rospy
         from std_msgs.msg import String
         from uav_msgs.msg import GuidanceState
@@ -143,11 +148,13 @@ class DronePart(RunPart):
             if lift_off_s is not None:
                 departed(lift_off_s)
 
-        self._subscribers = [rospy.Subscriber("/sim/state", String, look, queue_size=5)]
-        if Flight.of(spec).autopilot is not None:
-            self._subscribers.append(rospy.Subscriber("/uav_guidance/state", GuidanceState, self._hear_guidance, queue_size=1))
+        self._subscribers = [
+            rospy.Subscriber("/sim/state", String, look, queue_size=5),
+            rospy.Subscriber("/uav_guidance/state", GuidanceState, self._hear_guidance, queue_size=1),
+        ]
 
     def _hear_guidance(self, state: Any) -> None:
+        self._guidance = state
         self._linked = self._linked or state.link
 
     def clock_source(self, spec: RunSpec) -> str:
@@ -171,12 +178,25 @@ class DronePart(RunPart):
             return [f"the autopilot at {connection.text}: no heartbeat has come{' there' if connection.kind in LISTENS else ''}"]
         return []
 
+    def held(self, clock: Clock) -> str:
+        """Return that the pilot or a failsafe has the vehicle in the air, its mode and height."""
+        state = self._guidance
+        if state is None or clock.now_s is None or clock.now_s - state.header.stamp.to_sec() > SILENT_S:
+            return ""
+        if not state.link or state.authority or not state.armed or state.landed_state not in OFF_GROUND:
+            return ""
+        who = f"the pilot or a failsafe has it, in {state.mode}, at {state.position_enu_m.z:.1f} m"
+        return f"the vehicle is to be landed, or given back by GUIDED: {who}"
+
     def bring_to_rest(self, clock: Clock) -> None:
-        """Have the guidance land the vehicle, and wait until it stands."""
-        if clock.now_s is not None:
+        """Have the guidance land the vehicle, and wait until it stands, or somebody else has it."""
+        if clock.now_s is None:
+            return
+        if self._landing is None:
             from uav_flight.landing import Landing  # late: it needs ROS
 
-            Landing(clock).land()
+            self._landing = Landing(clock)
+        self._landing.land()
 
 
 def sensors_words(out: Path) -> str:

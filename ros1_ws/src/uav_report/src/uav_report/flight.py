@@ -96,6 +96,7 @@ class FlightReport:
         down = self._came_down()
         values: dict[str, Any] = {
             "crash": worst.crash or None,
+            "left": self._left(down=down) or None,
             "collisions": worst.collisions,
             "min_clearance_m": _rounded(worst.min_clearance_m),
             "distance_m": _rounded(worst.distance_m),
@@ -123,6 +124,16 @@ class FlightReport:
             where = "on the ground" if any(said) else "in the air"
             self._run.problems.note(f"the vehicle is said to be {where}, its true path ends otherwise")
         return any(said) and resting
+
+    def _left(self, *, down: bool | None) -> str:
+        """Say how a vehicle that has flown is left, where that is not on the ground with its motors off.
+
+        A recording that broke off in the air says nothing of one that is known to have come ``down``.
+        """
+        guidance, phases = self._recording.guidance, self._phases
+        if not guidance or not phases.lifted_off or guidance[-1].t_s <= phases.zero_s or (down and guidance[-1].landed_state != ON_GROUND):
+            return ""
+        return guidance[-1].left
 
     def _compare(self) -> Truth:
         """Compare with the true world, where there is one: the path first, then the map."""

@@ -20,8 +20,7 @@ SIM_STATE = "/sim/state"
 GUIDANCE = "/uav_guidance/state"
 MAPPING = "/lidar_mapping/state"
 HEALTH = {"/zed_depth/health": "zed", "/lidar_obstacles/health": "lidar"}
-ON_GROUND = 1  # uav_msgs/GuidanceState.landed_state
-LANDING = 4
+ON_GROUND, IN_AIR, TAKING_OFF, LANDING = 1, 2, 3, 4  # uav_msgs/GuidanceState.landed_state
 Floats = NDArray[np.float64]
 
 
@@ -63,17 +62,26 @@ class SimulatorAccount:
 
 @dataclass(frozen=True)
 class GuidanceAccount:
-    """One state of the guidance: ``t_s`` absolute; reference idle, takeoff, position, heading, hover or land."""
+    """One state of the guidance: ``t_s`` absolute; reference idle, takeoff, position, heading, hover or land; ``height_m`` z in map."""
 
     t_s: float
     reference: str
     mode: str
     landed_state: int
+    armed: bool = False
+    height_m: float = 0.0
 
     @property
     def landing(self) -> bool:
         """Tell whether the vehicle was on its way down to the ground."""
         return self.reference == "land" or self.mode == "LAND" or self.landed_state == LANDING
+
+    @property
+    def left(self) -> str:
+        """Say how a vehicle is that ends so, where that is not on the ground with its motors off."""
+        if self.landed_state in {IN_AIR, TAKING_OFF, LANDING}:
+            return f"still in the air, in {self.mode}, at {self.height_m:.1f} m"
+        return f"on the ground with its motors on, in {self.mode}" if self.armed and self.landed_state == ON_GROUND else ""
 
 
 @dataclass(frozen=True)
@@ -146,7 +154,9 @@ def read_recording(folder: Path, problems: Problems) -> Recording:
             elif topic == GUIDANCE:
                 t_s = message.header.stamp.to_sec()
                 estimate.add(t_s, message.position_enu_m)
-                guidance.append(GuidanceAccount(t_s, message.reference, message.mode, message.landed_state))
+                place = message.position_enu_m
+                said_of = (message.reference, message.mode, message.landed_state, message.armed, place.z)
+                guidance.append(GuidanceAccount(t_s, *said_of))
             elif topic == SIM_STATE:
                 simulator.append(message.data)
             elif topic in HEALTH:

@@ -33,6 +33,7 @@ EARLY_S, EARLY_STAY_S = 2.0, 1.4  # a mode that needs a position and is taken so
 PREARM_PERIOD_S = 30.0  # of the texts that say what is missing
 STEERED = (Mode.LOITER, Mode.POSHOLD)  # where the pilot's sticks fly
 NOT_ARMABLE = (Mode.AUTO, Mode.RTL, Mode.LAND, Mode.BRAKE)
+FENCE_BRAKE = 4.0  # FENCE_ACTION
 FORCE_MAGIC = 21196.0  # param2 of MAV_CMD_COMPONENT_ARM_DISARM
 
 
@@ -268,6 +269,8 @@ class Autopilot:
         self._wait_for_readiness()
         if self.armed and self._failsafes.gcs_falls_silent(now_s):
             self._fail_safe("GCS Failsafe")
+        if self.armed and not self.landed and self._failsafes.fence_breaks(self.estimate.position, self.home):
+            self._leave_fence()
         self._follow_sticks()
         self._progress_takeoff()
         self._progress_landing()
@@ -334,6 +337,12 @@ class Autopilot:
             self.disarm()
         elif self.armed and self.mode is not Mode.LAND:
             self.set_mode(Mode.RTL)
+
+    def _leave_fence(self) -> None:
+        """Return home, or hover where it is for ever [19]; a landing goes on."""
+        self._say(Severity.NOTICE, "Fence Breached")
+        if self.mode is not Mode.LAND:
+            self.set_mode(Mode.BRAKE if self.params["FENCE_ACTION"] == FENCE_BRAKE else Mode.RTL)
 
     def _follow_sticks(self) -> None:
         """Fly as the ground station's sticks say, and stop when they are centred, or were not heard of for too long."""

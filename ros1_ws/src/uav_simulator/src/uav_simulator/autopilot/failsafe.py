@@ -1,8 +1,11 @@
-"""Which of the links to people on the ground are lost [10]."""
+"""Which of the links to people on the ground are lost [10], and whether the vehicle is beyond its fence [19]."""
 
 from __future__ import annotations
 
+import math
+
 from uav_simulator.autopilot.params import Parameters
+from uav_simulator.frames import Vec3
 
 
 class Failsafes:
@@ -13,6 +16,7 @@ class Failsafes:
         self._gcs_heard_s: float | None = None
         self.rc_lost = False
         self.gcs_lost = False
+        self._beyond = False
 
     @property
     def active(self) -> bool:
@@ -38,3 +42,14 @@ class Failsafes:
             return False
         self.gcs_lost = now_s - heard > self._params["FS_GCS_TIMEOUT"]
         return self.gcs_lost
+
+    def fence_breaks(self, position: Vec3, home: Vec3 | None) -> bool:
+        """Return whether the fence is breached now; once, until the vehicle is inside again."""
+        was_beyond = self._beyond
+        p = self._params
+        self._beyond = (
+            bool(p["FENCE_ENABLE"])
+            and home is not None
+            and (math.dist(position[:2], home[:2]) > p["FENCE_RADIUS"] or position[2] - home[2] > p["FENCE_ALT_MAX"])
+        )
+        return self._beyond and not was_beyond

@@ -10,6 +10,10 @@ from uav_simulator.errors import ConfigError
 DEFAULTS: dict[str, float] = {
     "ATC_SLEW_YAW": 6000.0,  # cdeg/s
     "DISARM_DELAY": 10.0,  # s on the ground
+    "FENCE_ACTION": 1.0,  # when it is breached 1: RTL, 4: BRAKE
+    "FENCE_ALT_MAX": 100.0,  # m above home
+    "FENCE_ENABLE": 0.0,  # 1: it counts
+    "FENCE_RADIUS": 300.0,  # m around home
     "FS_GCS_ENABLE": 0.0,  # 1: RTL when the ground station falls silent
     "FS_GCS_TIMEOUT": 5.0,  # s
     "FS_THR_ENABLE": 1.0,  # 1: RTL when the remote control is lost
