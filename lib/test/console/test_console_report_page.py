@@ -213,6 +213,14 @@ def test_a_vehicle_that_is_left_in_the_air_is_told_so(browser: Any, tmp_path: Pa
     assert page.complaints() == []
 
 
+def test_what_an_autopilot_told_is_a_moment_of_the_run(browser: Any, tmp_path: Path) -> None:
+    told = ("/told", LIFT_OFF_S + 12.0, {"words": "autopilot: Potential Thrust Loss (1)"})
+    page = Page(browser, make_report(tmp_path, recordings=[told]))
+    page.wait(DRAWN)
+    assert "12.00 stoldautopilot: Potential Thrust Loss (1)" in page.text("#moments tbody tr").replace(" | ", "")
+    assert page.complaints() == []
+
+
 def test_what_follows_from_one_failure_is_one_row_with_what_the_autopilot_did(browser: Any, tmp_path: Path) -> None:
     page = Page(browser, make_story_report(tmp_path, lost_video(), {"outcome": "given_up", "reason": "", "landed": True, "collisions": 0}))
     page.wait(DRAWN)

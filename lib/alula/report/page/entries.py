@@ -45,6 +45,8 @@ FAULT = "/fault"
 """Something was made to fail: ``{sensor, mode}``."""
 HEALTH = "/health"
 """A watch changed its mind about a sensor: ``{sensor, ok, fault, reason}``."""
+TOLD = "/told"
+"""What a part of the robot told a person, as an autopilot's texts: ``{words}``."""
 CAUSES = "/causes"
 """Faults, failures with their chains of causes, and what the mission did about them, see ``causes.Causes``."""
 FACTS = frozenset({RUN, ROUTE, AREAS, MAP, WORLD, SUMMARY, CAUSES, PARTS})
@@ -57,7 +59,7 @@ TICKED = "/ticked"
 PICTURE = "/picture"
 """A small picture of a camera: ``{camera, jpeg}``, base64; what each shows, the robot's ``page`` says."""
 
-OF_RECORDINGS = frozenset({PATH, WORLD, FAULT, HEALTH})
+OF_RECORDINGS = frozenset({PATH, WORLD, FAULT, HEALTH, TOLD})
 """Topics of what a report tells of the run's other recordings than the record."""
 
 Wire = tuple[str, float | None, object]

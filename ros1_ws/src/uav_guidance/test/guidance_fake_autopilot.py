@@ -41,6 +41,9 @@ class Body:
     landed: int = 1
 
 
+FORCE_MAGIC = 21196.0
+
+
 class FakeVehicle:
     """The autopilot without its link: ``hear`` takes messages, ``send`` gets them, ``tick`` moves time on."""
 
@@ -166,12 +169,12 @@ class FakeVehicle:
         self.setpoint = self._climb_to = self._takeoff = None
         self._heartbeat_s = 0.0
 
-    def _arm(self, wanted: float, _: float, __: float) -> int:
+    def _arm(self, wanted: float, magic: float, __: float) -> int:
         body = self.body
         if not wanted:
-            if body.landed != 1:
+            if body.landed != 1 and magic != FORCE_MAGIC:
                 return mavlink.MAV_RESULT_FAILED
-            body.armed, self._takeoff = False, None
+            body.armed, body.landed, self._takeoff = False, 1, None
             return mavlink.MAV_RESULT_ACCEPTED
         why = self.refuse_arming or ("" if self.ready else "GPS 1: waiting for home")
         if why:

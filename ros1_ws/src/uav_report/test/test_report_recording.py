@@ -16,7 +16,7 @@ from alula.report.facts import RunFacts
 from alula.report.files import Problems
 from alula.report.history import History
 from alula.report.making import fault_entries
-from alula.report.page.entries import FAULT, HEALTH, PATH
+from alula.report.page.entries import FAULT, HEALTH, PATH, TOLD
 from alula.report.part import ReportedRun
 from uav_report.flight import FlightReport
 from uav_report.page import page_entries
@@ -69,6 +69,18 @@ def test_the_page_is_told_of_sensors_and_processes_that_were_made_to_fail_in_the
     entries = fault_entries(FlightReport(run).observe(run))
     told = [(t_s - LIFT_OFF_S, value["sensor"], value["mode"]) for topic, t_s, value in entries if topic == FAULT]
     assert told == [(3.0, "zed", "dark"), (5.0, "encoder", "killed"), (7.0, "zed", "ok")]
+
+
+def test_the_page_is_told_what_the_autopilot_told_once_in_ten_seconds(tmp_path):
+    texts = ((4.0, "autopilot: A"), (5.0, "autopilot: B"), (6.0, "autopilot: A"), (17.0, "autopilot: A"))
+    said = [(LIFT_OFF_S + t_s, words) for t_s, words in texts]
+    write_bag(tmp_path / "functional.bag", poses=STRAIGHT, states=[STATE], told=said)
+    entries = page_entries(read_recording(tmp_path, Problems()), None)
+    assert [(round(t_s - LIFT_OFF_S, 3), value["words"]) for topic, t_s, value in entries if topic == TOLD] == [
+        (4.0, "autopilot: A"),
+        (5.0, "autopilot: B"),
+        (17.0, "autopilot: A"),
+    ]
 
 
 def test_the_last_whole_state_of_the_simulator_counts(tmp_path):

@@ -84,6 +84,7 @@ def write_bag(
     guidance: Sequence[dict[str, Any]] = (),
     map_points: int | None = None,
     health: Sequence[tuple[float, str]] = (),
+    told: Sequence[tuple[float, str]] = (),
     cut_at: int | None = None,
 ) -> None:
     """Write a bag; with ``cut_at`` as a killed recorder leaves it: no index, and nothing behind so many bytes."""
@@ -106,6 +107,8 @@ def write_bag(
         said = SensorHealth(sensor="zed", ok=not fault, fault=fault, reason=f"it is {fault}" if fault else "")
         said.header.stamp = genpy.Time.from_sec(t_s)
         bag.write("/zed_depth/health", said, said.header.stamp)
+    for t_s, words in told:
+        bag.write("/uav_guidance/told", String(words), genpy.Time.from_sec(t_s))
     if map_points is not None:
         bag.write("/lidar_mapping/state", MappingState(points=map_points), genpy.Time.from_sec(LIFT_OFF_S))
     if cut_at is None:

@@ -98,3 +98,28 @@ def test_the_same_seed_and_commands_give_the_same_flight_and_measurements():
     assert a.pose == b.pose
     assert all(np.array_equal(x, y) for x, y in zip(images_a, images_b, strict=True))
     assert np.array_equal(cloud_a, cloud_b)
+
+
+def test_a_motor_that_stops_brings_the_vehicle_down_and_the_autopilot_leaves_the_others_on():
+    flown = SimulatedAutopilotVehicle(seed=0)
+    simulation = Simulation(CONFIG, flown, seed=0, faults=parse_faults("motor@4"))
+    client = Client(simulation)
+    client.take_off()
+    client.run_until(lambda: flown.body.stopped_rotor is not None)
+    client.command(21)
+    client.run_until(lambda: flown.body.on_ground, 30.0)
+    assert simulation.state.crash
+    texts = [
+        message.text for message in mavlink.MAVLink(None).parse_buffer(flown.endpoint.take_output()) if message.get_type() == "STATUSTEXT"
+    ]
+    assert [text for text in texts if "Thrust" in text] == ["Potential Thrust Loss (1)"]
+    for _ in range(50 * 20):
+        simulation.tick()
+    assert (flown.autopilot.armed, flown.landed_state) == (True, LandedState.LANDING)
+    client.command(400, 0)
+    simulation.tick()
+    assert flown.autopilot.armed, "as in the air"
+    client.command(400, 0, 21196)
+    simulation.tick()
+    simulation.tick()
+    assert (flown.autopilot.armed, flown.landed_state) == (False, LandedState.ON_GROUND)

@@ -278,7 +278,7 @@ def test_the_barometer_of_an_autopilot_that_is_not_simulated_can_not_be_broken()
 def test_scheduled_faults_happen_at_their_moment_after_lift_off():
     board = SensorBoard(parse_faults("zed@3,imu", FAULTS))
     assert board.apply_due(0.0, None)
-    assert board.modes == {"zed": "ok", "lidar": "ok", "camera": "ok", "imu": "dead", "barometer": "ok"}
+    assert board.modes == {"zed": "ok", "lidar": "ok", "camera": "ok", "imu": "dead", "barometer": "ok", "motor": "ok"}
     assert not board.apply_due(100.0, None), "not lifted off yet"
     assert not board.apply_due(12.9, 10.0)
     assert board.apply_due(13.0, 10.0)

@@ -102,6 +102,7 @@ const FOLDERS = {
     push(run.health.get(value.sensor), t, value);
     moment(run, t, "measurement", value.ok ? `${value.sensor} is fine` : `${value.sensor} ${value.fault}: ${value.reason}`, !value.ok);
   },
+  "/told": (run, t, { words }) => moment(run, t, "told", words, true),
   "/blackboard": (run, t, values) => {
     for (const [name, value] of Object.entries(values)) {
       if (!run.blackboard.has(name)) run.blackboard.set(name, newTrack());

@@ -15,6 +15,7 @@ from uav_guidance.vehicle import Mode, VehicleSnapshot
 DO_SET_MODE = 176
 ARM_DISARM = 400
 NAV_TAKEOFF = 22
+FORCE_MAGIC = 21196.0  # param2 of ARM_DISARM
 
 ACCEPTED = 0
 IN_PROGRESS = 5
@@ -69,9 +70,11 @@ def arm(failing_check: str = "") -> Command:
     return Command("arm", ARM_DISARM, (1.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0), evidence=evidence, known_obstacle=failing_check)
 
 
-def disarm() -> Command:
-    """Ask to disarm; refused in the air."""
-    return Command("disarm", ARM_DISARM, evidence=Evidence("HEARTBEAT", lambda vehicle: not vehicle.armed))
+def disarm(*, force: bool = False) -> Command:
+    """Ask to disarm; what the autopilot takes for flying is only disarmed by ``force``."""
+    parameters = (0.0, FORCE_MAGIC if force else 0.0, 0.0, 0.0, 0.0, 0.0, 0.0)
+    evidence = Evidence("HEARTBEAT", lambda vehicle: not vehicle.armed)
+    return Command("disarm by force" if force else "disarm", ARM_DISARM, parameters, evidence=evidence)
 
 
 def take_off(height_above_home_m: float) -> Command:

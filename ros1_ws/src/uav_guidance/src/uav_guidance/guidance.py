@@ -38,6 +38,7 @@ from uav_guidance.requests import (
     require,
 )
 from uav_guidance.settings import GuidanceSettings
+from uav_guidance.standing import GROUND_M, Standing, above_home_m
 from uav_guidance.takeover import Takeover
 from uav_guidance.vectors import Vec3
 from uav_guidance.vehicle import Landed, Mode, VehicleSnapshot, in_map, leapt, mode_name, updated
@@ -81,6 +82,11 @@ class Guidance:
         self._start_procedure: Procedure | None = None
         self._prearm_text = ""
         self._takeover = Takeover()
+        self._standing = Standing()
+        self._disarming: Procedure | None = None
+        self._disarms = 0
+        """How often the motors of a vehicle that stands in this landing were to be stopped."""
+        self._notes: list[str] = []
         self._answers: dict[type[Request], Callable[[Any, float], GuidanceDecision]] = {
             TakeoffRequest: self._take_off,
             PositionRequest: self._set_position,
@@ -182,6 +188,7 @@ class Guidance:
         command = self._procedure.due(now_s) if self._procedure is not None else None
         self._drop_what_ended(now_s)
         self._adopt_hover(now_s)
+        self._stop_motors(now_s)
         setpoint = self._follower.step(self.vehicle, now_s, commanded=self._authority.held)
         return [item for item in (command, self._in_odom(setpoint)) if item is not None]
 
@@ -423,7 +430,10 @@ class Guidance:
     def _drop_what_ended(self, now_s: float) -> None:
         """Follow nothing if the autopilot did not agree, or if the vehicle stands on the ground, disarmed (a landing keeps its name)."""
         outcome = self._procedure.outcome if self._procedure is not None else None
-        if outcome is not None and not outcome.accepted:
+        if outcome is not None and self._procedure is self._disarming:
+            self._procedure = self._disarming = None  # the landing goes on, whatever came of it
+            self._note("its motors are off" if outcome.accepted else outcome.reason)
+        elif outcome is not None and not outcome.accepted:
             self._procedure = None
             if isinstance(self._follower.reference, Land):
                 self._authority.withdraw_land()
@@ -435,6 +445,36 @@ class Guidance:
                 self._authority.withdraw_land()
         if self._procedure is None and self._follower.over(self.vehicle):
             self._follower.take(None, self.vehicle, now_s)
+
+    def _stop_motors(self, now_s: float) -> None:
+        """Disarm a vehicle that stands on the ground in a landing of ours that does not end; one that lies higher is only told of.
+
+        First as any client may, then by force, for the autopilot takes it for flying.
+        """
+        landing = self._authority.held and isinstance(self._follower.reference, Land)
+        if not landing:
+            self._disarms = 0
+        if not self._standing.step(self.vehicle, now_s, landing=landing) or self._procedure is not None:
+            return
+        self._standing.restart()
+        height_m = above_home_m(self.vehicle)
+        allowed = self._settings.disarm_standing and height_m <= GROUND_M
+        if allowed or not self._disarms:
+            what = "it is disarmed" if allowed else "it is not disarmed by itself"
+            self._note(f"the vehicle stands still in LAND with its motors on, {height_m:.1f} m above home: {what}")
+        if allowed:
+            self._disarming = Procedure([disarm(force=self._disarms > 0)])
+            self._run(self._disarming)
+        self._disarms += 1
+
+    def _note(self, words: str) -> None:
+        log.warning(words)
+        self._notes.append(words)
+
+    def take_notes(self) -> list[str]:
+        """Return what the guidance has done or seen since the last call that a person should know, in words."""
+        notes, self._notes = self._notes, []
+        return notes
 
     def _adopt_hover(self, now_s: float) -> None:
         """Stay in place when there is the authority but no reference, in the air: after a restart, or given back by the pilot."""

@@ -11,6 +11,7 @@ from typing import Any
 import rospy
 from geometry_msgs.msg import PoseStamped
 from rosgraph_msgs.msg import Clock
+from std_msgs.msg import String
 from tf2_msgs.msg import TFMessage
 from uav_msgs.msg import GuidanceState, MappingState, Obstacle
 from uav_msgs.srv import (
@@ -53,6 +54,7 @@ from uav_guidance.messages import (
 from uav_guidance.settings import GuidanceSettings
 from uav_guidance.stamping import Alarm, FineClock, StampClock, Steps
 from uav_guidance.streams import STREAMS_HZ, StreamKeeper
+from uav_guidance.takeover import CHECKS, LEAST_SEVERITY
 from uav_guidance.texts import TextAssembler
 
 log = logging.getLogger(__name__)
@@ -83,6 +85,7 @@ class GuidanceNode:
         self._heartbeat_s = -HEARTBEAT_PERIOD_S
         self._reporter = ResourceReporter(SKILLSET)
         self._state = rospy.Publisher("~state", GuidanceState, queue_size=5)
+        self._told = rospy.Publisher("~told", String, queue_size=10)
         self._pose = rospy.Publisher("~pose", PoseStamped, queue_size=10)
         self._tf = rospy.Publisher("/tf", TFMessage, queue_size=10)
         self._stepped_ns = self._done_ns = 0
@@ -223,6 +226,8 @@ class GuidanceNode:
         text = self._texts.take(message.text, message.id, message.chunk_seq)
         if text is not None:
             log.info("autopilot: %s", text)
+            if message.severity <= LEAST_SEVERITY and not text.startswith(CHECKS):
+                self._told.publish(String(f"autopilot: {text}"))
             self._guidance.on_text(message.severity, text, _now_s())
 
     def _stamped_pose(self, boot_ms: int, arrival: rospy.Time) -> PoseStamped | None:
@@ -260,6 +265,8 @@ class GuidanceNode:
         """Step the guidance to now and send what it says."""
         for item in self._guidance.step(_now_s()):
             self._link.send(setpoint_message(item) if isinstance(item, Setpoint) else command_message(item))
+        for note in self._guidance.take_notes():
+            self._told.publish(String(f"guidance: {note}"))
         self._report_resources()
         self._changed.notify_all()
 

@@ -45,6 +45,10 @@ class GuidanceSettings:
     reached_rad: float = tunable(math.radians(2.0), 0.005, 0.5, "from the heading at which nothing remains to be done")
     link_lost_s: float = tunable(2.0, 0.5, 30.0, "of silence after which the link counts as lost")
 
+    disarm_standing: bool = field(
+        default=True, metadata={KEY: Range(0, 1, "stop the motors of a vehicle that stands on the ground in a landing that does not end")}
+    )
+
     follow_map: bool = field(default=True, metadata={KEY: Range(0, 1, "fly by the SLAM's map; off: by the autopilot's local position")})
     map_rate_m_s: float = tunable(0.2, 0.01, 2.0, "at which the vehicle's place in the map is corrected in flight")
     map_rate_rad_s: float = tunable(math.radians(2.0), 0.001, 0.5, "at which its heading in the map is corrected in flight")

@@ -6,7 +6,7 @@ from collections.abc import Iterator
 
 import numpy as np
 
-from alula.report.page.entries import HEALTH, PATH, WORLD, Wire
+from alula.report.page.entries import HEALTH, PATH, TOLD, WORLD, Wire
 from uav_report.recording import Recording, Track
 from uav_report.world import TrueSurfaces
 
@@ -22,6 +22,8 @@ def page_entries(recording: Recording, world: TrueSurfaces | None) -> Iterator[W
     for change in recording.health:
         said = {"sensor": change.sensor, "ok": change.ok, "fault": change.fault, "reason": change.reason}
         yield HEALTH, round(change.t_s, 3), said
+    for t_s, text in recording.told:
+        yield TOLD, round(t_s, 3), {"words": text}
 
 
 def _path(path: Track) -> Iterator[Wire]:

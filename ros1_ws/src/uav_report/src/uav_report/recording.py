@@ -18,9 +18,11 @@ from uav_report.bag_rescue import BAG, usable_bag
 TRUE_POSE = "/sim/true_pose"
 SIM_STATE = "/sim/state"
 GUIDANCE = "/uav_guidance/state"
+TOLD = "/uav_guidance/told"
 MAPPING = "/lidar_mapping/state"
 HEALTH = {"/zed_depth/health": "zed", "/lidar_obstacles/health": "lidar"}
 ON_GROUND, IN_AIR, TAKING_OFF, LANDING = 1, 2, 3, 4  # uav_msgs/GuidanceState.landed_state
+TOLD_AGAIN_S = 10.0
 Floats = NDArray[np.float64]
 
 
@@ -105,6 +107,8 @@ class Recording:
     guidance: tuple[GuidanceAccount, ...] = ()
     map_points: int | None = None
     health: tuple[HealthChange, ...] = ()
+    told: tuple[tuple[float, str], ...] = ()
+    """What autopilot and guidance told a person, ``who: words``, each with its absolute seconds; what comes again within 10 s once."""
 
     @property
     def path(self) -> Track | None:
@@ -146,9 +150,10 @@ def read_recording(folder: Path, problems: Problems) -> Recording:
     guidance: list[GuidanceAccount] = []
     simulator: list[str] = []
     health: dict[str, list[HealthChange]] = {sensor: [] for sensor in HEALTH.values()}
+    told: list[tuple[float, str]] = []
     map_points: int | None = None
     with bag, problems.survive(f"{BAG} could be read in part only"):
-        for topic, message, _ in bag.read_messages(topics=[TRUE_POSE, SIM_STATE, GUIDANCE, MAPPING, *HEALTH]):
+        for topic, message, received in bag.read_messages(topics=[TRUE_POSE, SIM_STATE, GUIDANCE, TOLD, MAPPING, *HEALTH]):
             if topic == TRUE_POSE:
                 truth.add(message.header.stamp.to_sec(), message.pose.position)
             elif topic == GUIDANCE:
@@ -157,6 +162,10 @@ def read_recording(folder: Path, problems: Problems) -> Recording:
                 place = message.position_enu_m
                 said_of = (message.reference, message.mode, message.landed_state, message.armed, place.z)
                 guidance.append(GuidanceAccount(t_s, *said_of))
+            elif topic == TOLD:
+                t_s = received.to_sec()
+                if not any(text == message.data and t_s - at_s < TOLD_AGAIN_S for at_s, text in told):
+                    told.append((t_s, message.data))
             elif topic == SIM_STATE:
                 simulator.append(message.data)
             elif topic in HEALTH:
@@ -171,6 +180,7 @@ def read_recording(folder: Path, problems: Problems) -> Recording:
         simulator=_simulator_account(simulator, problems),
         guidance=tuple(guidance),
         map_points=map_points,
+        told=tuple(told),
         health=tuple(sorted((change for changes in health.values() for change in changes), key=lambda change: change.t_s)),
     )
 

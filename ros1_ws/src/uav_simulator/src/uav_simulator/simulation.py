@@ -27,6 +27,7 @@ from uav_simulator.world.scene import Scene
 
 TICK_NS = 20_000_000
 TICK_S = TICK_NS * 1e-9
+STOPPED_ROTOR = 0  # by the fault of a motor; they are alike
 
 
 @dataclass(frozen=True)
@@ -96,6 +97,7 @@ class Simulation:
         self.sensors.apply_due(self.now_s, self.lift_off_s)
         if self.flown.barometer is not None:
             self.flown.barometer.broken = self.sensors.mode("barometer") is SensorMode.DRIFTING
+        body.stopped_rotor = STOPPED_ROTOR if self.sensors.mode("motor") is SensorMode.STOPPED else None
         self.track.add(self.pose)
         return True
 

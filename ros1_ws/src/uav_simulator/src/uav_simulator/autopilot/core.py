@@ -85,6 +85,7 @@ class Autopilot:
         self._notices: list[Notice] = []
         self._falls_back_s = math.inf
         self._prearm_due_s = 0.0
+        self._thrust_lost = False
         if self.located:
             self.home = self.estimate.position
 
@@ -271,6 +272,7 @@ class Autopilot:
             self._fail_safe("GCS Failsafe")
         if self.armed and not self.landed and self._failsafes.fence_breaks(self.estimate.position, self.home):
             self._leave_fence()
+        self._watch_motors()
         self._follow_sticks()
         self._progress_takeoff()
         self._progress_landing()
@@ -338,6 +340,14 @@ class Autopilot:
         elif self.armed and self.mode is not Mode.LAND:
             self.set_mode(Mode.RTL)
 
+    def _watch_motors(self) -> None:
+        """Tell of a motor that has stopped in the air, and go on all the same [19]."""
+        rotor = self._vehicle.body.stopped_rotor
+        lost = rotor is not None and (self._thrust_lost or (self.armed and not self.landed))
+        if lost and not self._thrust_lost:
+            self._say(Severity.EMERGENCY, f"Potential Thrust Loss ({(rotor or 0) + 1})")
+        self._thrust_lost = lost
+
     def _leave_fence(self) -> None:
         """Return home, or hover where it is for ever [19]; a landing goes on."""
         self._say(Severity.NOTICE, "Fence Breached")
@@ -381,8 +391,8 @@ class Autopilot:
             self._descend()
 
     def _watch_touch_down(self, dt_s: float) -> None:
-        """Land when the ground carries; never during a take-off [8]."""
-        if self.landed or self._takeoff:
+        """Land when the ground carries; never during a take-off [8], and not with a motor that has stopped [19]."""
+        if self.landed or self._takeoff or self._thrust_lost:
             return
         landed = self._touch_down.step(self._vehicle.body, self._vehicle.target, dt_s)
         if self._touch_down.standing_s > 0.0:

@@ -50,6 +50,7 @@ class SystemStatus(IntEnum):
 class Severity(IntEnum):
     """MAV_SEVERITY: the values that this autopilot uses."""
 
+    EMERGENCY = 0
     CRITICAL = 2
     WARNING = 4
     NOTICE = 5

@@ -33,6 +33,7 @@ class SensorMode(Enum):
     LATE = "late"  # arrives half a second after its stamp
     FUTURE = "future"  # stamps ten seconds ahead
     DRIFTING = "drifting"  # the height that is measured runs away
+    STOPPED = "stopped"  # a motor of six
 
 
 _ALWAYS = (SensorMode.DEAD, SensorMode.FROZEN, SensorMode.FLICKERING, SensorMode.BLACK, SensorMode.LATE, SensorMode.FUTURE)
@@ -51,8 +52,10 @@ FAULTS: dict[str, tuple[str, ...]] = {
     "camera": tuple(mode.value for mode in _ALWAYS if mode is not SensorMode.FLICKERING),
     "imu": tuple(mode.value for mode in (*_ALWAYS, SensorMode.BIASED)),
     "barometer": (SensorMode.DRIFTING.value,),
+    "motor": (SensorMode.STOPPED.value,),
 }
-"""The sensors, each with the ways in which it can fail; the first one counts where none is named. The barometer is the autopilot's."""
+"""The sensors, each with the ways in which it can fail; the first one counts where none is named. The barometer is the autopilot's. A motor
+is no sensor, but fails alike."""
 
 
 @dataclass(frozen=True)

@@ -27,6 +27,8 @@ class RigidBody:
         self.rates: Vec3 = ZERO
         self.specific_force: Vec3 = (0.0, 0.0, GRAVITY_M_S2)  # what an accelerometer feels, body
         self.thrusts: tuple[float, ...] = (0.0,) * ROTORS
+        self.stopped_rotor: int | None = None
+        """A rotor whose motor has failed, whatever it is commanded."""
         self.on_ground = position[2] <= 0.0
         self._places = airframe.rotor_places
 
@@ -69,6 +71,8 @@ class RigidBody:
         limit, kappa = self.airframe.rotor_max_n, self.airframe.rotor_torque_m
         total = tx = ty = tz = 0.0
         thrusts = []
+        if self.stopped_rotor is not None:
+            commands_n = tuple(0.0 if rotor == self.stopped_rotor else command for rotor, command in enumerate(commands_n))
         for now, command, (x, y, spin) in zip(self.thrusts, commands_n, self._places, strict=True):
             wanted = 0.0 if command < 0.0 else min(command, limit)
             thrust = now + (wanted - now) * gain
