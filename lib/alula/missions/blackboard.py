@@ -39,6 +39,8 @@ class Blackboard:
     clock_ns: Clock
     pending: PendingInterrupts
     failures: list[Failure] = field(default_factory=list)
+    notes: list[str] = field(default_factory=list)
+    """What went wrong besides, as the tree has noted it."""
     reason: str = ""
     entries: Callable[[], Mapping[str, object]] = dict
     """What is on the blackboard of a mission that is a file, by name."""
@@ -54,5 +56,14 @@ class Blackboard:
 
     def note_reason(self) -> None:
         """Keep what went wrong up to here as the mission's reason; what fails afterwards, while stopping, is not the reason."""
-        sentences = dict.fromkeys(failure.sentence() for failure in self.failures)
-        self.reason = "; then ".join(sentences)
+        self.reason = self.what_went_wrong
+
+    def note(self, what: str) -> None:
+        """Keep what went wrong that no skill tells, once."""
+        if what not in self.notes:
+            self.notes.append(what)
+
+    @property
+    def what_went_wrong(self) -> str:
+        """What failed up to now, and what was noted, in words."""
+        return "; then ".join(dict.fromkeys([*(failure.sentence() for failure in self.failures), *self.notes]))

@@ -296,5 +296,5 @@ class Director:
         if self._mission.root.status is not Status.SUCCESS:
             return End(Outcome.GIVEN_UP, self.blackboard.reason)
         if self._mission.degraded:
-            return End(Outcome.DEGRADED, "; then ".join(failure.sentence() for failure in self.blackboard.failures))
+            return End(Outcome.DEGRADED, self.blackboard.what_went_wrong)
         return End(Outcome.ACCOMPLISHED)

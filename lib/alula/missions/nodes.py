@@ -12,7 +12,7 @@ from alula.trees.node import Action, Condition, Count, Decorator, Script, SyncAc
 from alula.trees.palette import Palette, input_port, script_port
 from alula.trees.status import FAILURE, IDLE, RUNNING, SKIPPED, SUCCESS, Answer
 from alula.trees.ticking import AGAIN, Order, Ticking
-from alula.trees.values import DOUBLE, INT
+from alula.trees.values import DOUBLE, INT, STRING
 
 IF = script_port("if", "a script that says yes or no")
 SECOND_NS = 1e9
@@ -212,14 +212,19 @@ class Needs(Condition):
 
 
 class NoteReason(SyncAction):
-    """Keeps what went wrong up to here as the mission's reason."""
+    """Keeps what went wrong up to here as the mission's reason; or, with a text, adds that to what went wrong: no skill tells it."""
 
+    ports = (input_port("text", STRING, "", "what went wrong; empty: what the skills told"),)
     ends = SUCCEEDS
     memory: Blackboard
 
     def update(self) -> Answer:
         """Keep it."""
-        self.memory.note_reason()
+        text = str(self.get("text"))
+        if text:
+            self.memory.note(text)
+        else:
+            self.memory.note_reason()
         return SUCCESS
 
 

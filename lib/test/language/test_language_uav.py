@@ -71,6 +71,13 @@ STATUS = [("UNKNOWN", "OK"), ("UNKNOWN", "BROKEN"), ("OK", "UNKNOWN"), ("OK", "B
         ("perception", "zed_status", ("UNKNOWN", "OK", "BROKEN"), STATUS, []),
         ("perception", "lidar_status", ("UNKNOWN", "OK", "BROKEN"), STATUS, []),
         ("mapping", "mapping_process", ("IDLE", "RUNNING"), [], [("IDLE", "RUNNING"), ("RUNNING", "IDLE")]),
+        (
+            "mapping",
+            "height_status",
+            ("AGREED", "DRIFTING", "WRONG"),
+            [("AGREED", "DRIFTING"), ("AGREED", "WRONG"), ("DRIFTING", "WRONG"), ("DRIFTING", "AGREED"), ("WRONG", "AGREED")],
+            [],
+        ),
         ("mapping", "slam_status", ("UNKNOWN", "OK", "LOST"), [(a, b) for a in SLAM for b in SLAM if a != b], []),
     ],
 )

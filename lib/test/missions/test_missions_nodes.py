@@ -118,3 +118,11 @@ def test_the_reason_names_each_failure_once_and_nothing_that_fails_afterwards(cl
     clock.board.note_reason()
     clock.board.failures.append(Failure("c", "arm.rest", E.FAILED, "", ""))
     assert clock.board.reason == "arm.grip: FAILED (cold); then arm.lift: STUCK"
+
+
+def test_what_no_skill_tells_is_noted_once_behind_what_the_skills_told(clock):
+    clock.board.failures.append(Failure("watch", "perception.zed", E.TERMINATED, "LOST", ""))
+    for _ in range(2):
+        clock.board.note("the barometer drifted")
+    clock.board.note_reason()
+    assert clock.board.reason == "perception.zed: LOST; then the barometer drifted"

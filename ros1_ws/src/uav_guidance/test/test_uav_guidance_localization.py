@@ -199,15 +199,20 @@ def raised(localization, rate_m_s, now_s, *, from_m=0.0, seconds=60.0, flying=Tr
 
 
 @pytest.mark.parametrize("rate_m_s", [0.015, -0.015, 0.028])
-def test_a_height_that_drifts_as_a_barometer_does_is_followed_however_far(rate_m_s):
-    assert raised(begun(), rate_m_s, 1.0, seconds=200.0) == pytest.approx(200.0 * rate_m_s, abs=0.01)
+def test_a_height_that_drifts_as_a_barometer_does_is_followed_but_not_without_end(rate_m_s):
+    settings, localization = GuidanceSettings(), begun()
+    followed_s = settings.map_height_most_m / abs(rate_m_s)
+    assert raised(localization, rate_m_s, 1.0, seconds=followed_s) == pytest.approx(followed_s * rate_m_s, abs=0.01)
+    # What goes on may be the map, which must not take the vehicle along to the ground.
+    most_m = math.copysign(settings.map_height_most_m + settings.map_height_m, rate_m_s)
+    assert raised(localization, rate_m_s, followed_s, from_m=followed_s * rate_m_s, seconds=400.0) == pytest.approx(most_m, abs=0.01)
 
 
 def test_a_map_that_leaves_the_measured_height_faster_than_a_barometer_drifts_is_followed_within_bounds():
     settings, localization = GuidanceSettings(), begun()
     assert raised(localization, 0.0, 1.0, from_m=0.5 * settings.map_height_m, seconds=10.0) == pytest.approx(0.5 * settings.map_height_m)
     for count in range(6):  # on and on, at last by 30 m
-        most_m = settings.map_height_m + settings.map_height_m_s * (60.0 * (count + 1) + 10.0)
+        most_m = settings.map_height_m + min(settings.map_height_m_s * (60.0 * (count + 1) + 10.0), settings.map_height_most_m)
         assert raised(localization, 0.1, 20.0 + 60.0 * count, from_m=0.1 + 6.0 * count) <= most_m + 0.01
     before_m = localization.correction.shift_m.z
     assert raised(localization, 0.0, 1000.0, from_m=6.1, seconds=0.0) == pytest.approx(before_m - 30.0, abs=0.05), "another origin"

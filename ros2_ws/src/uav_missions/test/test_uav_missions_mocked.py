@@ -87,6 +87,27 @@ def test_a_nominal_flight_is_accomplished_in_the_time_that_it_takes_in_the_simul
     assert mission.open_executions == []
 
 
+def test_a_barometer_that_drifts_is_flown_by_the_maps_height_and_said():
+    mission = make("barometer@8")
+    end = mission.run()
+    assert (end.outcome, end.reason) == (Outcome.DEGRADED, "the barometer drifted, flown by the map's height")
+    assert [skill for skill, _, _ in executions(mission)].count("goto_straight") == len(ROUTE)
+    assert landed(mission)
+    both = make("barometer@8", "zed@30").run()
+    assert both.outcome is Outcome.DEGRADED
+    assert "zed_ok" in both.reason
+    assert both.reason.endswith("; then the barometer drifted, flown by the map's height")
+
+
+def test_heights_that_nobody_can_believe_any_more_end_the_map_and_the_flight():
+    mission = make("barometer:wrong@8")
+    end = mission.run()
+    assert end.outcome is Outcome.GIVEN_UP
+    assert "height_known" in end.reason
+    assert [skill for skill, _, _ in executions(mission)][-2:] == ["hover", "land"]
+    assert landed(mission)
+
+
 def test_both_sensors_dead_is_given_up_and_landed():
     mission = make("zed@8", "lidar@8")
     end = mission.run()

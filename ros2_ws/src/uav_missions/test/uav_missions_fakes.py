@@ -89,7 +89,9 @@ class World:
     forgets: set[str] = field(default_factory=set)
     """Skills that can't go on after a pause."""
     conflicts: list[str] = field(default_factory=list)
-    resources: dict[str, str] = field(default_factory=lambda: {"SDK_authority": "AVAILABLE", "flight_status": "ON_GROUND"})
+    resources: dict[str, str] = field(
+        default_factory=lambda: {"SDK_authority": "AVAILABLE", "flight_status": "ON_GROUND", "height_status": "AGREED"}
+    )
 
     def clock_ns(self) -> int:
         return round(self.now_s * 1e9)

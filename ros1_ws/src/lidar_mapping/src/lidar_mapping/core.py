@@ -44,6 +44,8 @@ READING_WAIT_S = 0.3  # wall clock; the readings of a sweep may arrive after it,
 MAP_WAIT_S = 1.0  # wall clock; a guidance that runs tells of its map at 20 Hz
 TF_PERIOD_S = 0.1
 HEIGHT_DRIFT_M = 0.2  # from which on it is told: more than a height is noisy, and than a tilt of the map explains before the next turn
+HEIGHT_AGREES_M = 0.15  # below which it is not told any more
+HEIGHT_WRONG_M = 2.0  # no barometer drifts so far in a flight: the map may, or both
 STATE, MAP = Output("~state", MappingState, queue_size=5, latch=True), Output("~map", PointCloud2, latch=True)
 POSE, TF = Output("~pose", PoseWithCovarianceStamped, queue_size=5), Output("/tf", TFMessage, queue_size=5, shared=True)
 OUTPUTS = (STATE, MAP, POSE, TF)
@@ -64,6 +66,7 @@ class LidarMapping:
         self._stamps = SweepStamps()
         self._lock = Lock()
         self._saving = Lock()
+        self._height = "AGREED"
         self._received = 0
         self._saved_scans = 0
         self._resume()
@@ -94,7 +97,11 @@ class LidarMapping:
             self._slam.stop()
             self._readings.clear()
             self._publish_state(self._host.now_ns(), None)
+            if enabled:
+                self._height = "AGREED"
         self._host.report("mapping.slam_status", "UNKNOWN", "the mapping does not run")
+        if enabled:
+            self._host.report("mapping.height_status", self._height)
 
     def save(self) -> str:
         """Write the map; return what was written where, raise OSError."""
@@ -194,17 +201,23 @@ class LidarMapping:
 
     def _report(self) -> None:
         """Tell the skillset whether pose and map are to be trusted."""
-        problem, drifted_m = self._slam.problem, self._slam.height_drift_m
+        problem = self._slam.problem
         if problem:
             self._host.warn("lost", f"the map is lost: {problem}")
-        elif abs(drifted_m) > HEIGHT_DRIFT_M:
-            where = "higher" if drifted_m > 0.0 else "lower"
-            self._host.warn(
-                "height",
-                f"the barometer drifts: the autopilot takes the vehicle to be {abs(drifted_m):.2f} m {where} than it is in the map",
-                every_s=10.0,
-            )
+        else:
+            self._report_height(self._slam.height_drift_m)
         self._host.report("mapping.slam_status", "LOST" if problem else "OK", problem)
+
+    def _report_height(self, drifted_m: float) -> None:
+        """Tell the skillset how the autopilot's height fares beside the map's, as long as that is to be trusted."""
+        found = height_status(drifted_m, self._height)
+        where = "higher" if drifted_m > 0.0 else "lower"
+        words = f"the autopilot takes the vehicle to be {abs(drifted_m):.2f} m {where} than it is in the map"
+        if found == "DRIFTING":
+            self._host.warn("height", f"the barometer drifts: {words}", every_s=10.0)
+        if found != self._height:
+            self._height = found
+            self._host.report("mapping.height_status", found, "" if found == "AGREED" else words)
 
     def _publish_state(self, stamp_ns: int, registration: Registration | None) -> None:
         count = self._slam.count
@@ -248,3 +261,11 @@ class LidarMapping:
 
 def _time(stamp_ns: int) -> Time:
     return Time(stamp_ns // NS, stamp_ns % NS)
+
+
+def height_status(drifted_m: float, before: str) -> str:
+    """Return the state of `mapping.height_status`: WRONG stays until a mapping begins again."""
+    off_m = abs(drifted_m)
+    if off_m > HEIGHT_WRONG_M or before == "WRONG":
+        return "WRONG"
+    return "DRIFTING" if off_m > (HEIGHT_AGREES_M if before == "DRIFTING" else HEIGHT_DRIFT_M) else "AGREED"

@@ -28,6 +28,7 @@ REPORTS = {
     "perception.zed_status": ("/zed/left/image_raw", "/zed/right/image_raw"),
     "perception.lidar_status": ("/lidar/points",),
     "mapping.slam_status": ("/lidar/points",),
+    "mapping.height_status": ("/lidar/points",),
 }
 
 

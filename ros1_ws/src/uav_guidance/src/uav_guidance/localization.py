@@ -81,8 +81,8 @@ class Localization:
         self._sound_since_s: float | None = None
         self._begun = False
         self._stepped_s: float | None = None
-        self._above_m = self._level_m = 0.0
-        """The map's height above the autopilot's, as told last, and what of it has been followed for good."""
+        self._above_m = self._level_m = self._begun_m = 0.0
+        """The map's height above the autopilot's, as told last, what of it has been followed for good, and what it was when that began."""
 
     def tune(self, settings: GuidanceSettings) -> None:
         """Go on with other settings."""
@@ -120,8 +120,8 @@ class Localization:
         ``map_jump_m`` or ``map_jump_rad``: then a loop was closed, or the autopilot counts from another origin. To follow that slowly
         would keep the vehicle off its places for long, and move one that holds its place. The caller begins again from where the vehicle
         is, so that no setpoint jumps. In flight a change of height is followed up to ``map_height_m``, and one that goes on at
-        ``map_height_m_s``: a barometer drifts by centimetres a second, however long. A map that is worse than that, for it is not level,
-        must not lead the vehicle to the ground.
+        ``map_height_m_s``, in all up to ``map_height_most_m``: a barometer drifts by centimetres a second. A map that is worse than that,
+        for it is not level or drifts itself, must not lead the vehicle to the ground.
         """
         passed_s = 0.0 if self._stepped_s is None else min(max(now_s - self._stepped_s, 0.0), LONGEST_STEP_S)
         self._stepped_s = now_s
@@ -154,11 +154,13 @@ class Localization:
         above_m, before_m = told.shift_m.z, self._above_m
         self._above_m = above_m
         if not (flying and self._begun):
-            self._level_m = above_m
+            self._level_m = self._begun_m = above_m
         elif abs(above_m - before_m) > self._settings.map_jump_m:
             self._level_m += above_m - before_m
-        drift_m = self._settings.map_height_m_s * passed_s
+            self._begun_m += above_m - before_m
+        drift_m, in_all_m = self._settings.map_height_m_s * passed_s, self._settings.map_height_most_m
         self._level_m += min(max(above_m - self._level_m, -drift_m), drift_m)
+        self._level_m = min(max(self._level_m, self._begun_m - in_all_m), self._begun_m + in_all_m)
         most_m = self._settings.map_height_m
         bounded_m = min(max(above_m, self._level_m - most_m), self._level_m + most_m)
         return Correction(told.yaw_rad, Vec3(told.shift_m.x, told.shift_m.y, bounded_m))

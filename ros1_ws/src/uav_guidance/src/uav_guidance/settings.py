@@ -54,6 +54,7 @@ class GuidanceSettings:
     map_rate_rad_s: float = tunable(math.radians(2.0), 0.001, 0.5, "at which its heading in the map is corrected in flight")
     map_height_m: float = tunable(0.2, 0.0, 10.0, "up to which any change of the map's height against the autopilot's is followed at once")
     map_height_m_s: float = tunable(0.03, 0.0, 1.0, "at which a change that goes on is followed: a barometer that drifts")
+    map_height_most_m: float = tunable(2.0, 0.0, 100.0, "of such changes in a flight: what goes on farther may be the map")
     map_jump_m: float = tunable(1.0, 0.1, 100.0, "of correction, from which on it is taken at once and the reference begins again")
     map_jump_rad: float = tunable(math.radians(10.0), 0.01, math.pi, "of correction, likewise")
 
