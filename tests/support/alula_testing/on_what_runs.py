@@ -67,7 +67,8 @@ def _two_missions(robot: Path, run: Run) -> None:
     run("alula up robot")
     begun = processes(run)
     assert tuple(begun) == PARTS
-    assert json.loads(run("alula skills --json"))["resources"] == {"wheels": "FREE", "bumper": "CLEAR"}
+    known = {"wheels": "FREE", "bumper": "CLEAR", "link": "UP"}
+    until(lambda: json.loads(run("alula skills --json"))["resources"] == known, "the base tells its resources, and hears the managers")
     stamps = []
     for name in ("first", "second"):
         assert "mission accomplished\n" in run(f"alula run patrol --on robot --out runs/{name}")
