@@ -209,11 +209,11 @@ class _Look:
         ``needed``: a resource of it has a `silence`, after which nothing is known of it.
         """
         topic = f"/{skillset}{REPORTED}"
-        told = foreign(self._base.publishers.get(topic, frozenset()), bridges=False)
-        listening = foreign(self._base.subscribers.get(f"/{skillset}{STATES}", frozenset()), bridges=False)
+        told = foreign(self._base.publishers.get(topic, frozenset()), bridges=False) & self._reached
+        listening = foreign(self._base.subscribers.get(f"/{skillset}{STATES}", frozenset()), bridges=False) & self._reached
         copied = "copy resource_reporter and skillset_interfaces of this checkout to the base's computer, and build there"
         expected = self._types.message(STATES_TYPE).md5sum
-        for node in sorted(told & self._reached):
+        for node in sorted(told):
             try:
                 header = publisher_header(self._base.uris[node], topic, CALLER)
             except TimeoutError:
