@@ -115,8 +115,30 @@ def test_without_another_sensor_it_is_impossible_and_says_why(no_lidar: Path, ca
     assert found["answer"] == "impossible"
     reasons = found["reasons"]
     assert isinstance(reasons, list)
-    assert "perception.zed_depthmap can't start any more: it is refused by `zed_ready`" in reasons[0]
-    assert "perception.zed_status" in reasons[0]
+    assert "in no run without perception.zed_depthmap" in reasons[0]
+    assert "perception.zed_depthmap can't start any more: it is refused by `zed_ready`" in reasons[1]
+    assert "it could if perception.zed_status" in reasons[1]
+
+
+def test_nothing_maps_without_the_lidar(missions: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    found = answer(capsys, missions / "mapping.xml", "--fault", "lidar", code=1)
+    assert found["answer"] == "impossible"
+    assert "mapping.lidar_mapping" in str(found["reasons"])
+
+
+def test_the_end_by_which_a_mission_gives_up_is_written_again(missions: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    mission = missions / "mapping.xml"
+    mission.write_text(re.sub(r' *<SubTree ID="give_up"[^>]*/>\n', "", mission.read_text()))
+    shared = missions / "flying.xml"
+    shared.write_text(re.sub(r' *<BehaviorTree ID="give_up">.*?</BehaviorTree>\n', "", shared.read_text(), flags=re.DOTALL))
+    found = answer(capsys, mission, "--fault", "lidar", "--most-faults", "1")
+    one = found["repair"]
+    assert isinstance(one, dict)
+    assert re.findall(r"<(\w+) ", one["xml"])[1:] == ["ForceFailure", "Sequence", "NoteReason", "Script", "SubTree"]
+    fates = found["fates"]
+    assert isinstance(fates, list)
+    (lidar,) = [fate for fate in fates if fate["after"]["faults"] == ["lidar"]]
+    assert (lidar["before"]["safe"], lidar["after"]["safe"]) == (False, True)
 
 
 @pytest.mark.parametrize(

@@ -41,6 +41,12 @@ class Branch:
         return 1 if self.tree is None else sum(1 for _ in self.tree.iterate())
 
     @property
+    def key(self) -> tuple[str, ...]:
+        """What it is, whatever it is for."""
+        tree = "" if self.tree is None else "".join(self.tree.pieces())
+        return "".join(self.use.pieces()), tree, str(self.at)
+
+    @property
     def name(self) -> str:
         """What it is called."""
         return node_name(self.use)

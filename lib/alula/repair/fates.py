@@ -100,6 +100,23 @@ def fate_of(
     return Fate(tuple(faults), frozenset(outcomes), lost is None, safe, () if lost is None else _run(before, lost), len(before))
 
 
+def needs(steps: MissionSteps, skillsets: Sequence[Skillset], skill: str, deadline: Deadline) -> bool:
+    """Tell whether every run in which nothing fails, and the mission is accomplished, starts a skill; raises OutOfTimeError."""
+    ends = {f"{of.name}.{one.name}": _good_results(of, one.name) for of in skillsets for one in of.skills}
+    todo = deque((place, 0) for place in steps.initial())
+    seen = set(todo)
+    while todo:
+        here = todo.popleft()
+        deadline.check()
+        if steps.outcome(here[0]) in GOOD:
+            return False
+        for step, there in _following(steps, here, (), ends):
+            if skill not in step.uses and there not in seen:
+                seen.add(there)
+                todo.append(there)
+    return True
+
+
 def _good_results(skillset: Skillset, name: str) -> frozenset[str]:
     skill = skillset.skill(name)
     return frozenset(one.name for one in skill.results if skill.kind_of(one.name) is ResultKind.SUCCESS)

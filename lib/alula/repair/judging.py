@@ -14,7 +14,7 @@ from alula.prove.limits import Deadline
 from alula.prove.mission.prover import Proved, prove_within
 from alula.prove.mission.run import MissionRun
 from alula.prove.mission.system import System
-from alula.repair.fates import Fate, fate_of
+from alula.repair.fates import Fate, fate_of, needs
 from alula.repair.subject import Subject
 
 BOUND = "ALU710"
@@ -81,6 +81,12 @@ class Judge:
         found = self.fates(text)(faults, None)
         assert found is not None  # noqa: S101 - it has no bound
         return found
+
+    def needs(self, text: str, skill: str) -> bool:
+        """Tell whether a text of the mission's file is accomplished only where a skill starts; raises OutOfTimeError."""
+        with self._subject.copy(text) as path:
+            steps, _ = steps_of(self._subject.flown_as, changed=path)
+        return needs(steps, self._subject.skillsets, skill, self._deadline)
 
     def fates(self, text: str) -> Callable[[Sequence[str], int | None], Fate | None]:
         """Return what tells it of a text, of at most so many situations: of several faults that is quicker than one by one."""

@@ -31,7 +31,6 @@ from alula.trees.reading import node_name, type_name
 
 Tell = Callable[[str], None]
 TOGETHER = "Parallel"
-UNDECIDED = "not all its runs were looked at"
 MOST_SITUATIONS = 2_000
 """Of a mission with another fault than the one that is answered; where there are more, nothing is told of it."""
 SHARE = 0.3
@@ -81,7 +80,8 @@ class Repair:
 class Answer:
     """What came of the search: a repair, or why there is none.
 
-    ``impossible``: no skill of the robot can do it, as ``reasons`` show; otherwise nobody knows.
+    ``impossible``: it can't be accomplished with the fault, as ``reasons`` show; a repair then brings it to a safe end. Else, without a
+    repair, nobody knows.
     """
 
     failing: tuple[Failing, ...]
@@ -133,12 +133,13 @@ class Search:
         if fate is not None and fate.survives:
             return Answer(tuple(failing), fate)
         self._tell(f"{'; '.join(one.words for one in failing)}: {_told(fate)}")
-        repair, tried, open_ = self._first_proved(before, failing, fate, finding)
-        if repair is None:
-            reasons = [self._why_impossible(one) for one in failing] if not open_ else []
-            impossible = any(reasons)
-            return Answer(tuple(failing), fate, None, impossible, tuple(line for several in reasons for line in several), tried)
-        return Answer(tuple(failing), fate, self._with_fates(text, repair), tried=tried)
+        reasons = next((lines for one in failing if (lines := self._why_impossible(text, one))), [])
+        if reasons and (fate is None or fate.safe):
+            return Answer(tuple(failing), fate, None, impossible=True, reasons=tuple(reasons))
+        repair, tried = self._first_proved(before, failing, fate, finding)
+        if repair is not None:
+            repair = self._with_fates(text, repair)
+        return Answer(tuple(failing), fate, repair, bool(reasons), tuple(reasons), tried)
 
     def _without_branch(self, leave_out: Sequence[str]) -> tuple[str, list[str]]:
         document = self._subject.document()
@@ -174,10 +175,11 @@ class Search:
 
     def _first_proved(
         self, before: Judgement, failing: Sequence[Failing], fate: Fate | None, finding: Diagnostic | None
-    ) -> tuple[Repair | None, int, bool]:
-        """Return the first branch that is proved, how many were tried, and whether some could not be judged."""
-        tried, undecided = 0, False
-        branches = [one for leaf in failing for one in self._patterns.branches(leaf, within=self._question.within)]
+    ) -> tuple[Repair | None, int]:
+        """Return the first branch that is proved, and how many were tried."""
+        tried = 0
+        several = [one for leaf in failing for one in self._patterns.branches(leaf, within=self._question.within)]
+        branches = {one.key: one for one in several[::-1]}.values()  # two leaves may have the same answer
         for branch in sorted(branches, key=lambda one: one.size + one.wraps):
             if self._is_refuted(branch):
                 continue
@@ -185,12 +187,11 @@ class Search:
             try:
                 found = self._judged(branch, before, fate, finding)
             except (OutOfTimeError, KeyboardInterrupt):
-                return None, tried, True
+                return None, tried
             if isinstance(found, Repair):
-                return replace(found, tried=tried), tried, undecided
-            undecided = undecided or found == UNDECIDED
+                return replace(found, tried=tried), tried
             self._tell(f"{branch.size} nodes, '{branch.name}': no: {found}")
-        return None, tried, undecided
+        return None, tried
 
     def _judged(self, branch: Branch, before: Judgement, fate: Fate | None, finding: Diagnostic | None) -> Repair | str:
         """Return the repair, or why it is none."""
@@ -209,15 +210,20 @@ class Search:
             self._learn(branch, text, new[0])
             return new[0].message
         if not judgement.complete:
-            return UNDECIDED
+            return "not all its runs were looked at"
         if finding is not None and _is_left(judgement, before, finding):
             return "the counterexample is still there"
         written, _ = branch.written(self._subject)
         return Repair(branch, written, 0, tuple(not_asked))
 
-    def _why_impossible(self, failing: Failing) -> list[str]:
-        """Return why no tree can have done what a skill is for; empty where one might."""
+    def _why_impossible(self, text: str, failing: Failing) -> list[str]:
+        """Return why no tree can have done what a skill is for that the mission needs; empty where one might."""
         lines: list[str] = []
+        try:
+            if not failing.states or not self._judge.needs(text, failing.skill):
+                return []
+        except (OutOfTimeError, KeyboardInterrupt):
+            return []
         for purpose in self._patterns.all_stand_ins(failing):
             own = [(at.partition(".")[2], state) for at, state in failing.states if at.partition(".")[0] == purpose.skillset.name]
             try:
@@ -232,7 +238,8 @@ class Search:
                 f"{purpose.name} can't start any more: it is refused by {refused}, in each of {game.situations} situations; "
                 f"it could if {purpose.skillset.name}.{cure} left what the fault shows"
             )
-        return [*lines, f"no other skill is for what {failing.skill} is for"] if lines else []
+        needed = f"the mission is accomplished in no run without {failing.skill}, and no other skill is for the same"
+        return [needed, *lines]
 
     # --- counterexamples ---------------------------------------------------------------------------------------------
 

@@ -22,13 +22,14 @@ def as_text(answer: Answer, odds: Both | None) -> str:
         head = "impossible" if answer.impossible else "unknown: no branch was proved"
         lines = [f"{head}: {what} ({answer.tried} branches tried)", *(f"  {one}" for one in answer.reasons)]
         return "\n".join(lines) + "\n"
-    return "\n".join(_of_repair(answer.repair, what, odds)) + "\n"
+    return "\n".join(_of_repair(answer.repair, what, odds, answer.reasons)) + "\n"
 
 
-def _of_repair(repair: Repair, what: str, odds: Both | None) -> list[str]:
+def _of_repair(repair: Repair, what: str, odds: Both | None, reasons: Sequence[str]) -> list[str]:
     branch = repair.branch
     where = "in a Fallback around" if branch.wraps else "behind"
     lines = [f"repaired, proved by check: {what}", f"  '{branch.name}', {branch.size} nodes, {where} the node at {branch.at}"]
+    lines += [f"  it can't be accomplished then, and ends safely: {one}" for one in reasons]
     lines += ["", branch.as_xml(), ""] if branch.tree is not None else []
     lines += [f"  not proved: the property `{one}` asks for a node that the mission has not" for one in repair.not_asked]
     for faults, after in repair.after.items():
