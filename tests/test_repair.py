@@ -6,13 +6,22 @@ import io
 import json
 import re
 from contextlib import redirect_stderr, redirect_stdout
+from dataclasses import replace
 from pathlib import Path
 from typing import Any, NamedTuple
 
 import pytest
 
+from alula import Mission
+from alula.check.robot import part_of
 from alula.cli.check import main as check
 from alula.cli.repair import main as repair
+from alula.common.robots import find_robot
+from alula.common.scenarios import load_scenario
+from alula.missions.director import Outcome
+from alula.missions.mission_file import plan_of_file
+from alula.missions.mocked import MockedMission
+from alula.missions.scenario import inputs_of
 
 ALULA_ROOT = Path(__file__).resolve().parents[1]
 TIME_S = "600"
@@ -156,3 +165,28 @@ def test_what_can_not_be_asked_is_one_line(no_lidar: Path, capsys: pytest.Captur
     said = capsys.readouterr()
     assert said.out == ""
     assert message in said.err.splitlines()[-1]
+
+
+def flown(mission: Mission, path: Path, *faults: str) -> MockedMission:
+    """Fly a file over mocks instead of the scenario's own."""
+    inputs = inputs_of(load_scenario("mapping"))
+    part = part_of(find_robot(), pytest.fail)
+    return replace(mission, plan=plan_of_file(path, "mapping", mission.skillsets, inputs, part)).run(*faults, seed=1)
+
+
+def test_over_mocks_all_faults_end_as_with_the_branch_by_hand(repaired: Repaired, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setenv("ALULA_ROBOT", str(ALULA_ROOT))
+    mission = Mission.load("mapping", ALULA_ROOT)
+    for fault in mission.behaviour.faults:
+        for moment in (5, 12, 25):
+            ours = flown(mission, repaired.out, f"{fault}@{moment}")
+            theirs = flown(mission, ALULA_ROOT / "missions/mapping.xml", f"{fault}@{moment}")
+            assert ours.outcome is theirs.outcome, f"{fault}@{moment}"
+            assert decisions(ours) == decisions(theirs), f"{fault}@{moment}"
+            assert ours.world.now_s == pytest.approx(theirs.world.now_s, abs=1.0)
+    assert flown(mission, repaired.out, "zed@12").outcome is Outcome.DEGRADED
+
+
+def decisions(run: MockedMission) -> list[str]:
+    """Return the skills that have ended, in their order."""
+    return [one.skill for one in run.ended]
