@@ -129,6 +129,16 @@ def test_without_another_sensor_it_is_impossible_and_says_why(no_lidar: Path, ca
     assert "it could if perception.zed_status" in reasons[1]
 
 
+def test_a_branch_may_be_forbidden_to_do_something(no_lidar: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    found = answer(capsys, no_lidar, "--fault", "zed", "--most-faults", "1", "--never", "running(navigation.lock_head)", code=1)
+    assert found["answer"] == "unknown"
+
+
+def test_a_goal_is_as_good_as_an_accomplished_mission(no_lidar: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    goal = "outcome given_up and navigation.flight_status == ON_GROUND"
+    assert answer(capsys, no_lidar, "--fault", "zed", "--goal", goal)["answer"] == "nothing to repair"
+
+
 def test_nothing_maps_without_the_lidar(missions: Path, capsys: pytest.CaptureFixture[str]) -> None:
     found = answer(capsys, missions / "mapping.xml", "--fault", "lidar", code=1)
     assert found["answer"] == "impossible"
@@ -157,6 +167,8 @@ def test_the_end_by_which_a_mission_gives_up_is_written_again(missions: Path, ca
         ([], "name what is to be answered: --fault NAME, or --finding N"),
         (["--fault", "zed", "--using", "navigation.gota"], "--using navigation.gota: there is no such skill"),
         (["--fault", "zed", "--within", "nowhere"], "--within nowhere: there is no such node"),
+        (["--fault", "zed", "--never", "running(navigation.gota)"], "--never 'running(navigation.gota)'"),
+        (["--fault", "zed", "--goal", "outcome =="], "--goal 'outcome ==': can't be read as a condition"),
         (["--finding", "7"], "--finding 7: the mission has"),
     ],
 )

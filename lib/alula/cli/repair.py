@@ -47,7 +47,7 @@ def run(given: argparse.Namespace) -> int:
     tell = warner(COMMAND)
     subject = Subject.read(given.file, tell)
     using = tuple(one.strip() for part in given.using for one in part.split(",") if one.strip())
-    question = Question(given.fault, given.finding, given.within, using, given.most_faults)
+    question = Question(given.fault, given.finding, given.within, using, given.most_faults, given.goal, given.never)
     answer = Search(subject, question, Deadline.after(given.time, tell), tell).run()
     repair = answer.repair
     odds = None

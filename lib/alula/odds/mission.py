@@ -16,9 +16,11 @@ from fnmatch import fnmatchcase
 from typing import NamedTuple
 
 from alula.missions.director import Outcome as Ended
+from alula.model.expressions import Expression
 from alula.model.model import Skill
 from alula.odds.figures import NEVER, Figures
 from alula.odds.system import DEPARTURE, Kind, Outcome, Step
+from alula.prove.mission.conditions import true_in
 from alula.prove.mission.oracle import Asked
 from alula.prove.mission.state import Event, State
 from alula.prove.mission.state import Kind as Happens
@@ -83,6 +85,10 @@ class MissionSteps:
         """Return the state of ``skillset.resource``; None: the mission has nothing to do with it."""
         known = any(one.name == name.partition(".")[0] for one in self._system.skillsets)
         return self._system.resource(state.state, name) if known else None
+
+    def holds(self, state: Place, condition: Expression) -> bool:
+        """Tell whether a condition of a mission's property is true."""
+        return true_in(self._system, condition, state.state)
 
     def steps(self, state: Place) -> Iterator[Step[Place]]:
         """Yield what can happen; nothing where the mission was aborted. Before it begins nothing fails, and it waits for all it needs."""

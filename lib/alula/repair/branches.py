@@ -7,7 +7,7 @@ from collections.abc import Iterator
 from dataclasses import dataclass
 from textwrap import wrap
 
-from alula.repair.subject import Subject, without_properties_of
+from alula.repair.subject import Subject, with_property, without_properties_of
 from alula.trees.document import Document, Element, parse_document
 from alula.trees.errors import Place
 from alula.trees.reading import node_name
@@ -55,11 +55,15 @@ class Branch:
         """Return the subtree as it will stand in the file."""
         return "" if self.tree is None else "\n".join(_lines_of_tree(self))
 
-    def written(self, subject: Subject, leave_out: tuple[str, ...] = ()) -> tuple[str, list[str]]:
-        """Return the mission's file with it, and the properties that ask for nodes of these names, which are left out."""
+    def written(self, subject: Subject, leave_out: tuple[str, ...] = (), more: str = "") -> tuple[str, list[str]]:
+        """Return the mission's file with it, and the properties that ask for nodes of these names, which are left out.
+
+        ``more`` is a property that is asked besides.
+        """
         document = subject.document()
         _insert(document, self)
         taken = without_properties_of(document.root, leave_out)
+        with_property(document.root, subject.files.main, more)
         return document.text(), taken
 
 

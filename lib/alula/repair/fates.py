@@ -12,6 +12,7 @@ from collections import deque
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 
+from alula.model.expressions import Expression
 from alula.model.model import ResultKind, Skillset
 from alula.odds.mission import MissionSteps, Place
 from alula.odds.system import Kind, Outcome, Step
@@ -61,8 +62,11 @@ def fate_of(
     deadline: Deadline,
     rest: Sequence[tuple[str, str]] = (),
     most: int | None = None,
+    goal: Expression | None = None,
 ) -> Fate | None:
     """Return it; None: there are more situations than ``most``. ``rest`` are states of resources in which a robot is safe.
+
+    With a ``goal``, a mission survives, too, when it comes to be true after the faults.
 
     Raises OutOfTimeError.
     """
@@ -81,7 +85,7 @@ def fate_of(
         if most is not None and len(before) > most:
             return None
         outcome = steps.outcome(here[0])
-        if outcome in GOOD:
+        if outcome in GOOD or (goal is not None and here[1] == len(faults) and steps.holds(here[0], goal)):
             good.append(here)
         if outcome is not None:
             ends_at_rest.append(here)

@@ -9,6 +9,8 @@ from dataclasses import dataclass
 from pathlib import Path
 
 from alula.language.errors import Diagnostic, Severity
+from alula.model.expressions import Expression
+from alula.odds.mission import MissionSteps
 from alula.odds.robot import mission_of
 from alula.prove.limits import Deadline
 from alula.prove.mission.prover import Proved, prove_within
@@ -51,9 +53,10 @@ def _what(finding: Diagnostic) -> tuple[str, str]:
 class Judge:
     """Looks at a mission, and at what is made of it."""
 
-    def __init__(self, subject: Subject, deadline: Deadline) -> None:
+    def __init__(self, subject: Subject, deadline: Deadline, goal: Expression | None = None) -> None:
         self._subject = subject
         self._deadline = deadline
+        self._goal = goal
 
     def check(self, text: str, *, prove: bool = True) -> Judgement:
         """Return what `check` tells of a text of the mission's file; raises OutOfTimeError."""
@@ -84,21 +87,22 @@ class Judge:
 
     def needs(self, text: str, skill: str) -> bool:
         """Tell whether a text of the mission's file is accomplished only where a skill starts; raises OutOfTimeError."""
-        with self._subject.copy(text) as path:
-            steps, _ = steps_of(self._subject.flown_as, changed=path)
-        return needs(steps, self._subject.skillsets, skill, self._deadline)
+        return needs(self._steps(text), self._subject.skillsets, skill, self._deadline)
 
     def fates(self, text: str) -> Callable[[Sequence[str], int | None], Fate | None]:
         """Return what tells it of a text, of at most so many situations: of several faults that is quicker than one by one."""
-        with self._subject.copy(text) as path:
-            read, steps_of, _ = mission_of(self._subject.flown_as, changed=path)
-            steps = steps_of(read(""))
+        steps = self._steps(text)
 
         def fate(faults: Sequence[str], most: int | None) -> Fate | None:
             self._deadline.doing = f"looking at the runs with {' and then '.join(faults) or 'no fault'}"
-            return fate_of(steps, self._subject.skillsets, faults, self._deadline, self._subject.at_rest, most)
+            return fate_of(steps, self._subject.skillsets, faults, self._deadline, self._subject.at_rest, most, self._goal)
 
         return fate
+
+    def _steps(self, text: str) -> MissionSteps:
+        with self._subject.copy(text) as path:
+            read, steps_of, _ = mission_of(self._subject.flown_as, changed=path)
+            return steps_of(read(""))
 
 
 def run_of(finding: Diagnostic) -> MissionRun | None:

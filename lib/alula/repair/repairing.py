@@ -15,6 +15,10 @@ from contextlib import suppress
 from dataclasses import dataclass, field, replace
 
 from alula.language.errors import Diagnostic, Severity
+from alula.language.lexer import Source
+from alula.language.syntax.cursor import Cursor, SyntaxFault
+from alula.language.syntax.properties import read_mission_property
+from alula.model.expressions import Expression
 from alula.prove.limits import Deadline, OutOfTimeError
 from alula.prove.mission.run import MissionRun
 from alula.prove.mission.system import System
@@ -24,13 +28,15 @@ from alula.repair.fates import Fate
 from alula.repair.game import played
 from alula.repair.judging import Judge, Judgement, run_of
 from alula.repair.patterns import Failing, Patterns, failing_by
-from alula.repair.subject import Subject, without_properties_of
+from alula.repair.subject import Subject, with_property, without_properties_of
 from alula.trees.document import Element
 from alula.trees.node import Node
 from alula.trees.reading import node_name, type_name
 
 Tell = Callable[[str], None]
 TOGETHER = "Parallel"
+UNREAD = "ALU713"
+"""The finding about a property that can't be read."""
 MOST_SITUATIONS = 2_000
 """Of a mission with another fault than the one that is answered; where there are more, nothing is told of it."""
 SHARE = 0.3
@@ -47,6 +53,8 @@ class Question:
         within: the node that the branch has to stand in; empty: anywhere.
         using: the skills that a branch may add, ``skillset.skill``; empty: all.
         most_faults: how many faults may come, the first one included.
+        goal: a condition, written as in properties, that is as good as an accomplished mission; empty: there is none.
+        never: what no run of the repaired mission may come to.
     """
 
     fault: str = ""
@@ -54,6 +62,13 @@ class Question:
     within: str = ""
     using: tuple[str, ...] = ()
     most_faults: int = 2
+    goal: str = ""
+    never: str = ""
+
+    @property
+    def never_asked(self) -> str:
+        """The property that ``never`` is; empty where it is nothing."""
+        return f"asked_never: never {self.never}" if self.never else ""
 
 
 @dataclass(frozen=True)
@@ -113,7 +128,8 @@ class Search:
         self._question = question
         self._deadline = deadline
         self._tell = tell
-        self._judge = Judge(subject, deadline)
+        self._goal = _condition(question.goal) if question.goal else None
+        self._judge = Judge(subject, deadline, self._goal)
         self._patterns = Patterns(subject, question.using)
         self._refuted: set[frozenset[str]] = set()
         self._missing = tuple(subject.names_asked())
@@ -125,6 +141,7 @@ class Search:
         errors = [one for one in before.findings if one.severity is Severity.ERROR and one.code < "ALU7"]
         if errors:
             raise RepairError(f"the mission has errors, which come first: {errors[0].render()}")
+        self._can_be_asked()
         system = System.read(self._subject.path, self._subject.skillsets, self._subject.part)
         finding = self._finding(before)
         failing = self._failing(system, finding)
@@ -141,9 +158,19 @@ class Search:
             repair = self._with_fates(text, repair)
         return Answer(tuple(failing), fate, repair, bool(reasons), tuple(reasons), tried)
 
-    def _without_branch(self, leave_out: Sequence[str]) -> tuple[str, list[str]]:
+    def _can_be_asked(self) -> None:
+        """Raise RepairError where a condition that is asked for names what the robot has not."""
+        for option, condition in (("--never", self._question.never), ("--goal", self._question.goal)):
+            if condition:
+                text, _ = self._without_branch(self._missing, f"asked: never {condition}")
+                wrong = next((one for one in self._judge.check(text).findings if one.code == UNREAD), None)
+                if wrong is not None:
+                    raise RepairError(f"{option} '{condition}': {wrong.message}{f'; {wrong.hint}' if wrong.hint else ''}")
+
+    def _without_branch(self, leave_out: Sequence[str], more: str = "") -> tuple[str, list[str]]:
         document = self._subject.document()
         taken = without_properties_of(document.root, leave_out)
+        with_property(document.root, self._subject.files.main, more)
         return document.text(), taken
 
     def _finding(self, before: Judgement) -> Diagnostic | None:
@@ -197,7 +224,7 @@ class Search:
         """Return the repair, or why it is none."""
         names = {node_name(one) for one in (branch.tree.iterate() if branch.tree is not None else ())}
         leave_out = tuple(one for one in self._missing if one not in names)
-        text, not_asked = branch.written(self._subject, leave_out)
+        text, not_asked = branch.written(self._subject, leave_out, self._question.never_asked)
         if errors := [one for one in self._judge.check(text, prove=False).new(before) if one.severity is Severity.ERROR]:
             return errors[0].message
         if fate is not None:
@@ -267,7 +294,7 @@ class Search:
         stripped, _ = repair.branch.written(self._subject, self._missing)
         before: dict[tuple[str, ...], Fate] = {}
         after: dict[tuple[str, ...], Fate] = {}
-        judge = Judge(self._subject, Deadline.after(self._deadline.left_s() * SHARE, self._deadline.tell))
+        judge = Judge(self._subject, Deadline.after(self._deadline.left_s() * SHARE, self._deadline.tell), self._goal)
         with suppress(OutOfTimeError, KeyboardInterrupt):
             was, now = judge.fates(text), judge.fates(stripped)
             for faults in (*singles, *pairs):
@@ -275,6 +302,18 @@ class Search:
                 if fates[0] is not None and fates[1] is not None:
                     before[faults], after[faults] = fates[0], fates[1]
         return replace(repair, before=before, after=after)
+
+
+def _condition(text: str) -> Expression:
+    """Read a condition, as those of a mission's properties; raises RepairError."""
+    source = Source("", f"goal: eventually {text}".replace("'", '"'))
+    with suppress(SyntaxFault):
+        cursor = Cursor(source)
+        one = read_mission_property(cursor)
+        if cursor.at_end and not source.diagnostics:
+            return one.condition
+    why = f": {source.diagnostics[0].message}" if source.diagnostics else ""
+    raise RepairError(f"--goal '{text}': can't be read as a condition, such as outcome given_up or running(skillset.skill){why}")
 
 
 def _told(fate: Fate | None) -> str:

@@ -130,6 +130,14 @@ def without_properties_of(root: Element, missing: Collection[str]) -> list[str]:
     return taken
 
 
+def with_property(root: Element, main: str, text: str) -> None:
+    """Add a property to what the top of a tree says."""
+    tree = next((one for one in root.children if one.get("ID") == main), None)
+    if tree is not None and text:
+        top = tree.children[0]
+        top.set(DESCRIPTION, f"{top.get(DESCRIPTION).rstrip().rstrip(';')}; property {text};".lstrip("; "))
+
+
 def texts_of(root: Element) -> Sequence[str]:
     """Return all that a file says in names, comments and attributes: how its author spells words."""
     parts = [part for one in root.iterate() for part in one.content if isinstance(part, str)]

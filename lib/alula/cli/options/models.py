@@ -88,6 +88,8 @@ def repair(parser: ArgumentParser) -> None:
     parser.add_argument("file", type=Path, metavar="FILE", help=MISSION_HELP)
     completed_by(parser.add_argument("--fault", default="", metavar="NAME", help="the fault that is to be survived"), "faults")
     parser.add_argument("--finding", type=int, default=0, metavar="N", help="the counterexample of `alula check` that is to be answered")
+    parser.add_argument("--goal", default="", metavar="CONDITION", help="what is as good as an accomplished mission, as in properties")
+    parser.add_argument("--never", default="", metavar="CONDITION", help="what no run of the repaired mission may come to")
     parser.add_argument("--within", default="", metavar="NODE", help="where the branch has to stand (default: anywhere)")
     parser.add_argument(
         "--using", action="append", default=[], metavar="SKILLS", help="skills that may stand for the one that fails (default: all)"
