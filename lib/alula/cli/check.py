@@ -6,7 +6,6 @@ are printed there instead, and findings go to standard error.
 
 from __future__ import annotations
 
-import json
 import sys
 from collections import Counter
 from collections.abc import Sequence
@@ -15,6 +14,7 @@ from dataclasses import replace
 from alula.api.checking import checked_files, prove_files, robot_models
 from alula.cli.saying import warner
 from alula.cli.table import parse
+from alula.common.files import json_line
 from alula.common.garbage import collect_seldom
 from alula.common.robots import RobotError, find_robot
 from alula.language.errors import Diagnostic, Severity, has_errors, render
@@ -58,7 +58,11 @@ def main(arguments: Sequence[str] | None = None) -> int:
     code = exit_code(findings)
     if options.to is not None:
         return _convert(files, Notation(options.to), code)
-    _write(_as_json(files, code) if options.json else _as_text(files))
+    if options.json:
+        found = [{"file": file.path, "findings": [one.as_json() for one in file.findings]} for file in files]
+        sys.stdout.write(json_line({"exit_code": code, "files": found}))
+    else:
+        _write(_as_text(files))
     return code
 
 
@@ -91,11 +95,6 @@ def _write(text: str) -> None:
     """Write to the standard output whatever its encoding; names and paths may hold anything."""
     encoding = sys.stdout.encoding or "utf-8"
     sys.stdout.write(text.encode(encoding, "backslashreplace").decode(encoding) + "\n")
-
-
-def _as_json(files: Sequence[ModelFile], code: int) -> str:
-    found = [{"file": file.path, "findings": [f.as_json() for f in file.findings]} for file in files]
-    return json.dumps({"exit_code": code, "files": found}, indent=2)
 
 
 def _as_text(files: Sequence[ModelFile]) -> str:

@@ -3,13 +3,12 @@
 from __future__ import annotations
 
 import argparse
-import json
 import sys
 from collections.abc import Sequence
 from pathlib import Path
 
 from alula.cli.table import parser_of
-from alula.common.files import strict, write_aside
+from alula.common.files import json_line, write_aside
 from alula.records.comparing import compare, load_side
 from alula.records.comparing.telling import as_dict, lines
 from alula.records.errors import AnalysisError
@@ -47,8 +46,7 @@ def main(arguments: Sequence[str] | None = None) -> int:
     except (AnalysisError, OSError, ValueError) as error:
         sys.stderr.write(f"alula compare: {error}\n")
         return UNREADABLE
-    text = json.dumps(strict(as_dict(compared)), indent=2) if given.json else "\n".join(lines(compared))
-    sys.stdout.write(text + "\n")
+    sys.stdout.write(json_line(as_dict(compared)) if given.json else "\n".join(lines(compared)) + "\n")
     return ALIKE if compared.alike else DIFFERENT
 
 

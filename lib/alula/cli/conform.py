@@ -5,11 +5,11 @@ With ``--complete`` a log that misses something conforms only up to there, and t
 
 from __future__ import annotations
 
-import json
 import sys
 from collections.abc import Iterator, Sequence
 
 from alula.cli.table import parse
+from alula.common.files import json_line
 from alula.records.conformance import ConformanceVerdict, judge
 from alula.records.errors import AnalysisError
 from alula.records.logs import Log, read_log
@@ -51,10 +51,9 @@ def main(arguments: Sequence[str] | None = None) -> int:
         sys.stderr.write(f"alula conform: {error}\n")
         return UNREADABLE
     if given.json:
-        text = json.dumps({"log": str(log.path), **verdict.as_dict(), "cut": log.cut}, indent=2)
+        sys.stdout.write(json_line({"log": str(log.path), **verdict.as_dict(), "cut": log.cut}))
     else:
-        text = "\n".join(lines(log, verdict))
-    sys.stdout.write(text + "\n")
+        sys.stdout.write("\n".join(lines(log, verdict)) + "\n")
     missing = holes(log, verdict) if given.complete else ()
     if missing:
         sys.stderr.write(f"alula conform: {log.path}: is not complete: {'; '.join(missing)}\n")

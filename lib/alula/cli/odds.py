@@ -6,13 +6,12 @@ Ends with 0, and with 2 when a file can't be read or is wrong, or there is no St
 from __future__ import annotations
 
 import argparse
-import json
 import sys
 from collections.abc import Sequence
 
 from alula.cli.saying import warner
 from alula.cli.table import parse
-from alula.common.files import write_text
+from alula.common.files import json_line, write_text
 from alula.common.robots import RobotError
 from alula.common.scenarios import ScenarioError
 from alula.missions.plan import InputError
@@ -60,7 +59,7 @@ def run(given: argparse.Namespace) -> int:
     title = f"{given.file.name}: odds"
     if given.svg is not None:
         write_text(given.svg, as_svg(title, found))
-    sys.stdout.write(json.dumps(as_dict(found, others)) + "\n" if given.json else as_text(title, found, others))
+    sys.stdout.write(json_line(as_dict(found, others)) if given.json else as_text(title, found, others))
     return 0
 
 

@@ -58,6 +58,11 @@ def _range(choices: Any) -> str:
     return f"{every[0]} to {every[-1]}" if isinstance(choices, range) else ", ".join(map(str, every))
 
 
+def json_option(parser: argparse.ArgumentParser, what: str) -> None:
+    """Add ``--json``: a command prints ``what`` then as `alula.common.files.json_line` does, a line each."""
+    parser.add_argument("--json", action="store_true", help=f"print {what} as JSON, an object a line")
+
+
 def completed_by(action: argparse.Action, words: str) -> None:
     """Say which words of the robot complete an argument: a name of `alula.cli.completion.WORDS`."""
     setattr(action, _WORDS, words)

@@ -6,7 +6,6 @@ Exit code 0: the managers do what the counterexample says; 1: they do something 
 from __future__ import annotations
 
 import argparse
-import json
 import sys
 from collections.abc import Mapping, Sequence
 from pathlib import Path
@@ -14,6 +13,7 @@ from pathlib import Path
 from alula.api.checking import counterexamples_of, is_mission
 from alula.cli.play_mission import play_mission
 from alula.cli.saying import warner
+from alula.common.files import json_line
 from alula.language.models import check_files, models_in
 from alula.prove.skillset.play import PlayedStep, play
 
@@ -55,4 +55,4 @@ def _as_text(title: str, played: Sequence[PlayedStep], *, agrees: bool) -> str:
 
 def _as_json(title: str, played: Sequence[PlayedStep], *, agrees: bool) -> str:
     steps = [{**one.step.as_json(), "differences": list(one.differences)} for one in played]
-    return json.dumps({"finding": title, "agrees": agrees, "steps": steps}, indent=2) + "\n"
+    return json_line({"finding": title, "agrees": agrees, "steps": steps})

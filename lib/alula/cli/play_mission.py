@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import argparse
-import json
 import sys
 from collections.abc import Mapping
 from pathlib import Path
@@ -12,6 +11,7 @@ from alula.api.checking import CheckedMission, checked_files, prove_missions
 from alula.check.robot import part_of
 from alula.cli.run_request import run_folder
 from alula.cli.saying import warner
+from alula.common.files import json_line
 from alula.common.robots import RobotError, find_robot
 from alula.common.run_log import note_mocked
 from alula.language.errors import has_errors
@@ -73,7 +73,7 @@ def _flown(source: TreeSource, finding: MissionFinding, folder: Path, *, as_json
             "outcome": played.end.outcome.value,
             "folder": str(folder),
         }
-        sys.stdout.write(json.dumps(told, indent=2) + "\n")
+        sys.stdout.write(json_line(told))
     else:
         goes_on = finding.run.outcome == Outcome.RUNNING.value
         same = "situation" if goes_on else f"end: {played.end.outcome.value}"

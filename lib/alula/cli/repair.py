@@ -6,7 +6,6 @@ Ends with 0 when a branch was proved, or none is needed; 1: it is impossible, or
 from __future__ import annotations
 
 import argparse
-import json
 import sys
 from collections.abc import Sequence
 from pathlib import Path
@@ -14,7 +13,7 @@ from pathlib import Path
 from alula.cli.saying import warner
 from alula.cli.table import parse
 from alula.common.errors import AlulaError
-from alula.common.files import write_text
+from alula.common.files import json_line, write_text
 from alula.common.garbage import collect_seldom
 from alula.odds.errors import OddsError
 from alula.odds.odds import Odds, odds_of
@@ -57,7 +56,7 @@ def run(given: argparse.Namespace) -> int:
     if repair is not None and given.out is not None:
         write_text(given.out, repair.text)
         tell(f"{given.out} has it")
-    sys.stdout.write(json.dumps(as_dict(answer, odds)) + "\n" if given.json else as_text(answer, odds))
+    sys.stdout.write(json_line(as_dict(answer, odds)) if given.json else as_text(answer, odds))
     return 0 if repair is not None or answer.survives_already else NONE
 
 

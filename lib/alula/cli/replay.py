@@ -11,7 +11,6 @@ not be replayed).
 from __future__ import annotations
 
 import argparse
-import json
 import sys
 import tempfile
 from collections.abc import Callable, Mapping, Sequence
@@ -22,7 +21,7 @@ from alula.cli.options.runs import SKILLS
 from alula.cli.options.runs import replay as options
 from alula.cli.parser import Parser
 from alula.common.faults import parse_fault
-from alula.common.files import write_text
+from alula.common.files import json_line, write_text
 from alula.common.record import FILE
 from alula.records.errors import AnalysisError
 from alula.records.expectations import Checked, check, junit, load_expectations
@@ -123,8 +122,7 @@ def decide_again(given: Arguments, recorded: Recorded, folder: Path, out: Path |
 def tell(recorded: Recorded, result: Result, *, as_json: bool) -> None:
     """Write the decisions to standard output, and what came of them to standard error."""
     for line, decision in zip(trace_of(result, recorded.zero_s), result.decisions, strict=True):
-        text = json.dumps(line) if as_json else f"{decision.t_s - recorded.zero_s:9.2f} s  {decision.words()}"
-        sys.stdout.write(f"{text}\n")
+        sys.stdout.write(json_line(line) if as_json else f"{decision.t_s - recorded.zero_s:9.2f} s  {decision.words()}\n")
     for text in verdict(recorded, result):
         sys.stderr.write(f"{text}\n")
 

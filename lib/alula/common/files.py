@@ -41,6 +41,11 @@ def strict(value: object) -> object:
             return value
 
 
+def json_line(value: object) -> str:
+    """Return a value as a line of strict JSON, as all commands print their results with ``--json``."""
+    return json.dumps(strict(value), allow_nan=False) + "\n"
+
+
 def write_json(path: Path, value: object) -> None:
     """Replace a file with strict JSON in one step."""
     write_text(path, json.dumps(strict(value), indent=2, allow_nan=False) + "\n")

@@ -60,7 +60,9 @@ def test_text(tmp_path, capsys):
 def test_json(tmp_path, capsys):
     (path,) = write(tmp_path, a=WRONG)
     assert main([path, "--json"]) == 1
-    document = json.loads(capsys.readouterr().out)
+    told = capsys.readouterr().out
+    assert told.count("\n") == 1
+    document = json.loads(told)
     assert document["exit_code"] == 1
     (file,) = document["files"]
     assert file["file"] == path

@@ -29,6 +29,14 @@ def test_a_command_is_described_and_its_module_does_it(name: str) -> None:
     assert {words_completing(action) for action in command.parser()._actions} <= {"", *WORDS}
 
 
+def test_json_is_the_same_in_every_command_that_has_it() -> None:
+    helps = {
+        name: str(action.help) for name in COMMANDS for action in COMMANDS[name].parser()._actions if "--json" in action.option_strings
+    }
+    assert {"check", "conform", "data", "doctor", "odds", "replay", "status", "tree"} <= set(helps)
+    assert {name for name, text in helps.items() if not text.endswith(" as JSON, an object a line")} == set()
+
+
 def test_what_the_table_names_without_importing_it_is_there() -> None:
     assert set(NOTATIONS) == {notation.value for notation in Notation}
 

@@ -52,7 +52,8 @@ def test_another_flight_is_told_with_its_first_other_decision_and_its_figures(fo
 
 def test_json_has_every_figure_and_decision(folders, capsys):
     assert main([str(folders["nominal"]), str(folders["zed-fails"]), "--json"]) == 1
-    told = json.loads(capsys.readouterr().out)
+    (line,) = capsys.readouterr().out.splitlines()
+    told = json.loads(line)
     assert (told["alike"], [side["outcome"] for side in told["runs"]]) == (False, ["accomplished", "degraded"])
     assert told["runs"][1]["figures"]["map coverage"] == 0.9
     assert told["runs"][0]["decisions"][0]["what"] == "start navigation.takeoff"

@@ -8,7 +8,7 @@ from pathlib import Path
 from typing import Any
 
 from alula.cli.options.runs import FAULT
-from alula.cli.parser import completed_by
+from alula.cli.parser import completed_by, json_option
 
 DOMAINS = range(233)
 LATEST = "latest"
@@ -88,7 +88,7 @@ def talking(*own: Callable[[ArgumentParser], None]) -> Callable[[ArgumentParser]
         domain = place.add_argument("--domain", type=int, choices=DOMAINS, metavar="N", help="the skillsets in this DDS domain")
         completed_by(domain, "nothing")
         parser.add_argument("--namespace", default="", metavar="NS", help="only the robot in this namespace")
-        parser.add_argument("--json", action="store_true", help="print a JSON object a line")
+        json_option(parser, "each result")
 
     return add
 
@@ -113,14 +113,14 @@ def down(parser: ArgumentParser) -> None:
 def status(parser: ArgumentParser) -> None:
     """Add what ``alula status`` takes."""
     deployed(parser)
-    parser.add_argument("--json", action="store_true", help="print a JSON object")
+    json_option(parser, "the state of its parts")
 
 
 def doctor(parser: ArgumentParser) -> None:
     """Add what ``alula doctor`` takes."""
     words = "look at this one on what runs, instead of at the installation: names, master, nodes, bindings, ROS 2, clocks, disk"
     completed_by(parser.add_argument("deployment", nargs="?", metavar="DEPLOYMENT", help=words), "deployments")
-    parser.add_argument("--json", action="store_true", help="of a deployment: print a JSON object")
+    json_option(parser, "what was found of a deployment")
 
 
 def service(parser: ArgumentParser) -> None:

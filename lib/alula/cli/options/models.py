@@ -5,7 +5,7 @@ from __future__ import annotations
 from argparse import Action, ArgumentParser, Namespace
 from pathlib import Path
 
-from alula.cli.parser import completed_by
+from alula.cli.parser import completed_by, json_option
 
 NOTATIONS = ("paper", "rl")
 FORMAT = "4"
@@ -26,7 +26,7 @@ PALETTE_HELP = "a TreeNodesModel with more types of node, as Groot2's"
 def check(parser: ArgumentParser) -> None:
     """Add what ``alula check`` takes."""
     parser.add_argument("files", nargs="*", metavar="FILE", help=f"{FILES_HELP} (default: the robot's)")
-    parser.add_argument("--json", action="store_true", help="print one JSON object: each finding's place, code, counterexample")
+    json_option(parser, "all findings, each with its place, code and counterexample,")
     parser.add_argument("--palette", action="append", default=[], metavar="FILE", help=f"with a mission: {PALETTE_HELP}")
     _trees(parser)
     parser.add_argument(
@@ -80,7 +80,7 @@ def odds(parser: ArgumentParser) -> None:
     )
     parser.add_argument("--most", type=int, default=MOST_SITUATIONS, metavar="N", help=f"situations looked at ({MOST_SITUATIONS})")
     parser.add_argument("--svg", type=Path, metavar="FILE", help="write a picture there, too")
-    parser.add_argument("--json", action="store_true", help="print one JSON object")
+    json_option(parser, "the odds")
 
 
 def repair(parser: ArgumentParser) -> None:
@@ -97,7 +97,7 @@ def repair(parser: ArgumentParser) -> None:
     parser.add_argument("--most-faults", type=int, default=2, metavar="K", help="how many faults may come, one after another (default 2)")
     parser.add_argument("--time", type=float, default=REPAIR_S, metavar="SECONDS", help=f"time limit (default {REPAIR_S:g})")
     parser.add_argument("--out", type=Path, metavar="FILE", help="write the mission with the branch there (default: nothing is written)")
-    parser.add_argument("--json", action="store_true", help="print one JSON object")
+    json_option(parser, "the branch")
 
 
 def tree(parser: ArgumentParser) -> None:
@@ -120,7 +120,7 @@ def tree(parser: ArgumentParser) -> None:
     parser.add_argument("--ticks", type=int, metavar="N", help=f"with answers, how often it is ticked ({TICKS})")
     parser.add_argument("--trace", action="store_true", help="with answers, tell of each tick what changed: statuses, entries")
     parser.add_argument("--html", type=Path, metavar="FILE", help="with answers, write a page that steps through the ticks")
-    parser.add_argument("--json", action="store_true", help="print the tree, or each tick, as JSON")
+    json_option(parser, "the tree, or each tick,")
 
 
 def palette(parser: ArgumentParser) -> None:

@@ -5,7 +5,7 @@ from __future__ import annotations
 from argparse import ArgumentParser
 from pathlib import Path
 
-from alula.cli.parser import completed_by
+from alula.cli.parser import completed_by, json_option
 
 FAULT = "WHAT[:HOW][@SECONDS[-SECONDS]]"
 ANSWERS_S = 120.0
@@ -109,7 +109,7 @@ def replay(parser: ArgumentParser, depths: tuple[str, ...] = DEPTHS) -> None:
     parser.add_argument("--out", type=Path, metavar="DIR", help="folder for the replay's own record, summary, pictures and report")
     parser.add_argument("--expect", type=Path, metavar="FILE", help="check the replay against expectations; they decide the exit code")
     parser.add_argument("--junit", type=Path, metavar="FILE", help="with --expect: also write the results as JUnit XML")
-    parser.add_argument("--json", action="store_true", help="print each decision and the difference as a line of JSON")
+    json_option(parser, "each decision")
 
 
 def expect(parser: ArgumentParser) -> None:
@@ -131,13 +131,13 @@ def conform(parser: ArgumentParser) -> None:
         help="check it against this model (default: the models of the managers that wrote it)",
     )
     parser.add_argument("--complete", action="store_true", help="exit with 1 if the log has a gap, breaks off, or ends within a step")
-    parser.add_argument("--json", action="store_true", help="print the verdict as JSON")
+    json_option(parser, "the verdict")
 
 
 def compare(parser: ArgumentParser) -> None:
     """Add what ``alula compare`` takes."""
     parser.add_argument("runs", type=Path, nargs="+", metavar="RUN", help="two or more folders of runs, or logs")
-    parser.add_argument("--json", action="store_true", help="print the comparison as JSON")
+    json_option(parser, "the comparison")
     parser.add_argument("--svg", type=Path, metavar="FILE", help="also draw the skills of all runs over time")
 
 
