@@ -57,8 +57,15 @@ def links(page: Path) -> Iterator[str]:
     return (target for target in re.findall(r"\]\(([^)\s]+)\)", page.read_text()) if not re.match(r"\w+:", target))
 
 
-SIZES = {"README.md": 5_000, "docs/how-to": 6_000, "docs/start": 6_000}
-"""How many bytes a page may have: who has a task reads the whole of it."""
+SIZES = {
+    "README.md": 5_000,
+    "docs/how-to": 6_000,
+    "docs/start": 6_000,
+    "docs/reference/performance.md": 22_500,
+    "docs/reference/robots.md": 10_500,
+    "docs/reference/mocks.md": 7_600,
+}
+"""How many bytes a page may have: of a task, which is read whole, and of a reference that was made shorter."""
 
 
 @pytest.mark.parametrize("name", NAMES)
@@ -70,7 +77,7 @@ def test_a_page_says_for_whom_it_is(name: str) -> None:
 
 
 @pytest.mark.parametrize("name", [name for name in NAMES if name.startswith(tuple(SIZES))])
-def test_a_page_of_one_task_is_short(name: str) -> None:
+def test_a_page_is_no_longer_than_it_may_be(name: str) -> None:
     limit = next(size for place, size in SIZES.items() if name.startswith(place))
     assert (ALULA_ROOT / name).stat().st_size <= limit
 
