@@ -1,4 +1,4 @@
-"""Flown answers beside proved ones: what a campaign's missions did about each failure, and what they can do in all their runs.
+"""Compare how the missions of a campaign reacted to each failure with all reactions that the search of their runs proves possible.
 
 A flown answer that the proof does not know is an error of one of them.
 """
@@ -25,7 +25,7 @@ NOTHING = "nothing more"
 
 @dataclass(frozen=True)
 class Flown:
-    """An answer as it was flown: what was asked for, and how the mission ended; ``runs`` are those that did, once for each time."""
+    """A reaction as it was flown: the skills requested and the outcome; ``runs`` has the number of each such run, once for each time."""
 
     asked: Asked
     outcome: str
@@ -40,7 +40,7 @@ class Flown:
 
 @dataclass
 class Beside:
-    """A failure at a moment: what the tree can do about it, and what it did; ``proved`` None: the proof knows of no such failure then."""
+    """A failure at a moment, with the proved and the flown reactions; ``proved`` None: the search found no such failure then."""
 
     key: Key
     skill: str
@@ -132,7 +132,7 @@ class MissionAnswers:
 
 
 def beside(scenario: str, mission: ProvedMission, rows: Iterable[Row]) -> MissionAnswers:
-    """Hold the flown answers of a scenario's runs against those that are proved."""
+    """Compare the flown reactions of a scenario's runs with the proved ones."""
     found = {key: Beside(key, one.skill, one) for key, one in mission.answers.items()}
     flown: dict[tuple[Key, Asked, str, str, str], Flown] = {}
     for row in rows:

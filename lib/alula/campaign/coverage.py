@@ -36,7 +36,7 @@ class Cover:
 
     @property
     def times(self) -> int:
-        """How often it came about."""
+        """How often it happened."""
         return self.responses.total()
 
     def as_dict(self) -> dict[str, object]:
@@ -66,7 +66,7 @@ class Coverage:
 
     @property
     def never(self) -> list[Way]:
-        """What no run has tried."""
+        """The ways to fail that no run has tried."""
         return [cover.way for cover in self.covers if not cover.times]
 
     def as_dict(self) -> dict[str, object]:
@@ -79,7 +79,7 @@ class Coverage:
 
 
 def cover(rows: Iterable[Row], ways: Iterable[Way], answers: Sequence[MissionAnswers] = ()) -> Coverage:
-    """Count what became of each way to fail; ``answers`` are those of the same runs, beside the proved ones."""
+    """Count the outcomes of each way to fail; ``answers`` are the reactions of the same runs, compared with the proved ones."""
     covers = {way: Cover(way) for way in ways}
     outcomes: Counter[str] = Counter()
     troubled: list[int] = []

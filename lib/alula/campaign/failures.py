@@ -36,7 +36,7 @@ class Way:
 
 @dataclass(frozen=True)
 class Failure:
-    """A way to fail that came about.
+    """A failure that happened in a run.
 
     Attributes:
         at_s: when, seconds of mission clock.

@@ -1,4 +1,4 @@
-"""What the tree of a flown mission did about each failure that it saw: what it asked for then, and what else ran when it saw it.
+"""How the tree of a flown mission reacted to each failure: the skills that it requested next, and what else ran at that moment.
 
 This is what the proof tells of all runs (``alula.prove.mission.answers``), of one: by ticks, not by the managers' events.
 """
@@ -19,7 +19,7 @@ from alula.trees.status import FAILURE, RUNNING, Status
 
 @dataclass(frozen=True)
 class FlownAnswer:
-    """A failure that the tree saw, and its answer.
+    """A failure that the tree saw, and its reaction.
 
     Attributes:
         id: of the execution that failed.
@@ -61,29 +61,29 @@ class _Tick:
 
 
 class Ticks:
-    """Hears a mission's ticks (a ``Listener`` of ``MockedMission``), and tells the answers at its end."""
+    """Listens to a mission's ticks (a ``Listener`` of ``MockedMission``), and returns the reactions at its end."""
 
     def __init__(self) -> None:
         self._ticks = [_Tick(())]
         self._running: dict[SkillNode, None] = {}
 
     def watch(self, root: Node) -> None:
-        """Have the nodes of a tree told of."""
+        """Record what the nodes of a tree do from now on."""
         root.watchers.append(self._changed)
 
     def tick(self) -> None:
-        """Begin the next one; those that saw and did nothing are forgotten."""
+        """Begin the next tick; ticks that saw no failure and requested nothing are dropped."""
         if not (self._ticks[-1].failed or self._ticks[-1].asked):
             self._ticks.pop()
         self._ticks.append(_Tick([node for node in self._running if node.leaf.handle is not None]))
 
     def decision(self, kind: str, skillset: str, skill: str, execution_id: str, inputs: Mapping[str, object]) -> None:  # noqa: ARG002
-        """Take a request of the tree."""
+        """Record a request of the tree."""
         if kind == "start":
             self._ticks[-1].asked.append(execution_id)
 
     def report(self, skillset: str, handle: SkillHandle) -> None:
-        """Take no notice: what the tree sees of it, its leaf tells."""
+        """Ignore it: the leaf tells what the tree sees of it."""
 
     def sample(self, skillset: str, data: str, value: object, stamp_ns: int | None) -> None:
         """Take no notice."""

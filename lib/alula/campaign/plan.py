@@ -51,7 +51,7 @@ class Campaign:
     scenarios: tuple[str, ...] = field(default=())
 
     def as_dict(self) -> dict[str, object]:
-        """Return what decides the table: a campaign goes on only where this is the same."""
+        """Return all that determines the table: a campaign is continued only where this has not changed."""
         runs = [{**asdict(planned), "world": planned.world and planned.world.read_text(encoding="utf-8")} for planned in self.runs]
         return {
             "over": self.over,
@@ -145,7 +145,7 @@ def _fault(part: Located, text: str) -> str:
 
 @dataclass(frozen=True)
 class _Kind:
-    """A fault to draw: what and how; it lasts as long as ``lasts_s`` says, where that is None as long as the draw says."""
+    """A fault to draw: its name and way; it lasts ``lasts_s`` seconds, or, where that is None, as long as the draw says."""
 
     what: str
     how: str
@@ -154,7 +154,7 @@ class _Kind:
 
 @dataclass(frozen=True)
 class _Draw:
-    """What is drawn for a run: when each fault comes and how long it lasts.
+    """The ranges from which a run's faults are drawn: their start times and durations, seconds.
 
     Which faults come is drawn, too: up to ``most`` of ``faults``. With ``in_turn``, the runs of a scenario take its lists one after
     another instead, and begin again after the last one.

@@ -1,4 +1,4 @@
-"""What a mission's tree can do about each failure, in all its runs: what flown answers are held against."""
+"""All reactions of a mission's tree to each failure, from the search of its runs; flown reactions are compared with them."""
 
 from __future__ import annotations
 
@@ -36,7 +36,7 @@ Asked = frozenset[Path]
 
 @dataclass(frozen=True)
 class ProvedAnswer:
-    """What the tree can do about a failure at a moment.
+    """All reactions of the tree to a failure at a moment.
 
     Attributes:
         place: of the leaf that fails.
@@ -80,7 +80,7 @@ class ProvedMission:
 def proved(
     scenario: Scenario, models: Sequence[Skillset], effects: EffectsByFault, tell: Callable[[str], None], time_s: float
 ) -> ProvedMission:
-    """Look at all runs of a scenario's mission within a time; ``tell`` hears now and then how far a long search is."""
+    """Search all runs of a scenario's mission within a time; ``tell`` gets the progress of a long search."""
     if not scenario.mission.endswith(".xml"):
         return ProvedMission(unproved=f"{scenario.mission} is no file of a tree")
     deadline = Deadline.after(time_s, tell)

@@ -1,4 +1,4 @@
-"""Does the runs of a campaign, in whatever process, and makes a row of each. A row says nothing of the machine or the time of day."""
+"""Runs the missions of a campaign, in any process, and makes a row of each; a row holds nothing that depends on machine or date."""
 
 from __future__ import annotations
 
@@ -34,7 +34,7 @@ Row = dict[str, Any]
 
 
 def rows_of(runs: Sequence[PlannedRun], over: str, behaviour: tuple[str, ...], out: str, options: tuple[str, ...] = ()) -> list[Row]:
-    """Do one after another; return a row of each. ``out`` is the campaign's folder: runs in the simulator leave theirs there."""
+    """Run one after another; return a row each. Runs in the simulator leave their folders in ``out``, the campaign's folder."""
     if over == SIMULATOR:
         return [_simulated(planned, options, Path(out)) for planned in runs]
     return [_mocked(planned, behaviour) for planned in runs]
@@ -78,7 +78,7 @@ def came_back(events: Sequence[EngineEvent]) -> bool | None:
 
 @dataclass(frozen=True)
 class _Evidence:
-    """What a run has left.
+    """The events and facts that a run has left.
 
     Attributes:
         events: of its managers.
@@ -146,7 +146,7 @@ def _ended(died: Mapping[str, Any], events: Sequence[EngineEvent], effects: Effe
 
 
 def _simulated(planned: PlannedRun, options: Sequence[str], out: Path) -> Row:
-    """Run as a user does; the run's folder stays."""
+    """Run by the command line, as a user does; keep the run's folder."""
     folder = out / f"run-{planned.number:05d}"
     for number in range(2, 1000):  # one that a crash has left half done stays as it is
         if not folder.exists():

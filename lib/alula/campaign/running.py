@@ -1,4 +1,4 @@
-"""Has the runs of a campaign done by Dask, here or on other machines, and puts the rows into the table as they come."""
+"""Distributes the runs of a campaign by Dask, here or on other machines, and adds their rows to the table as they finish."""
 
 from __future__ import annotations
 

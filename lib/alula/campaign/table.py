@@ -73,7 +73,7 @@ class Table:
 
 
 def _json(text: bytes) -> Any:
-    """Return what a text says, None where it is no JSON."""
+    """Return the JSON value of a text, None where it is no JSON."""
     try:
         return json.loads(text)
     except (ValueError, RecursionError):

@@ -9,5 +9,5 @@ THRESHOLDS = (10_000, 50, 10)
 
 
 def collect_seldom() -> None:
-    """Have it look less often, in this process, from now on: what is in no cycle goes at once anyhow."""
+    """Make the garbage collector run less often in this process: only cycles need it."""
     gc.set_threshold(*THRESHOLDS)

@@ -17,7 +17,7 @@ MakeError = Callable[[str], Exception]
 
 
 class YamlError(AlulaError):
-    """A file is not as it should be; the message says where, what and what would be right."""
+    """A file is wrong; the message names the place, the error and the remedy."""
 
 
 class Located:
@@ -109,7 +109,7 @@ class Located:
 
 
 def choices(name: str, known: Collection[str]) -> str:
-    """Return what may stand in the place of a wrong name, the nearest once more at the end."""
+    """Return the names that are allowed in the place of a wrong one, the nearest again at the end."""
     hint = nearest(name, known)
     return (", ".join(known) or "none") + (f" ({hint})" if hint.startswith("did") else "")
 

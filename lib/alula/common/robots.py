@@ -139,7 +139,7 @@ class RobotFolder:
         return self.load(self.parts[name]) if name in self.parts else None
 
     def import_path(self) -> None:
-        """Have the robot's own packages found by imports."""
+        """Put the robot's own packages on the import path."""
         _swap_code(self.python)
         own = [str(folder) for folder in self.python]
         # Before what is installed: the folder that was named is the robot.
@@ -162,7 +162,7 @@ _SWAPPING = threading.RLock()
 
 
 def _swap_code(folders: Sequence[Path]) -> None:
-    """Set aside what was imported from other robots where packages of these folders have the same name, and bring back their own."""
+    """Swap imported modules: unload those of other robots that have names of these folders' packages, and restore these folders' own."""
     with _SWAPPING:
         for folder in folders:
             _CODE.setdefault(folder, {})
@@ -179,7 +179,7 @@ def _swap_code(folders: Sequence[Path]) -> None:
 
 
 def _folder_of(module: ModuleType) -> Path | None:
-    """Return which folder of a robot's packages a module was imported from; None: none."""
+    """Return the folder of a robot's packages that a module was imported from, or None."""
     places = [getattr(module, "__file__", None) or "", *list(getattr(module, "__path__", ()))[:1]]
     place = next((Path(one) for one in places if one), None)
     within = [folder for folder in _CODE if place is not None and place.is_relative_to(folder)]
@@ -191,7 +191,7 @@ _MEANT: ContextVar[RobotFolder | None] = ContextVar("robot", default=None)
 
 @contextlib.contextmanager
 def meaning(robot: RobotFolder | None) -> Iterator[None]:
-    """Have `find_robot` return this robot as long as the context lasts, in this thread; None: what it returned before."""
+    """Make `find_robot` return this robot within the context, in this thread; None: leave it as it is."""
     token = _MEANT.set(robot or _MEANT.get())
     try:
         yield

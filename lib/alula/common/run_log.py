@@ -79,7 +79,7 @@ def note_mocked(out: Path, simulated_s: float, wall_s: float, faults: Iterable[F
 
 
 def account(out: Path, entries: Iterable[Entry]) -> Mapping[str, Any]:
-    """Return what is said last of what the mission was to do and how it ended, of a run with this record; empty where nothing is.
+    """Return the mission's last account of its task and outcome, of a run with this record; empty where there is none.
 
     It is in the record; a mission whose record ended early, on a full disk say, notes it here.
     """

@@ -64,7 +64,7 @@ def scenarios_folder() -> Path:
 
 
 def scenario_names(folder: Path | None = None) -> list[str]:
-    """Return what can be run."""
+    """Return the names of the robot's scenarios."""
     return sorted(path.stem for path in (folder or scenarios_folder()).glob("*.yaml"))
 
 

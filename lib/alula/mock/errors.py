@@ -6,4 +6,4 @@ from alula.runtime.core.errors import SkillRuntimeError
 
 
 class BehaviourError(SkillRuntimeError):
-    """A behaviour file is not as it should be; the message says where, what and what would be right."""
+    """A behaviour file is wrong; the message names the place, the error and the remedy."""

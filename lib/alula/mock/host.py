@@ -8,7 +8,7 @@ from alula.runtime.timers import Job, Timer
 
 
 class MockHost(Protocol):
-    """A clock that does jobs, and the functional layer's side of the skillsets; jobs may come from any thread."""
+    """A clock that runs jobs, and the functional layer's interface to the skillsets; methods may be called in any thread."""
 
     @property
     def now_s(self) -> float:
@@ -17,7 +17,7 @@ class MockHost(Protocol):
 
     @property
     def notes(self) -> list[str]:
-        """What went wrong and belongs to no execution."""
+        """Errors that belong to no execution."""
         ...
 
     def after(self, delay_s: float, job: Job) -> Timer:
@@ -25,7 +25,7 @@ class MockHost(Protocol):
         ...
 
     def transition(self, skillset: str, resource: str, to: str, reason: str) -> str:
-        """Take an extern transition for this reason; return "" or why it was refused."""
+        """Request an extern transition; return "" or why it was refused."""
         ...
 
     def state(self, skillset: str, resource: str) -> str:
@@ -37,5 +37,5 @@ class MockHost(Protocol):
         ...
 
     def note(self, error: str) -> None:
-        """Tell of what went wrong and belongs to no execution."""
+        """Report an error that belongs to no execution."""
         ...

@@ -33,7 +33,7 @@ class LocalMockHost:
         return self._world.clock.after(delay_s, job)
 
     def transition(self, skillset: str, resource: str, to: str, reason: str) -> str:
-        """Take an extern transition for this reason; return why it was refused, empty where it was taken."""
+        """Request an extern transition; return why it was refused, empty where it was taken."""
         managers = self._world.managers.get(skillset)
         if managers is None or not managers.alive:
             return f"the managers of {skillset} are not there"
@@ -77,7 +77,7 @@ def serve_robot(world: LocalWorld, robot: MockRobot, skillsets: Iterable[Skillse
 
 
 def follow(robot: MockRobot, skillset: str, events: Sequence[EngineEvent]) -> None:
-    """Tell a mock robot of the states that resources enter: to be called at each step."""
+    """Report the states that resources enter to a mock robot; to be called at each step."""
     for event in events:
         if isinstance(event, TransitionEvent):
             robot.on_state(skillset, event.resource, event.to_state)

@@ -42,7 +42,7 @@ def load_behaviour(paths: Sequence[str | Path], skillsets: Sequence[Skillset]) -
 
 
 def _silences(skillsets: Sequence[Skillset]) -> dict[str, MockFault]:
-    """Return the faults ``RESOURCE:silent``: nothing is heard of the resources of this name that have a silence."""
+    """Return the faults ``RESOURCE:silent``: resources of this name that have a silence are no longer reported."""
     found: dict[str, MockFault] = {}
     for skillset in skillsets:
         for one in skillset.resources:
@@ -54,7 +54,7 @@ def _silences(skillsets: Sequence[Skillset]) -> dict[str, MockFault]:
 
 
 class _Reader:
-    """What names mean, while files are read."""
+    """The meaning of names while files are read."""
 
     def __init__(self, skillsets: Mapping[str, Skillset], memory: Mapping[str, object]) -> None:
         self._skillsets = skillsets

@@ -68,7 +68,7 @@ class MockRobot(MockState):
             other.begin()
 
     def fail(self, request: FaultRequest) -> None:
-        """Have a fault of the behaviour happen, and end where the request says so; without a time it happens at the beginning.
+        """Inject a fault of the behaviour at its time, at the beginning where it has none, and end it where the request has an end.
 
         A fault may be written for one way of failing, ``zed:dark``, or for all, ``zed``.
 
@@ -103,7 +103,7 @@ class MockRobot(MockState):
     # --- the clock's part --------------------------------------------------------------------------------------------
 
     def _schedule(self, anchor: tuple[Place, str] | None, delay_s: float, job: Job) -> None:
-        """Run a job so long after a resource first enters a state; None: after now."""
+        """Run a job some seconds after a resource first enters a state; None: from now."""
         if anchor is None:
             self._do(delay_s, job)
         elif anchor in self._entered_s:
@@ -112,7 +112,7 @@ class MockRobot(MockState):
             self._awaited.setdefault(anchor, []).append((delay_s, job))
 
     def _do(self, delay_s: float, job: Job) -> None:
-        """Run a job after a delay; a formula in it that has no value is told, and the robot goes on."""
+        """Run a job after a delay; report a formula in it that has no value, and go on."""
 
         def safely() -> None:
             try:

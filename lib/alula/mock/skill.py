@@ -34,7 +34,7 @@ class MockInputs(SimpleNamespace):
 
 @dataclass(frozen=True)
 class Choice:
-    """What is done in one call; ``result`` is empty where it does not end by itself with one."""
+    """The script chosen for one call; ``result`` is empty where it does not end with a result by itself."""
 
     script: Script
     result: str
@@ -110,7 +110,7 @@ class MockSkill(SkillHooks):
         return self._state.number(said, {**run.names, "t": elapsed_s, "f": part}, self._chance)
 
     def on_interrupt(self, execution: Execution) -> bool | None:
-        """Stop: what it moves stays where it is, what was still to come does not come."""
+        """Stop the script: moved memory stays where it is, further changes are dropped."""
         with self._state.lock:
             self.move()
             run = self._runs.pop(execution.id, None)
@@ -132,7 +132,7 @@ class MockSkill(SkillHooks):
             self._move(run, _part(self._state.host.now_s - run.started_s, run.delay_s))
 
     def forget(self, execution_id: str) -> None:
-        """Take note that an execution was ended from elsewhere: what it moves has got there, what was still to come does not come."""
+        """Note the end of an execution by others: its moves are completed, further changes are dropped."""
         with self._state.lock:
             run = self._runs.pop(execution_id, None)
             if run is not None:
@@ -143,7 +143,7 @@ class MockSkill(SkillHooks):
     # --- parts -------------------------------------------------------------------------------------------------------
 
     def choose(self, inputs: object) -> Choice:
-        """Choose what is done in the next call, by the rules; what derives from this may know better.
+        """Choose the script of the next call by the rules; subclasses may choose otherwise.
 
         There is one draw for each rule that has a chance, whether or not it applies.
         """
@@ -172,7 +172,7 @@ class MockSkill(SkillHooks):
         return run
 
     def _finish(self, run: PlayedScript) -> None:
-        """End an execution as it was chosen."""
+        """End an execution with the result that its script has chosen."""
         with self._state.lock:
             if self._runs.pop(run.execution.id, None) is None:
                 return
@@ -225,7 +225,7 @@ def _plain(value: object) -> object:
 
 
 def _towards(source: object, target: object, part: float) -> object:
-    """Return what is between two numbers or points; anything else changes at the end."""
+    """Interpolate between two numbers or points; any other value changes at the end."""
     if part >= 1.0:
         return target
     if isinstance(source, int | float) and isinstance(target, int | float):

@@ -1,4 +1,4 @@
-"""A behaviour file to begin with: what mocks do by themselves, written down, with what may be written instead."""
+"""Make a behaviour file to start from: the default behaviour of the mocks, with alternatives in comments."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""What the skills of a mock robot share: its memory, chance, and the states of its resources."""
+"""The state that the skills of a mock robot share: memory, random numbers, states of resources."""
 
 from __future__ import annotations
 
@@ -31,7 +31,7 @@ class MockState:
         """What faults hold resources at, whatever else is said of them."""
 
     def take(self, states: Mapping[Place, str], reason: str = "") -> None:
-        """Have resources be in these states, as far as they are not; ``reason``: why, in words."""
+        """Put resources into these states by extern transitions; ``reason`` is told with them."""
         for (skillset, resource), wanted in states.items():
             state = self._held.get((skillset, resource), wanted)
             if self.host.state(skillset, resource) == state:
@@ -48,7 +48,7 @@ class MockState:
         return float(result)
 
     def value(self, value: Value, names: Mapping[str, object], chance: random.Random | None = None) -> object:
-        """Return what a value is now; ``names`` go before the memory."""
+        """Evaluate a value; ``names`` take precedence over the memory."""
         if isinstance(value, bool | int | float | str):
             return value
         if isinstance(value, Formula):
@@ -56,7 +56,7 @@ class MockState:
         return value(self._known(names))
 
     def _known(self, names: Mapping[str, object]) -> Mapping[str, object]:
-        """Return the names with the memory as it is now behind them."""
+        """Return the names over the current memory."""
         with self.lock:
             for move in self._moving:
                 move()

@@ -1,4 +1,4 @@
-"""Processes of a run that ended without being told to, as the supervisor writes them down."""
+"""Read and write the processes of a run that died: ended without being asked to."""
 
 from __future__ import annotations
 
@@ -30,7 +30,7 @@ class Death:
 
     @property
     def fate(self) -> str:
-        """Say what became of it."""
+        """Return in words whether it was restarted."""
         return "it stayed dead" if self.again_s is None else f"it was started again{_at(self.again_s or None)}"
 
 
@@ -56,7 +56,7 @@ def note_again(out: Path, name: str, at_s: float | None) -> None:
 
 
 def read_deaths(out: Path) -> list[Death]:
-    """Return which processes of a run died, in that order, with what became of each."""
+    """Return the processes of a run that died, in that order, and whether each was restarted."""
     deaths = []
     for values in read(out, DEATH):
         with contextlib.suppress(TypeError):

@@ -1,4 +1,4 @@
-"""Who ended a run before its mission did, and why: the first who says so."""
+"""Who ended a run before its mission did, and why; the first entry counts."""
 
 from __future__ import annotations
 
@@ -24,7 +24,7 @@ class ReportedEnd:
     when_s: float | None = None
 
     def sentence(self) -> str:
-        """Return what a person wants to read."""
+        """Return it as a sentence."""
         told = {OPERATOR: "aborted by the operator", SIGNAL: "aborted from outside"}
         return f"{told.get(self.by, f'ended by the {self.by}')}: {self.why}"
 

@@ -1,4 +1,4 @@
-"""What the supervisor knows of a run and no file tells: the input of a report."""
+"""The input of a report: what only the supervisor knows of a run."""
 
 from __future__ import annotations
 

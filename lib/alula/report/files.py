@@ -16,7 +16,7 @@ class ReportError(AlulaError):
 
 
 class Problems:
-    """What could not be read, known or believed, a sentence each; a report goes on without it and says so."""
+    """The problems of a report, a sentence each: what could not be read or makes no sense is left out and named here."""
 
     def __init__(self) -> None:
         self._sentences: list[str] = []

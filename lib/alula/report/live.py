@@ -15,7 +15,7 @@ from alula.runtime.core.events import EngineEvent, TransitionEvent, read_event
 
 
 def event_line(event: EngineEvent, lift_off_s: float | None = None, begun_s: float = 0.0) -> str | None:
-    """Return what a person wants to read of one event, or None where it is not worth a line.
+    """Return the line that tells of an event; None for events that are not shown.
 
     Times count from lift-off; before it, and marked so, from ``begun_s``: no matter where the mission clock begins to count.
     """
@@ -46,7 +46,7 @@ class LiveEvents:
         self._deaths_shown = self._waits_shown = self._held_shown = 0
 
     def show_new(self) -> None:
-        """Say what was written since the last call; what is written in part waits for the rest."""
+        """Print what was written since the last call; an incomplete entry waits for the next call."""
         for entry in self._record.poll():
             if entry.topic == EVENTS:
                 self._show(entry.value)

@@ -35,7 +35,7 @@ from alula.report.timeline_picture import draw_timeline
 
 @dataclass(frozen=True)
 class Account:
-    """What happened in the skillsets, and what is known besides."""
+    """What happened in the skillsets, and the results derived from it."""
 
     observed: Observed
     mock: MockSummary | None
@@ -127,7 +127,7 @@ def _write_page(run: ReportedRun, part: ReportPart, account: Account, summary: S
 
 
 def fault_entries(observed: Observed) -> list[Wire]:
-    """Return what the page is told of things that failed and worked again."""
+    """Return the entries of the page about faults that began and ended."""
     return [(FAULT, round(fault.t_s, 3), {"sensor": fault.sensor, "mode": fault.mode}) for fault in observed.all_faults]
 
 

@@ -1,4 +1,4 @@
-"""What a run over mocks tells in place of recordings: when what failed, and how fast it was."""
+"""Read what a run over mocks notes in place of recordings: its faults with their times, and its speed."""
 
 from __future__ import annotations
 
@@ -19,7 +19,7 @@ class MockSummary(TypedDict):
 
 
 def read_mock(folder: Path, problems: Problems) -> tuple[Observed, MockSummary]:
-    """Return what a run over mocks says of itself: faults, and how fast it ran."""
+    """Return the faults of a run over mocks, and its speed."""
     told = run_log.read(folder, run_log.MOCKED)
     if not told:
         problems.note(f"{run_log.FILE} does not say how the mocks ran")

@@ -1,4 +1,4 @@
-"""What is known of a run besides the events of its skillsets: from the robot's own recordings, the supervisor, or mocks."""
+"""Observations of a run besides the events of its skillsets: from the robot's recordings, the supervisor, or mocks."""
 
 from __future__ import annotations
 
@@ -38,7 +38,7 @@ class Observed:
 
     @property
     def all_faults(self) -> tuple[FaultChange, ...]:
-        """What was broken and mended, in the order of time."""
+        """All starts and ends of faults, in the order of time."""
         return tuple(sorted((*self.faults, *self.processes), key=lambda change: change.t_s))
 
 
@@ -48,7 +48,7 @@ def read_faults(folder: Path) -> tuple[FaultChange, ...]:
 
 
 def fault_changes(value: object) -> Iterator[FaultChange]:
-    """Yield what failed and what worked again, as it was written, as far as it makes sense."""
+    """Yield the starts and ends of faults as they were written; entries that make no sense are left out."""
     for entry in sequence(value):
         values = mapping(entry)
         t_s = finite(values.get("t_s"))

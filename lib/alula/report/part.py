@@ -47,7 +47,7 @@ class ReportedRun:
 
     @property
     def title(self) -> str:
-        """Return what stands above its pictures."""
+        """Return the title of its pictures."""
         facts = self.facts
         failing = f", failing {', '.join(facts.faults)}" if facts.faults else ""
         if facts.replay_of:
@@ -58,7 +58,7 @@ class ReportedRun:
 @public("alula.parts")
 @dataclass(frozen=True)
 class Task:
-    """Something that the mission was sent out for, such as a parcel; ``why`` says of one that is not done what came between."""
+    """A task of the mission, such as a parcel to deliver; ``why`` says what prevented one that is not done."""
 
     name: str
     done: bool
@@ -68,7 +68,7 @@ class Task:
 @public("alula.parts")
 @dataclass(frozen=True)
 class Findings:
-    """What the parts of a report have found. ``landed``: came back as far as more is known than the skillsets tell; None: nothing more."""
+    """The results of a robot's part of the report. ``landed``: whether it came back, by its own recordings; None: they do not tell."""
 
     values: Mapping[str, Any] = field(default_factory=dict)
     """What goes into ``summary.json`` besides what every run has."""
@@ -85,7 +85,7 @@ class ReportPart(Protocol):
         ...
 
     def failures(self, phases: Phases, known: Sequence[Fault], effects: EffectsByFault) -> Iterable[tuple[FaultChange, Fault]]:
-        """Return what else failed, by the recordings, than is known by now."""
+        """Return further failures that the recordings show."""
         ...
 
     def measure(self, phases: Phases, recovery: Recovery | None, timeline: Timeline | None) -> Findings:
@@ -102,7 +102,7 @@ class NoPart:
     """The report of a robot that adds nothing."""
 
     def observe(self, run: ReportedRun) -> Observed:
-        """Know what the supervisor did."""
+        """Return the faults that the supervisor injected."""
         return Observed(processes=read_faults(run.folder))
 
     def failures(self, phases: Phases, known: Sequence[Fault], effects: EffectsByFault) -> Iterable[tuple[FaultChange, Fault]]:  # noqa: ARG002

@@ -1,4 +1,4 @@
-"""When a run's robot departed and was back, from the records that tell it."""
+"""Find when a run's robot departed and when it was back."""
 
 from __future__ import annotations
 
@@ -30,7 +30,7 @@ class Phases:
 
 
 def find_phases(history: History, observed: Observed) -> Phases:
-    """Ask the robot's own recordings, then the resources."""
+    """Find them in the robot's own recordings, else in its resources."""
     zero_s, zero_from, departed = _origin(history, observed)
     return Phases(zero_s=zero_s, zero_from=zero_from, departed=departed, back_s=_back(history, observed, zero_s))
 

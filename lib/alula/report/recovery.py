@@ -1,4 +1,4 @@
-"""How a run got over a fault: when it happened, when that was noticed, when the fallback ran, when the robot moved on."""
+"""Measure the recovery from a fault: when it happened, was detected, when the fallback ran, when the robot moved on."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""What failed in a run, what followed from each fault, and what the mission did about it (see ``alula.records.causes``)."""
+"""Find the faults of a run, their consequences, and how the mission reacted (see ``alula.records.causes``)."""
 
 from __future__ import annotations
 
@@ -56,7 +56,7 @@ Known = tuple[FaultChange, Fault]
 
 
 def injected(observed: Observed) -> tuple[FaultChange, ...]:
-    """Return what was broken, in the order of time."""
+    """Return the faults, in the order of time."""
     return tuple(change for change in observed.all_faults if change.mode != MENDED)
 
 
@@ -82,7 +82,7 @@ def find_responses(known: Sequence[Known], history: History) -> tuple[FaultRespo
 
 
 def _asked(facts: RunFacts, scenario: Scenario, history: History, phases: Phases, effects: EffectsByFault) -> Iterator[Known]:
-    """Yield what was asked for and no recording tells: in the simulator the radio's faults."""
+    """Yield the faults that were requested and that no recording tells of, such as the simulated radio's."""
     if not facts.mock:
         untold = dict(scenario.faults).keys() - dict(scenario.processes).keys()
         requests = [request for request in map(parse_fault, facts.faults) if request.what in untold]

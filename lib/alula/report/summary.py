@@ -25,7 +25,7 @@ OUTCOMES = frozenset({"accomplished", "degraded", "given_up", "aborted", "not_st
 
 
 class RecoverySummary(TypedDict):
-    """Moments of the recovery, seconds since lift-off; None: it did not come to that."""
+    """Times of the recovery, seconds since lift-off; None: it did not happen."""
 
     failure_s: float | None
     detected_s: float | None
@@ -104,7 +104,7 @@ def duration_s(history: History, observed: Observed, phases: Phases) -> float | 
 
 
 def note_doubts(facts: RunFacts, history: History, observed: Observed, phases: Phases, problems: Problems) -> None:
-    """Say what the numbers alone would hide: a run without a departure, faults that never came."""
+    """Return sentences about what the numbers hide: no departure, faults that never happened."""
     scenario = load_scenario(facts.scenario)
     if not phases.departed and home() is not None and scenario.mission:  # who only serves skills may stay where it is
         problems.note(f"no {page_words()['departure']} is known: times count from {phases.zero_from}")

@@ -57,7 +57,7 @@ class ResourceRow(TypedDict):
 
 
 class Mark(TypedDict):
-    """A moment worth a line through all rows."""
+    """A moment that is marked through all rows."""
 
     t_s: float
     kind: str

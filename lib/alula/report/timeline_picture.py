@@ -57,7 +57,7 @@ class Rows:
 
 
 class Ruler:
-    """Tells how long a text or a stretch of the time axis is, in points."""
+    """Measures texts and durations on the time axis, in points."""
 
     def __init__(self, figure: Figure, points_per_s: float) -> None:
         self._renderer = FigureCanvasAgg(figure).get_renderer()

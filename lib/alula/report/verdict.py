@@ -74,14 +74,14 @@ def outcome_words(summary: Mapping[str, Any], died: Sequence[Death], out: Path, 
 
 
 def death_lines(died: Sequence[Death]) -> list[str]:
-    """Return how each process died the last time, what became of it, and how often it did."""
+    """Return for each process that died how it ended the last time, whether it was restarted, and how often it died."""
     last = {death.name: death for death in died}
     times = {name: sum(death.name == name for death in died) for name in last}
     return [f"  {one.sentence()}; {one.fate}" + (f" ({times[name]} times in all)" if times[name] > 1 else "") for name, one in last.items()]
 
 
 def world_lines(summary: Mapping[str, Any]) -> list[str]:
-    """Return what a run through a world was."""
+    """Return the figures of a run in a world: duration, distance, clearance, collisions."""
     words, collisions = page_words(), summary.get("collisions")
     return [
         "  "
@@ -120,7 +120,7 @@ def task_lines(summary: Mapping[str, Any]) -> list[str]:
 
 
 def mock_lines(summary: Mapping[str, Any]) -> list[str]:
-    """Return what a run over mocks was; there is no world to collide with or to map."""
+    """Return the figures of a run over mocks, which has no world."""
     mock = summary["mock"]
     return [
         f"  {', '.join([*came_back(summary), duration_words(summary)])}; "
@@ -129,13 +129,13 @@ def mock_lines(summary: Mapping[str, Any]) -> list[str]:
 
 
 def what_failed(summary: Mapping[str, Any]) -> str:
-    """Return what the robot had to recover from."""
+    """Return the lines about the recovery."""
     failure_s = summary["recovery"]["failure_s"]
     return next((f"{one['sensor']} {one['told']}" for one in summary["answers"] if one["t_s"] == failure_s), "sensor failed")
 
 
 def conformance_lines(found: Mapping[str, Any]) -> list[str]:
-    """Return what the monitor has to say."""
+    """Return the lines about the monitor's verdict."""
     if found["conforms"]:
         return [f"  monitor: all {found['events']} events conform to the models"]
     told = [

@@ -1,4 +1,4 @@
-"""What the map shows of the space to move in: areas that the robot reads from its world, as its part ``areas``."""
+"""The areas that the map shows, which the robot's part ``areas`` reads from its world."""
 
 from __future__ import annotations
 

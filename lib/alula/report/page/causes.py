@@ -1,4 +1,4 @@
-"""What the page is told of a run's failures: faults, how each skill failed and why, what the mission did about it.
+"""Explain a run's failures for the page: faults, how and why each skill failed, how the mission reacted.
 
 The page shows it and judges nothing: what is pushed to a live page and what is inside a report is made here, of the same entries.
 """
@@ -32,7 +32,7 @@ NOTHING: dict[str, Any] = {"departed_s": None, "back_s": None, "faults": [], "fa
 
 
 class Causes:
-    """Takes the page's entries as they come, and tells what follows from them whenever that has changed."""
+    """Collects the page's entries, and returns the explanation whenever it has changed."""
 
     def __init__(self) -> None:
         self._facts: dict[str, Any] = {}
@@ -48,13 +48,13 @@ class Causes:
         self._effects: EffectsByFault | None = None
 
     def take(self, entry: Wire) -> None:
-        """Take an entry; one that makes no sense is ignored."""
+        """Add an entry; ignore one that makes no sense."""
         topic, t_s, value = entry
         with contextlib.suppress(ValueError, TypeError, KeyError, IndexError, AttributeError):
             self._take(topic, -math.inf if t_s is None else t_s, value)
 
     def told(self) -> dict[str, Any] | None:
-        """Return what the page is told; None where it has not changed since the last call."""
+        """Return the explanation; None where it has not changed since the last call."""
         if not self._new:
             return None
         self._new = False

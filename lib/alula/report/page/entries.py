@@ -1,4 +1,4 @@
-"""What the page is made of: entries ``[topic, t_s, value]``, seconds of mission clock.
+"""The input of the page: entries ``[topic, t_s, value]``, seconds of mission clock.
 
 Without a time are facts of the whole run (``FACTS``), and what came before the mission clock was heard: a clock that was not heard
 reads zero, and zero is no time of a run whose clock is Unix time.
@@ -92,7 +92,7 @@ class Converter:
         self._route: list[list[float]] | None = None
 
     def convert(self, entry: Entry) -> Iterator[Wire]:
-        """Yield what the page gets of an entry."""
+        """Yield the page's entries for an entry of the record."""
         t_s = round(entry.stamp_s, 3) if entry.stamp_ns > 0 else None
         if entry.topic == TREE:
             yield from self._tree(t_s, entry.value)

@@ -21,7 +21,7 @@ class LinesFollower:
         self._offset = 0
 
     def poll(self) -> list[Entry]:
-        """Return what came since the last call; half a line waits for its other half, what makes no sense is left out."""
+        """Return the entries since the last call; an incomplete line waits for the next call, one that makes no sense is left out."""
         if not self._path.is_file():
             return []
         with self._path.open("rb") as file:
