@@ -12,12 +12,12 @@ from collections import deque
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 
+from alula.common.graphs import reachable_from
 from alula.model.expressions import Expression
 from alula.model.model import ResultKind, Skillset
 from alula.odds.mission import MissionSteps, Place
 from alula.odds.system import Kind, Outcome, Step
 from alula.prove.limits import Deadline
-from alula.prove.mission.calm import reaching
 
 GOOD = frozenset({Outcome.ACCOMPLISHED, Outcome.DEGRADED})
 Here = tuple[Place, int]
@@ -98,7 +98,7 @@ def fate_of(
             if there not in before:
                 before[there] = (here, step)
                 todo.append(there)
-    hopeful, ending = reaching(good, leading), reaching(ends_at_rest, leading)
+    hopeful, ending = (reachable_from(ends, lambda one: leading.get(one, ())) for ends in (good, ends_at_rest))
     lost = next((one for one in before if one not in hopeful), None)
     safe = safe and len(ending) == len(before)
     return Fate(tuple(faults), frozenset(outcomes), lost is None, safe, () if lost is None else _run(before, lost), len(before))

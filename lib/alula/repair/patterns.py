@@ -12,11 +12,11 @@ from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
 from itertools import islice, product
 
-from alula.language.syntax.elements import told_unit
 from alula.missions.mission_file import READY, STOP_HERE
 from alula.missions.palette import palette_of
 from alula.missions.skill_types import type_of
 from alula.model.model import Parameter
+from alula.model.units import told_unit
 from alula.prove.mission.system import System
 from alula.repair.branches import FALLBACKS, Branch, clone, node, parent_of
 from alula.repair.naming import Renaming, another, assigned, plain

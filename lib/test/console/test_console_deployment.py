@@ -13,8 +13,8 @@ from console_page import SIZES, Page
 from console_serving import Bench, Robot, answer_to, heard, serve, served
 
 from alula.common.network import claim_domain
-from alula.report.page.following import RunFollower
 from alula.console.link import Skillsets
+from alula.report.page.following import RunFollower
 
 PARTS = {"bridge": ("running", ""), "rover": ("running", ""), "recorder": ("given up", "exit code 1: the disk is full")}
 
