@@ -152,7 +152,9 @@ class _Look:
         near = [name for name in self._base.publishers if name.rpartition("/")[2] == topic.rpartition("/")[2]]
         hint = f"is it {listed(near)}?" if near else "start its node"
         return problem(
-            BINDINGS, f"{topic}: nobody in ROS 1 publishes it{f' (data {data})' if data else ''}", f"{hint} skillsets/bindings.yaml"
+            BINDINGS,
+            f"{topic}: nobody in ROS 1 publishes it{f' (data {data})' if data else ''}",
+            f"{hint}, or correct the name in skillsets/bindings.yaml",
         )
 
     def _often(self, topic: str, node: str, data: str, period_s: float | None, heard: Heard, *, latched: bool) -> Iterator[Finding]:

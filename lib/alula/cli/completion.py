@@ -30,8 +30,8 @@ if TYPE_CHECKING:
     from alula.runtime.live.options import RunOption
 
 # What only some words need is imported where they are asked for: a shell waits.
-OPTIONS_S = 2.0
-"""Wall clock, for a robot's own options where only a ROS world can import its part: a shell waits for it."""
+OPTIONS_S = 10.0
+"""Wall clock, for a robot's own options where only a ROS world can import its part: 0.5 s, on a busy machine 3 s; a shell waits for it."""
 NAMES = ("alula", "./alula")
 HELP = ("-h", "--help")
 
