@@ -8,6 +8,7 @@ is accepted after ``QUEUED_S``: a ROS 2 client can't cancel what it has no answe
 from __future__ import annotations
 
 import logging
+import math
 import threading
 import uuid
 from collections.abc import Iterable
@@ -28,6 +29,10 @@ KEEP_RESULTS = 1000
 KEEP_RESULT_BYTES = 64_000_000  # of all results that are kept; the newest is kept whatever its size
 MOST_GOALS = 1000  # open at a time; more are rejected
 ANY_GOAL = bytes(16)
+EVERY_GOAL = ""
+"""In a cancel request of ROS 1: all goals of the server, whoever has sent them."""
+AFTER_CANCEL_S = 0.1
+"""So long after such a request no goal is sent: it goes over another connection, and may arrive first."""
 NOT_TAKEN = frozenset({Ros1Status.REJECTED, Ros1Status.RECALLED})
 
 
@@ -47,7 +52,7 @@ class ActionlibServer(Protocol):
         """Publish a goal under this id; ``payload`` is the serialized ROS 1 goal."""
 
     def send_cancel(self, name: str) -> None:
-        """Ask for one goal's end."""
+        """Ask for one goal's end, or that of all."""
 
 
 class Ros2Clients(Protocol):
@@ -107,6 +112,9 @@ class GoalsToRos1:
         self._timeout_s = timeout_s
         self.lock = threading.RLock()
         self._goals: dict[bytes, GoalToRos1] = {}
+        self._owes_cancel = False
+        """Whether all goals of the server are to be cancelled as soon as it is there: a bridge before this one may have sent some."""
+        self._cancelled_s = -math.inf
 
     def connect(self, server: ActionlibServer, clients: Ros2Clients) -> None:
         """Take both ends; the caller that opens them holds the lock meanwhile, so that what they bring waits."""
@@ -129,7 +137,7 @@ class GoalsToRos1:
             self._send_if_possible(goal, now_s)
 
     def _send_if_possible(self, goal: GoalToRos1, now_s: float) -> None:
-        if self._server.present():
+        if self._server.present() and not self._owes_cancel and now_s - self._cancelled_s >= AFTER_CANCEL_S:
             goal.sent_s = now_s
             self._server.send_goal(goal.name, goal.payload)
 
@@ -146,7 +154,16 @@ class GoalsToRos1:
             self._clients.reply_cancel(caller, code, [(goal.uuid, goal.stamp_ns) for goal in chosen])
             for goal in chosen:
                 self._cancel(goal, now_s)
+            if goal_uuid == ANY_GOAL and not stamp_ns:
+                self._owes_cancel = True
+                self._cancel_all_if_possible(now_s)
             self._publish_status()
+
+    def _cancel_all_if_possible(self, now_s: float) -> None:
+        """Cancel what the server does for clients that are not known here, too."""
+        if self._owes_cancel and self._server.present():
+            self._owes_cancel, self._cancelled_s = False, now_s
+            self._server.send_cancel(EVERY_GOAL)
 
     def _cancel(self, goal: GoalToRos1, now_s: float) -> None:
         goal.cancel_seen = True
@@ -230,6 +247,7 @@ class GoalsToRos1:
     def tick(self, now_s: float) -> None:
         """Do what is due: send to a server that came, give up on one that went, drop old results."""
         with self.lock:
+            self._cancel_all_if_possible(now_s)
             gone, late = self._server.gone(), self._server.late()
             for goal in list(self._goals.values()):
                 if goal.open:

@@ -16,6 +16,8 @@ from ros_bridge.conversion import Types, ament_prefixes
 from ros_bridge.definitions import split
 from ros_bridge.errors import TypeUnknownError, WireError
 from ros_bridge.goals_to_ros1 import (
+    AFTER_CANCEL_S,
+    ANY_GOAL,
     KEEP_RESULT_BYTES,
     KEEP_RESULT_S,
     KEEP_RESULTS,
@@ -415,6 +417,25 @@ def test_result_that_does_not_come_is_waited_for_longer_when_the_server_was_away
     assert clients.results == {}
     table.tick(within_s + 0.1)
     assert clients.results == {"result": Ros2Status.SUCCEEDED}
+
+
+@pytest.mark.parametrize("here", [True, False], ids=["server is there", "server comes"])
+def test_a_request_to_cancel_all_reaches_goals_of_others_and_no_goal_that_comes_after_it(here):
+    server, clients = Server(), Clients2()
+    server.here = here
+    table = GoalsToRos1("test", 5.0)
+    table.connect(server, clients)
+    table.request_cancel("cancel", ANY_GOAL, 0, 0.0)
+    assert clients.cancels == [(CancelCode.NONE, [])]
+    table.request_goal("goal", goal_uuid(0), b"", 0.01)
+    assert (server.cancelled, server.goals) == ([""] if here else [], [])
+    server.here = True
+    table.tick(0.05)
+    assert (server.cancelled, server.goals) == ([""], [])
+    table.tick(0.05 + AFTER_CANCEL_S)
+    assert (server.cancelled, server.goals) == ([""], [goal_name(0)])
+    table.request_cancel("cancel", ANY_GOAL, 7, 0.3)
+    assert server.cancelled == [""], "a stamp is of goals that are known here"
 
 
 def ended_goals(count, size=0):
