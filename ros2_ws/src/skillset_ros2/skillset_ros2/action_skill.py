@@ -162,9 +162,11 @@ class ActionSkill(FunctionSkill[Goal]):
         ready = call.client.server_is_ready()
         waited_s = self.waited_s(call)
         if not call.sent:
-            if ready:
+            if ready and not self.stops_first:
                 self._send(call)
-            return "is not there" if not ready and waited_s > self.answer_s else ""
+                return ""
+            lost = "has not stopped what ran before" if ready else "is not there"
+            return lost if waited_s > self.answer_s else ""
         if not ready:
             return "is gone"
         if call.handle is None or (call.cancelled and not call.cancel_answered):

@@ -39,6 +39,15 @@ class Call:
     """Whether an interruption waits for its end."""
 
 
+@dataclass(eq=False)
+class LateStop:
+    """What stops what ran before, at a server that was not there when the managers started: it, or a bridge to it, may come later."""
+
+    client: Any
+    request: Any
+    asked: bool = False
+
+
 CallT = TypeVar("CallT", bound=Call)
 
 
@@ -62,24 +71,39 @@ class FunctionSkill(SkillHooks, Generic[CallT]):
         self.watch = watch
         self._lock = threading.RLock()
         self._calls: dict[str, CallT] = {}
+        self._late: LateStop | None = None
         _check_results(type(self))
         watch.every(self._look)
 
     def call_at_start(self, kind: Any, server: str, request: Any) -> None:
-        """Call a service that stops what runs, and wait for its answer, wall clock; where it is not there nothing runs.
+        """Call a service that stops what runs, and wait for its answer, wall clock; one that is not there is called when it comes.
 
         Raises:
             SkillRuntimeError: it does not answer.
         """
         client = self.watch.node.create_client(kind, server)
+        if not client.wait_for_service(timeout_sec=FOUND_S):
+            self._late = LateStop(client, request)
+            return
         try:
-            if client.wait_for_service(timeout_sec=FOUND_S):
-                answered = threading.Event()
-                client.call_async(request).add_done_callback(lambda _: answered.set())
-                if not answered.wait(self.answer_s):
-                    raise SkillRuntimeError(f"{server} does not answer for {self.answer_s:g} s")
+            answered = threading.Event()
+            client.call_async(request).add_done_callback(lambda _: answered.set())
+            if not answered.wait(self.answer_s):
+                raise SkillRuntimeError(f"{server} does not answer for {self.answer_s:g} s")
         finally:
             self.watch.node.destroy_client(client)
+
+    @property
+    def stops_first(self) -> bool:
+        """Tell whether a server that has just come is being told to stop what runs: nothing is asked of it before it has answered."""
+        late = self._late
+        return late is not None and late.client.wait_for_service(timeout_sec=0.0)
+
+    def forget_late_stop(self) -> None:
+        """Call no service any more that stops what ran before: something else runs now."""
+        late, self._late = self._late, None
+        if late is not None:
+            self.watch.node.destroy_client(late.client)
 
     def server_for(self, inputs: Any) -> str:  # noqa: ARG002
         """Return the server for these inputs."""
@@ -136,6 +160,13 @@ class FunctionSkill(SkillHooks, Generic[CallT]):
             call.execution.fail(message)
 
     def _look(self) -> None:
+        late = self._late
+        ready = self.stops_first
+        if late is not None and late.asked and not ready:
+            late.asked = False  # it has gone again without an answer
+        elif late is not None and ready and not late.asked:
+            late.asked = True
+            late.client.call_async(late.request).add_done_callback(lambda _: self.forget_late_stop())
         for call in list(self._calls.values()):
             with self._lock:
                 why = self.look(call) if self.is_open(call) else ""

@@ -86,7 +86,8 @@ class ServiceSkill(FunctionSkill[ServiceCall]):
 
     def look(self, call: ServiceCall) -> str:
         """Call the service once it is there; return why it is lost, or ""."""
-        if call.pending is None and call.client.service_is_ready():
+        if call.pending is None and call.client.service_is_ready() and not self.stops_first:
+            self.forget_late_stop()
             call.since_s = self.watch.now_s
             call.pending = call.client.call_async(call.request)
             call.pending.add_done_callback(lambda future: self._on_answer(call, future.result()))

@@ -329,6 +329,29 @@ def test_managers_that_start_call_the_stop_of_a_service(spinning):
     assert asked.stops == 1
 
 
+def test_a_stop_whose_server_comes_after_the_managers_is_called_before_anything_is_asked(spinning):
+    rig = Rig(spinning, Ask)
+    asked = AskServer(spinning)
+    until(lambda: asked.stops == 1, "what ran before is stopped")
+    handle = rig.start()
+    until(lambda: len(asked.answers) == 1, "it is asked")
+    asked.answers[0]("there")
+    assert rig.ended(handle)[:2] == (S.TERMINATED, "ARRIVED")
+    assert asked.stops == 1
+
+
+def test_an_action_whose_server_comes_after_the_managers_is_sent_goals_once_it_has_cancelled_what_ran_before(spinning):
+    rig = Rig(spinning, Quiet)
+    server = FlyServer(spinning)
+    try:
+        handle = rig.start()
+        server.goal().end(("succeed", ""))
+        assert rig.ended(handle)[:2] == (S.TERMINATED, "ARRIVED")
+        assert (server.cancels, rig.hooks.stops_first) == (0, False)
+    finally:
+        server.leave()
+
+
 # --- what is wrong in the class -------------------------------------------------------------------------------------------
 
 

@@ -9,9 +9,12 @@ import pytest
 pytest.importorskip("action_msgs")
 
 from action_msgs.msg import GoalStatus
+from std_srvs.srv import SetBool, Trigger
 
-from skillset_ros2 import ActionClient
+from alula.runtime.local.clock import VirtualClock
+from skillset_ros2 import ActionClient, ActionSkill, ServiceSkill, Watch
 from skillset_ros2.replay.actions import RecordedActionClient
+from skillset_ros2.replay.node import BagNode
 
 
 def message(number, **fields):
@@ -56,3 +59,22 @@ def test_a_goal_that_was_not_sent_then_is_a_difference():
 def test_hooks_get_their_client_from_the_node_of_a_replay():
     made = object()
     assert ActionClient(SimpleNamespace(create_action_client=lambda kind, name: (made, kind, name)), int, "/drive") == (made, int, "/drive")
+
+
+class Drive(ActionSkill):
+    action, server = object, "drive"
+
+
+class Switch(ServiceSkill):
+    service, server, stop_service, stop_server = SetBool, "switch", Trigger, "switch/stop"
+
+
+@pytest.mark.parametrize("kind", [Drive, Switch])
+def test_in_a_replay_there_is_nothing_to_be_stopped_at_the_start(kind):
+    clock, calls = VirtualClock(), []
+    node = BagNode(clock, lambda name, _: calls.append(name), {}, lambda: False, lambda _: SimpleNamespace(server_is_ready=lambda: True))
+    hooks = kind(Watch(node))
+    hooks.on_start()
+    while clock.do_next(5 * 10**9):
+        pass
+    assert (calls, hooks.stops_first) == ([], False)

@@ -54,6 +54,10 @@ class RecordedService:
         """Tell that it is there."""
         return True
 
+    def wait_for_service(self, timeout_sec: float) -> bool:  # noqa: ARG002 - rclpy's signature
+        """Tell that there is nothing to be stopped at the start: what ran before a record is not in it."""
+        return False
+
     def call_async(self, request: Any) -> RecordedFuture:
         """Return a future of the recorded response to this request."""
         return self._answer(self.service_name, to_plain(request))
@@ -103,6 +107,9 @@ class BagNode:
     def create_client(self, _kind: object, name: str, **_: object) -> RecordedService:
         """Return a client that the record answers."""
         return RecordedService(absolute(name), self._answer)
+
+    def destroy_client(self, client: RecordedService) -> None:
+        """Do nothing: it is connected to nothing."""
 
     def create_action_client(self, _kind: object, name: str) -> Any:
         """Return a client that the record answers."""
