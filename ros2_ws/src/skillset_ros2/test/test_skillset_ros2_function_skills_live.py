@@ -194,7 +194,7 @@ def test_an_interruption_is_done_when_the_server_says_that_the_goal_is_over(flyi
     goal = flying.goal()
     handle.interrupt()
     until(lambda: flying.cancels == 1, "the goal is cancelled")
-    assert handle.state is S.INTERRUPTING
+    until(lambda: handle.state is S.INTERRUPTING, "that is told")
     assert rig.client.resources["axes_authority"] == "USED"
     goal.end(("canceled", ""))
     assert rig.ended(handle)[0] is S.INTERRUPTED
@@ -297,9 +297,10 @@ def test_an_answer_ends_it_by_the_table_and_an_interruption_calls_the_stop(spinn
     assert rig.ended(handle) == (S.TERMINATED, "BLOCKED", "no")
     handle = rig.start()
     asked.asked(2)
+    before = asked.stops  # what ran before is stopped, too, where the service that does it was found first
     handle.interrupt()
     assert rig.ended(handle)[0] is S.INTERRUPTED
-    assert asked.stops == 1
+    assert asked.stops == before + 1
     late = rig.start()
     asked.asked(3)
     assert rig.ended(late) == (S.TERMINATED, "ABORTED", "ask does not answer for 1 s")
