@@ -98,11 +98,15 @@ def write_bag(
         text = state if isinstance(state, str) else json.dumps(state)
         bag.write("/sim/state", String(text), genpy.Time.from_sec(LIFT_OFF_S))
     for values in guidance:
-        told = GuidanceState()
-        told.header.stamp = genpy.Time.from_sec(values["t_s"])
-        told.reference, told.mode, told.landed_state = values.get("reference", "idle"), values.get("mode", "GUIDED"), values["landed_state"]
-        told.armed, told.position_enu_m.z = values.get("armed", False), values.get("height_m", 0.0)
-        bag.write("/uav_guidance/state", told, told.header.stamp)
+        stated = GuidanceState()
+        stated.header.stamp = genpy.Time.from_sec(values["t_s"])
+        stated.reference, stated.mode, stated.landed_state = (
+            values.get("reference", "idle"),
+            values.get("mode", "GUIDED"),
+            values["landed_state"],
+        )
+        stated.armed, stated.position_enu_m.z = values.get("armed", False), values.get("height_m", 0.0)
+        bag.write("/uav_guidance/state", stated, stated.header.stamp)
     for t_s, fault in health:
         said = SensorHealth(sensor="zed", ok=not fault, fault=fault, reason=f"it is {fault}" if fault else "")
         said.header.stamp = genpy.Time.from_sec(t_s)

@@ -12,6 +12,7 @@ from alula.missions.pausing import PauseRefusedError
 from alula.model.execution_state import ExecutionState
 
 READY = {
+    "height_status": "AGREED",
     "SDK_authority": "AVAILABLE",
     "flight_status": "ON_GROUND",
     "homepoint_status": "VALID",
