@@ -84,6 +84,7 @@ def read_base(uri: str) -> Base:
         publishers, subscribers, services = master.call("getSystemState", CALLER)
         types = {str(name): str(kind) for name, kind in master.call("getTopicTypes", CALLER)}
         nodes = {str(node) for entries in (publishers, subscribers, services) for _, every in entries for node in every}
+        nodes = {node for node in nodes if not node.startswith(CALLER)}  # a busy master may not have taken a doctor's leave yet
         uris = {}
         for node in sorted(nodes):
             with suppress(RefusedError):  # it has gone meanwhile
@@ -178,9 +179,9 @@ def _have_it_call(deployment: Deployment, port: int, called: threading.Event) ->
         master.call("registerPublisher", me, WAY_BACK, "std_msgs/Empty", uri)
         return called.wait(BACK_S)
     finally:
-        with suppress(OSError):
-            master.call("unregisterSubscriber", me, WAY_BACK, uri)
-            master.call("unregisterPublisher", me, WAY_BACK, uri)
+        for leave in ("unregisterSubscriber", "unregisterPublisher"):
+            with suppress(OSError):
+                master.call(leave, me, WAY_BACK, uri)
         master.close()
 
 
