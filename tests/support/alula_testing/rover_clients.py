@@ -36,7 +36,7 @@ def skills() -> dict[str, Any]:
     from base_interfaces.action import DriveTo, Localise
     from rclpy.action import ActionClient  # noqa: TID251 - a stock client, as others have it
     from rclpy.qos import DurabilityPolicy, QoSProfile
-    from skillset_interfaces.msg import ResourceStates
+    from skillset_interfaces.msg import Heartbeat, ResourceStates
 
     rclpy.init()
     node = rclpy.create_node("stock_client")
@@ -54,7 +54,9 @@ def skills() -> dict[str, Any]:
     latched = QoSProfile(depth=1, durability=DurabilityPolicy.TRANSIENT_LOCAL)
     look = lambda told: known.append(any((one.name, one.state) == ("pose_status", "GOOD") for one in told.resources))  # noqa: E731
     node.create_subscription(ResourceStates, "/base/resource_states", look, latched)
-    while not known or not known[-1]:
+    alive: list[Any] = []  # managers say so once they take requests
+    node.create_subscription(Heartbeat, "/base/alive", alive.append, latched)
+    while not alive or not known or not known[-1]:
         rclpy.spin_once(node, timeout_sec=0.1)
 
     heard: list[Any] = []
