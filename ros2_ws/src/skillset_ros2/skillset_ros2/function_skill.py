@@ -96,14 +96,16 @@ class FunctionSkill(SkillHooks, Generic[CallT]):
     @property
     def stops_first(self) -> bool:
         """Tell whether a server that has just come is being told to stop what runs: nothing is asked of it before it has answered."""
-        late = self._late
-        return late is not None and late.client.wait_for_service(timeout_sec=0.0)
+        with self._lock:  # another thread may be about to destroy the client
+            late = self._late
+            return late is not None and late.client.wait_for_service(timeout_sec=0.0)
 
     def forget_late_stop(self) -> None:
         """Call no service any more that stops what ran before: something else runs now."""
-        late, self._late = self._late, None
-        if late is not None:
-            self.watch.node.destroy_client(late.client)
+        with self._lock:
+            late, self._late = self._late, None
+            if late is not None:
+                self.watch.node.destroy_client(late.client)
 
     def server_for(self, inputs: Any) -> str:  # noqa: ARG002
         """Return the server for these inputs."""
@@ -159,14 +161,18 @@ class FunctionSkill(SkillHooks, Generic[CallT]):
         else:
             call.execution.fail(message)
 
+    def _stop_late(self) -> None:
+        """Call what stops what ran before, as soon as its server is there."""
+        with self._lock:
+            late, ready = self._late, self.stops_first
+            if late is None or late.asked is ready:
+                return
+            late.asked = ready  # not ready: it has gone again without an answer
+            if ready:
+                late.client.call_async(late.request).add_done_callback(lambda _: self.forget_late_stop())
+
     def _look(self) -> None:
-        late = self._late
-        ready = self.stops_first
-        if late is not None and late.asked and not ready:
-            late.asked = False  # it has gone again without an answer
-        elif late is not None and ready and not late.asked:
-            late.asked = True
-            late.client.call_async(late.request).add_done_callback(lambda _: self.forget_late_stop())
+        self._stop_late()
         for call in list(self._calls.values()):
             with self._lock:
                 why = self.look(call) if self.is_open(call) else ""
