@@ -9,7 +9,6 @@ Starts, ends and mends nothing. Exit code 0: nothing has to be mended; 1: someth
 
 from __future__ import annotations
 
-import json
 import os
 import sys
 import time
@@ -23,7 +22,7 @@ import psutil
 from alula.cli.table import parse
 from alula.common.deployments import deployment_names
 from alula.common.errors import AlulaError
-from alula.common.files import write_text
+from alula.common.files import json_line, write_text
 from alula.common.robots import RobotFolder, find_robot
 from alula_flight.doctor.base import foreign, look_at_master, look_at_nodes, look_at_way_back
 from alula_flight.doctor.bindings import look_at_bindings
@@ -109,7 +108,7 @@ def main(arguments: Sequence[str]) -> int:
     if given.json:
         every = [{**asdict(one), "level": one.level.value} for one in findings]
         took_s = round(time.monotonic() - begun_s, 1)
-        sys.stdout.write(json.dumps({"deployment": given.deployment, "took_s": took_s, "findings": every}) + "\n")
+        sys.stdout.write(json_line({"deployment": given.deployment, "took_s": took_s, "findings": every}))
     else:
         bad = sum(one.level is Level.PROBLEM for one in findings)
         sys.stdout.write("".join(f"{line}\n" for line in lines_of(findings)))

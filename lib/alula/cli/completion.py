@@ -31,7 +31,7 @@ if TYPE_CHECKING:
 
 # What only some words need is imported where they are asked for: a shell waits.
 OPTIONS_S = 10.0
-"""Wall clock, for a robot's own options where only a ROS world can import its part: 0.5 s, on a busy machine 3 s; a shell waits for it."""
+"""Wall clock, for a robot's own options where only a ROS world can import its part (3 s on a busy machine): a shell waits for it."""
 NAMES = ("alula", "./alula")
 HELP = ("-h", "--help")
 
