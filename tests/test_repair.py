@@ -11,6 +11,7 @@ from pathlib import Path
 from typing import Any, NamedTuple
 
 import pytest
+import yaml
 
 from alula import Mission
 from alula.check.robot import part_of
@@ -92,6 +93,9 @@ def test_the_flight_goes_on_with_the_lidar_as_in_figure_10(repaired: Repaired) -
     others = ["navigation.rotate_head", "navigation.lock_head", "navigation.goto"]
     assert skills == ["perception.lidar_depthmap", "uav.NextWaypoint", *others]
     assert 'heading="{sideways}"' in one["xml"]
+    fates = [*(one["after"]["faults"] for one in repaired.found["fates"]), *repaired.found["not_looked_at"]]
+    known = yaml.safe_load((ALULA_ROOT / "skillsets/uav/faults.yaml").read_text(encoding="utf-8"))["faults"]
+    assert {name for (name,) in fates} >= set(known)  # each is told of, or named
     assert repaired.found["not_asked"] == []  # the names that the properties ask for are there again
     (zed,) = [one for one in repaired.found["fates"] if one["after"]["faults"] == ["zed"]]
     assert (zed["before"]["survives"], zed["after"]["survives"]) == (False, True)
@@ -124,7 +128,7 @@ def test_without_another_sensor_it_is_impossible_and_says_why(no_lidar: Path, ca
     assert found["answer"] == "impossible"
     reasons = found["reasons"]
     assert isinstance(reasons, list)
-    assert "in no run without perception.zed_depthmap" in reasons[0]
+    assert "in no run without perception.zed_depthmap, and of navigation.goto none is for the same" in reasons[0]
     assert "perception.zed_depthmap can't start any more: it is refused by `zed_ready`" in reasons[1]
     assert "it could if perception.zed_status" in reasons[1]
 
@@ -132,6 +136,12 @@ def test_without_another_sensor_it_is_impossible_and_says_why(no_lidar: Path, ca
 def test_a_branch_may_be_forbidden_to_do_something(no_lidar: Path, capsys: pytest.CaptureFixture[str]) -> None:
     found = answer(capsys, no_lidar, "--fault", "zed", "--most-faults", "1", "--never", "running(navigation.lock_head)", code=1)
     assert found["answer"] == "unknown"
+
+
+def test_a_branch_that_an_abort_or_a_death_breaks_is_no_repair(no_lidar: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    """The branch is proved without them; `--never` asks for what only an abort brings about, with the branch and without it."""
+    asked = ("--fault", "zed", "--most-faults", "1", "--never", "outcome aborted")
+    assert answer(capsys, no_lidar, *asked, code=1)["answer"] == "unknown"
 
 
 def test_a_goal_is_as_good_as_an_accomplished_mission(no_lidar: Path, capsys: pytest.CaptureFixture[str]) -> None:
@@ -177,6 +187,13 @@ def test_what_can_not_be_asked_is_one_line(no_lidar: Path, capsys: pytest.Captur
     said = capsys.readouterr()
     assert said.out == ""
     assert message in said.err.splitlines()[-1]
+
+
+def test_more_faults_than_are_looked_at_can_not_be_asked_for(no_lidar: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    with pytest.raises(SystemExit) as ended:
+        repair([str(no_lidar), "--fault", "zed", "--most-faults", "3"])
+    assert ended.value.code == 2
+    assert "--most-faults: there is no 3" in capsys.readouterr().err
 
 
 def flown(mission: Mission, path: Path, *faults: str) -> MockedMission:

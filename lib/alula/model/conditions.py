@@ -26,10 +26,11 @@ _COMPARE: dict[Comparison, Callable[[Any, Any], Any]] = {
 
 
 def judge(condition: Expression, states: States, data: Data) -> bool | None:
-    """Tell whether a condition is true, or None where that hangs on data without a fresh value (Kleene's logic)."""
+    """Tell whether a condition is true, by Kleene's logic: None where that hangs on data without a fresh value, or a resource not given."""
     match condition:
         case ResourceIs(resource=resource, state=state, negated=negated):
-            return (states[resource] == state) != negated
+            known = states.get(resource)
+            return None if known is None else (known == state) != negated
         case DataIs():
             return _data_holds(condition, data)
         case Constant(value=value):

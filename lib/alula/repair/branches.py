@@ -8,7 +8,7 @@ from dataclasses import dataclass
 from textwrap import wrap
 
 from alula.repair.subject import Subject, with_property, without_properties_of
-from alula.trees.document import Document, Element, parse_document
+from alula.trees.document import Document, Element, quoted
 from alula.trees.errors import Place
 from alula.trees.reading import node_name
 
@@ -153,7 +153,7 @@ def _lines_of_tree(branch: Branch) -> list[str]:
 
 def _lines(element: Element, level: int) -> Iterator[str]:
     """Yield an element's lines, the longest broken before an attribute, as authors do."""
-    words = [f'{one.name}="{_escaped(one.value)}"' for one in element.attributes.values()]
+    words = [f"{one.name}={quoted(one.value)}" for one in element.attributes.values()]
     head = f"<{element.tag}"
     end = "/>" if not element.children else ">"
     room = WIDTH - len(STEP) * level
@@ -172,16 +172,5 @@ def _lines(element: Element, level: int) -> Iterator[str]:
         yield f"</{element.tag}>"
 
 
-def _escaped(value: str) -> str:
-    for sign, entity in (("&", "&amp;"), ("<", "&lt;"), (">", "&gt;"), ('"', "&quot;"), ("\n", "&#10;")):
-        value = value.replace(sign, entity)
-    return value
-
-
 def _indented(lines: list[str], level: int) -> str:
     return "\n".join(STEP * level + one for one in lines)
-
-
-def parsed(text: str) -> Element:
-    """Return the element of a text."""
-    return parse_document(text).root

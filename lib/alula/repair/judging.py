@@ -58,20 +58,23 @@ class Judge:
         self._deadline = deadline
         self._goal = goal
 
-    def check(self, text: str, *, prove: bool = True) -> Judgement:
-        """Return what `check` tells of a text of the mission's file; raises OutOfTimeError."""
+    def check(self, text: str, *, prove: bool = True, also: bool = False) -> Judgement:
+        """Return what `check` tells of a text of the mission's file; raises OutOfTimeError.
+
+        ``also``: of runs in which hooks raise, processes die or people interfere, too; else only of what the models make go wrong.
+        """
         found = self._subject.findings(text)
         if any(one.severity is Severity.ERROR for one in found) or not prove:
             return Judgement(tuple(found), complete=False)
         with self._subject.copy(text) as path:
-            proved = self._prove(path)
+            proved = self._prove(path, also=also)
         return Judgement((*found, *proved.findings), proved.complete)
 
-    def _prove(self, path: Path) -> Proved:
+    def _prove(self, path: Path, *, also: bool) -> Proved:
         self._deadline.check()
         subject = self._subject
         given = f"{self._deadline.left_s():.3g} s"
-        return prove_within(self._deadline, path, subject.skillsets, subject.part, faults=subject.shown, given=given)
+        return prove_within(self._deadline, path, subject.skillsets, subject.part, faults=subject.shown, given=given, also=also)
 
     def skills(self, text: str) -> list[str]:
         """Return the skills of the leaves of a text of the mission's file, by the leaves' numbers."""

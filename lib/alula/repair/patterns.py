@@ -15,12 +15,14 @@ from itertools import islice, product
 from alula.missions.mission_file import READY, STOP_HERE
 from alula.missions.palette import palette_of
 from alula.missions.skill_types import type_of
+from alula.model.conditions import NO_DATA, judge
 from alula.model.model import Parameter
 from alula.model.units import told_unit
+from alula.prove.mission.accepted import DESCRIPTION
 from alula.prove.mission.system import System
 from alula.repair.branches import FALLBACKS, Branch, clone, node, parent_of
 from alula.repair.naming import Renaming, another, assigned, plain
-from alula.repair.purposes import Purpose, Purposes, asked_of_others, broken_by, decided
+from alula.repair.purposes import Purpose, Purposes, asked_of_others, broken_by
 from alula.repair.subject import Subject, texts_of
 from alula.trees.document import Element
 from alula.trees.node import Node, pointer
@@ -184,7 +186,11 @@ class Patterns:
     def _watching(purpose: Purpose, resource: str) -> list[str]:
         """Return the invariants of a skill that a state of a resource breaks."""
         states = purpose.skillset.resource(resource).states
-        return [one.name for one in purpose.skill.invariants if any(decided(one.condition, resource, state) is False for state in states)]
+        return [
+            one.name
+            for one in purpose.skill.invariants
+            if any(judge(one.condition, {resource: state}, NO_DATA) is False for state in states)
+        ]
 
     def _was_there(self, invariant: str, failing: Failing) -> bool:
         """Tell whether a leaf beside the failing one can end by an invariant: then something else failed, which is not answered here."""
@@ -324,7 +330,7 @@ def _rename(element: Element, renaming: Renaming, old: str, new: str) -> None:
     for name, attribute in element.attributes.items():
         if name == "name":
             element.set(name, renaming.name(attribute.value))
-        elif name == "_description":
+        elif name == DESCRIPTION:
             element.set(name, "")
         elif old in attribute.value and not (is_port(name) and attribute.value.startswith("{")):
             element.set(name, attribute.value.replace(old, new))

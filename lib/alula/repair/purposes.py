@@ -13,7 +13,8 @@ from __future__ import annotations
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
 
-from alula.model.expressions import And, Constant, Expression, Implies, Not, Or, ResourceIs
+from alula.model.conditions import NO_DATA, judge
+from alula.model.expressions import ResourceIs
 from alula.model.model import Resource, ResultKind, Skill, Skillset
 
 
@@ -97,37 +98,10 @@ def _words(one: Purpose) -> set[str]:
 # --- conditions ---------------------------------------------------------------------------------------------------------
 
 
-def decided(condition: Expression, resource: str, state: str) -> bool | None:
-    """Tell what a condition is while a resource is in a state, whatever the others and the data are; None: that depends on them."""
-    match condition:
-        case Constant(value=value):
-            return value
-        case ResourceIs(resource=name, state=other, negated=negated):
-            return (state == other) != negated if name == resource else None
-        case Not(operand=operand):
-            inner = decided(operand, resource, state)
-            return None if inner is None else not inner
-        case And(operands=operands):
-            return _all([decided(one, resource, state) for one in operands])
-        case Or(operands=operands):
-            inner = _all([decided(Not(one), resource, state) for one in operands])
-            return None if inner is None else not inner
-        case Implies(premise=premise, conclusion=conclusion):
-            return decided(Or((Not(premise), conclusion)), resource, state)
-        case _:
-            return None
-
-
-def _all(values: Sequence[bool | None]) -> bool | None:
-    if False in values:
-        return False
-    return None if None in values else True
-
-
 def broken_by(skill: Skill, resource: str, state: str) -> str | None:
     """Return the invariant that is false in a state, else the precondition; None: the skill can start and run."""
     conditions = [(one.name, one.condition) for one in skill.invariants] + [(one.name, one.condition) for one in skill.preconditions]
-    return next((name for name, condition in conditions if decided(condition, resource, state) is False), None)
+    return next((name for name, condition in conditions if judge(condition, {resource: state}, NO_DATA) is False), None)
 
 
 def asked_of_others(purpose: Purpose) -> list[tuple[Resource, str]]:

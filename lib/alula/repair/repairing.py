@@ -2,8 +2,9 @@
 
 1. The mission is looked at as it is: what `check` tells, and what becomes of it with the fault.
 2. Branches are made of what its files and the robot's skills have (`Patterns`), the smallest first.
-3. Each is judged: what `check` finds in the file, what becomes of the mission with the fault, then all runs, with all failures. A branch is
-   a repair when the fault is survived, every property of the mission is proved, and nothing new is left open.
+3. Each is judged: what `check` finds in the file, what becomes of the mission with the fault, then all runs, with all failures, at last
+   those in which hooks raise, managers die, or somebody aborts or pauses the mission. A branch is a repair when the fault is survived,
+   every property of the mission is proved, and nothing new is left open.
 4. A counterexample goes back: branches that would run the same skills side by side again are not tried.
 5. Of a repair it is told which faults are survived before and after it.
 """
@@ -13,6 +14,7 @@ from __future__ import annotations
 from collections.abc import Callable, Iterator, Sequence
 from contextlib import suppress
 from dataclasses import dataclass, field, replace
+from functools import cached_property
 
 from alula.language.errors import Diagnostic, Severity
 from alula.language.lexer import Source
@@ -81,6 +83,7 @@ class Repair:
         tried: how many branches were judged before it.
         not_asked: properties of the mission that ask for nodes which it has not.
         before, after: what becomes of the mission by faults, without and with it.
+        not_looked_at: faults, alone or one after another, of which that was not found out: too many situations, or no time left.
     """
 
     branch: Branch
@@ -89,6 +92,7 @@ class Repair:
     not_asked: tuple[str, ...]
     before: dict[tuple[str, ...], Fate] = field(default_factory=dict)
     after: dict[tuple[str, ...], Fate] = field(default_factory=dict)
+    not_looked_at: tuple[tuple[str, ...], ...] = ()
 
 
 @dataclass(frozen=True)
@@ -133,6 +137,12 @@ class Search:
         self._patterns = Patterns(subject, question.using)
         self._refuted: set[frozenset[str]] = set()
         self._missing = tuple(subject.names_asked())
+
+    @cached_property
+    def _whole_before(self) -> Judgement:
+        """What `check` finds in the mission as it is, in all the runs that it looks at."""
+        text, _ = self._without_branch(self._missing)
+        return self._judge.check(text, also=True)
 
     def run(self) -> Answer:
         """Search; raises AlulaError where the mission can't be looked at."""
@@ -240,6 +250,11 @@ class Search:
             return "not all its runs were looked at"
         if finding is not None and _is_left(judgement, before, finding):
             return "the counterexample is still there"
+        whole = self._judge.check(text, also=True)
+        if new := whole.new(self._whole_before):
+            return new[0].message
+        if not whole.complete:
+            return "not all its runs in which hooks raise, managers die, or somebody aborts or pauses it were looked at"
         written, _ = branch.written(self._subject)
         return Repair(branch, written, 0, tuple(not_asked))
 
@@ -265,7 +280,8 @@ class Search:
                 f"{purpose.name} can't start any more: it is refused by {refused}, in each of {game.situations} situations; "
                 f"it could if {purpose.skillset.name}.{cure} left what the fault shows"
             )
-        needed = f"the mission is accomplished in no run without {failing.skill}, and no other skill is for the same"
+        others = f"of {', '.join(self._question.using)} none" if self._question.using else "no other skill"
+        needed = f"the mission is accomplished in no run without {failing.skill}, and {others} is for the same and can run"
         return [needed, *lines]
 
     # --- counterexamples ---------------------------------------------------------------------------------------------
@@ -301,7 +317,8 @@ class Search:
                 fates = was(faults, MOST_SITUATIONS), now(faults, MOST_SITUATIONS)
                 if fates[0] is not None and fates[1] is not None:
                     before[faults], after[faults] = fates[0], fates[1]
-        return replace(repair, before=before, after=after)
+        not_looked_at = tuple(one for one in (*singles, *pairs) if one not in after)
+        return replace(repair, before=before, after=after, not_looked_at=not_looked_at)
 
 
 def _condition(text: str) -> Expression:

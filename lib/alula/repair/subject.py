@@ -20,15 +20,16 @@ from alula.language.errors import Diagnostic
 from alula.language.messages import Messages, messages_of
 from alula.missions.part import MissionPart
 from alula.model.model import Skillset
+from alula.prove.mission.accepted import DESCRIPTION
+from alula.prove.mission.wanted import PROPERTY
 from alula.records.causes.effects import FaultEffects
 from alula.records.causes.fault_file import load_effects
 from alula.repair.errors import RepairError
 from alula.trees.document import Document, Element, parse_document, read_source
 from alula.trees.reading import TreeFiles, node_name, read_files
 
-DESCRIPTION = "_description"
 _ACTIVE = re.compile(r"active\(\s*['\"](?P<node>[^'\"]+)['\"]\s*\)")
-_PROPERTY = re.compile(r"\s*\bproperty (?P<name>\w+):(?:(?!\bproperty \w+:|\baccepted ALU7)[^;])*;?", re.DOTALL)
+_PROPERTY = re.compile(rf"\s*{PROPERTY.pattern};?", re.DOTALL)
 
 
 @dataclass(frozen=True)

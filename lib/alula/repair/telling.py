@@ -36,6 +36,8 @@ def _of_repair(repair: Repair, what: str, odds: Both | None, reasons: Sequence[s
         before = repair.before[faults]
         if len(faults) == 1 or after.survives or not after.safe:
             lines.append(f"  {' and then '.join(faults):<34} {_fate(before)} -> {_fate(after)}")
+    if repair.not_looked_at:
+        lines.append(f"  not looked at: {', '.join(' and then '.join(one) for one in repair.not_looked_at)}")
     if odds is not None:
         lines.append("odds, without and with it:")
         lines += [f"  {WORDS[name]:<18} {_range(odds[0], name)} -> {_range(odds[1], name)}" for name in odds[0].outcomes]
@@ -58,6 +60,7 @@ def as_dict(answer: Answer, odds: Both | None) -> dict[str, object]:
     branch = {"name": repair.branch.name, "nodes": repair.branch.size, "at": places, "wraps": repair.branch.wraps}
     found["repair"] = {**branch, "xml": repair.branch.as_xml(), "use": "".join(repair.branch.use.pieces())}
     found["not_asked"] = list(repair.not_asked)
+    found["not_looked_at"] = [list(one) for one in repair.not_looked_at]
     found["fates"] = [{"before": repair.before[one].as_dict(), "after": fate.as_dict()} for one, fate in repair.after.items()]
     if odds is not None:
         found["odds"] = {name: _pairs(odds, name) for name in odds[0].outcomes}

@@ -37,6 +37,11 @@ _BLANK = "something stands before `<?xml`, so other tools refuse the file", "beg
 TAG = re.compile(rb"<[A-Za-z_][^\s=/>]*")
 
 
+def quoted(value: str) -> str:
+    """Return an attribute's value as a file has it, with its quotation marks."""
+    return f'"{value.translate(_ESCAPED)}"'
+
+
 @dataclass
 class Attribute:
     """An attribute; ``place`` is that of its name."""
@@ -64,7 +69,7 @@ class Attribute:
 
     def text(self) -> str:
         """Return it as it stands in a file."""
-        value = self.source or '"' + self.value.translate(_ESCAPED) + '"'
+        value = self.source or quoted(self.value)
         return f"{self.lead}{self.name}{self.sign}{value}"
 
 

@@ -94,7 +94,14 @@ def repair(parser: ArgumentParser) -> None:
     parser.add_argument(
         "--using", action="append", default=[], metavar="SKILLS", help="skills that may stand for the one that fails (default: all)"
     )
-    parser.add_argument("--most-faults", type=int, default=2, metavar="K", help="how many faults may come, one after another (default 2)")
+    parser.add_argument(
+        "--most-faults",
+        type=int,
+        default=2,
+        choices=(1, 2),
+        metavar="K",
+        help="how many faults may come, one after another: 1 or 2 (default 2)",
+    )
     parser.add_argument("--time", type=float, default=REPAIR_S, metavar="SECONDS", help=f"time limit (default {REPAIR_S:g})")
     parser.add_argument("--out", type=Path, metavar="FILE", help="write the mission with the branch there (default: nothing is written)")
     json_option(parser, "the branch")

@@ -81,9 +81,15 @@ def prove_within(
     *,
     faults: Faults = NO_FAULTS,
     given: str,
+    also: bool = False,
 ) -> Proved:
-    """Return what the models alone make go wrong, within a deadline; ``given`` is what messages call it."""
-    return _Search(mission, models, part, faults).within(deadline, given).proved()
+    """Return what the models alone make go wrong, within a deadline; ``given`` is what messages call it.
+
+    ``also`` has runs looked at, too, in which hooks raise, processes die or people interfere, as ``prove_mission`` does.
+    """
+    search = _Search(mission, models, part, faults)
+    seen = search.within(deadline, given)
+    return (search.also(seen, deadline, given) if also else seen).proved()
 
 
 @dataclass(frozen=True)

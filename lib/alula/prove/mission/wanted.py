@@ -24,7 +24,8 @@ from alula.trees.document import Attribute
 from alula.trees.node import Node
 
 CODE = "ALU713"
-_PROPERTY = re.compile(rf"\bproperty (?P<text>\w+:.*?)(?=;|{NEXT})", re.DOTALL)
+PROPERTY = re.compile(rf"\bproperty (?P<text>(?P<name>\w+):.*?)(?=;|{NEXT})", re.DOTALL)
+"""A property in a description; behind it may stand a semicolon."""
 OUTCOMES = tuple(one.value for one in Outcome if one is not Outcome.RUNNING)
 
 
@@ -43,7 +44,7 @@ def wanted(nodes: Sequence[Node], skillsets: Sequence[Skillset], faults: Collect
     names = {node.name for node in nodes}
     for node in nodes:
         attribute = node.wiring.element.attributes.get(DESCRIPTION)
-        for match in _PROPERTY.finditer(attribute.value) if attribute else ():
+        for match in PROPERTY.finditer(attribute.value) if attribute else ():
             assert attribute is not None  # noqa: S101 - it has a match
             try:
                 one = _read(attribute, match["text"], match.start("text"))

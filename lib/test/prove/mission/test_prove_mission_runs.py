@@ -221,6 +221,14 @@ def drones(name: str, deadline: Deadline) -> Proved:
     return prove_within(deadline, path, models, part_of(robot, print), faults=states_of_faults(models, print), given="this test")
 
 
+def test_within_a_deadline_an_abort_is_looked_at_where_that_is_asked(tmp_path: Path) -> None:
+    path = tmp_path / "mission.xml"
+    path.write_text(whole('<Sequence name="all" _description="property kept: never outcome aborted;"><drone.hover/></Sequence>'))
+    told = {also: prove_within(Deadline.after(1e6), path, robots(), PART, given="this test", also=also) for also in (False, True)}
+    assert {also: [one.code for one in proved.findings] for also, proved in told.items()} == {False: ["ALU702"], True: ["ALU702", "ALU714"]}
+    assert [one.code for one in prove_mission(path, robots(), PART).findings] == ["ALU702", "ALU714"]
+
+
 def test_what_was_found_before_the_bound_is_told() -> None:
     proved = drones("mapping", Few.after(1e6))
     assert not proved.complete
