@@ -20,6 +20,7 @@ from alula.trees.errors import TickError
 from alula.trees.palette import Category, NodeType, Port
 from alula.trees.status import FAILURE, IDLE, RUNNING, SKIPPED, SUCCESS, Answer, Status
 from alula.trees.ticking import ANY_TICKING, Order, Ticking, never_ticked
+from alula.trees.values import StandIn
 
 NANOSECONDS_PER_MS = 1_000_000
 Watcher = Callable[["Node", Status, Status], None]
@@ -321,8 +322,8 @@ class Node(Behaviour):  # type: ignore[misc]  # py_trees is seen untyped
     def number(self, port: str) -> int:
         """Return the value of an input that is a whole number."""
         value = self.get(port)
-        if isinstance(value, int):
-            return value
+        if isinstance(value, int) or (isinstance(value, float) and isinstance(value, StandIn)):
+            return value  # type: ignore[return-value]  # of a whole number nobody knows
         raise TickError(f"{self.place()}: the port '{port}' is no whole number")
 
     def real(self, port: str) -> float:

@@ -32,6 +32,20 @@ def literal(text: str) -> object:
     return number if math.isfinite(number) else text
 
 
+class StandIn:
+    """What stands in the place of a value that nobody knows, as in a search of all runs: it says itself what a port reads of it."""
+
+    __slots__ = ()
+
+    def read_as(self, type_: PortType) -> object:
+        """Return what a port of a type reads; raises ValueError where the value may be none that it can read."""
+        raise NotImplementedError
+
+    def says(self, number: float) -> bool:
+        """Tell of a text whether it is one for a number."""
+        raise NotImplementedError
+
+
 @public("alula.trees")
 @dataclass(frozen=True, eq=False)
 class PortType:
@@ -40,9 +54,15 @@ class PortType:
     name: str
     parse: Callable[[str], object] = field(repr=False)
     cast: Callable[[object], object] = field(repr=False)
+    limits: tuple[int, int] | None = field(default=None, repr=False)
+    """Of whole numbers the least and the largest; None: a type of anything else."""
+    item: PortType | None = field(default=None, repr=False)
+    """Of lists the type of their items."""
 
     def read(self, value: object) -> object:
         """Return a value of this type made of any other; raises ValueError."""
+        if isinstance(value, StandIn):
+            return value.read_as(self)
         return self.parse(value) if isinstance(value, str) else self.cast(value)
 
 
@@ -71,7 +91,7 @@ def whole(name: str, least: int, largest: int) -> PortType:
             raise _wrong(text, name)
         return number
 
-    return PortType(name, parse, cast)
+    return PortType(name, parse, cast, (least, largest))
 
 
 def _parse_double(text: str) -> float:
@@ -158,4 +178,4 @@ def list_of(item: PortType) -> PortType:
             return [item.read(part) for part in value]
         raise _wrong(value, name)
 
-    return PortType(name, parse, cast)
+    return PortType(name, parse, cast, item=item)

@@ -197,24 +197,18 @@ class MeasuredNumber(UnknownNumber):
     def __new__(cls, oracle: Oracle, what: str, low: float = -math.inf, high: float = math.inf) -> Self:
         """Make one. As a plain float it is no NaN: that would mean that nothing was measured."""
         made = float.__new__(cls, math.inf)
-        made.oracle, made.what, made.low, made.high = oracle, what, low, high
+        made.oracle, made.what, made.low, made.high, made.whole, made.others = oracle, what, low, high, False, frozenset()
         return made
 
-    def _decided(self, sure: bool, impossible: bool, symbol: str, other: float) -> bool:  # noqa: FBT001
+    @property
+    def keeps_answers(self) -> bool:
+        """Always: what is NaN is asked apart."""
+        return True
+
+    def _asked(self, symbol: str, other: float) -> bool:
         if isinstance(other, UnknownNumber):
             raise UndecidedError(f"the data {self.what} is compared with {other.what}, which is not known either")
-        if sure or impossible:
-            return sure
-        answer = bool(self.oracle.choose((DATA, self.what, symbol, repr(other))))
-        below = {"<": math.nextafter(other, -math.inf), "<=": other}
-        above = {">": math.nextafter(other, math.inf), ">=": other}
-        upwards = {"<": other, "<=": math.nextafter(other, math.inf)}
-        downwards = {">": other, ">=": math.nextafter(other, -math.inf)}
-        if symbol in below:
-            self.high, self.low = (min(self.high, below[symbol]), self.low) if answer else (self.high, max(self.low, upwards[symbol]))
-        else:
-            self.low, self.high = (max(self.low, above[symbol]), self.high) if answer else (self.low, min(self.high, downwards[symbol]))
-        return answer
+        return bool(self.oracle.choose((DATA, self.what, symbol, repr(other))))
 
     def near(self, other: float) -> bool:
         """Tell whether it is equal to another, as scripts count."""
@@ -251,28 +245,12 @@ class MeasuredNumber(UnknownNumber):
 class MeasuredText(UnknownText):
     """A text that was told; what a tick has asked of it holds for the rest of the tick."""
 
-    __slots__ = ("_known", "_others")
-    _known: str | None
-    _others: set[str]
+    __slots__ = ()
 
-    def __new__(cls, oracle: Oracle, what: str) -> Self:
-        """Make one."""
-        made = super().__new__(cls, oracle, what)
-        made._known, made._others = None, set()
-        return made
-
-    def _decided(self, symbol: str, other: object) -> bool:
-        if symbol != "==" or not isinstance(other, str) or isinstance(other, UnknownText):
+    def _asked(self, symbol: str, other: str) -> bool:
+        if symbol != "==" or not other.startswith("'"):
             raise UndecidedError(f"the letters of the data {self.what} are needed")
-        if self._known is not None or other in self._others:
-            return self._known == other
-        if self.oracle.choose((DATA, self.what, "==", f"'{other}'")):
-            self._known = other
-            return True
-        self._others.add(other)
-        return False
-
-    __hash__ = UnknownText.__hash__
+        return bool(self.oracle.choose((DATA, self.what, symbol, other)))
 
 
 def of_data(choices: Iterable[Asked]) -> list[Asked]:

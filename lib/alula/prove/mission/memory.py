@@ -18,18 +18,18 @@ from alula.prove.mission.oracle import UndecidedError
 from alula.prove.mission.own import MOST, Run
 from alula.prove.mission.reading import ANOTHER, Read
 from alula.prove.mission.robot import Handle, Memory, Robot
-from alula.prove.mission.unknown import Unknown, UnknownNumber, UnknownText, is_unknown
+from alula.prove.mission.unknown import Unknown, UnknownItems, UnknownNumber, UnknownText, is_unknown
 from alula.trees.blackboard import Entry
 from alula.trees.node import Count, Node
 from alula.trees.status import IDLE, RUNNING, Skipped, Status
 from alula.trees.tree import Tree
-from alula.trees.values import ANY, STRING
+from alula.trees.values import ANY, STRING, PortType
 
 FEW = 2
 STATUS_OF = {one.value: one for one in Status}
 TAKE_TEXT = (STRING, ANY)
 """Types of entries that any text can be written into."""
-PLAIN = frozenset({type(None), bool, int, float, str, Status, Skipped, Unknown})
+PLAIN = frozenset({type(None), bool, int, float, str, Status, Skipped})
 """Types whose values are kept as they are."""
 
 
@@ -321,10 +321,14 @@ class Keeper:
                 return {name: self._thawed(one) for name, one in items}
             case ("set", frozenset() as items):
                 return set(items)
-            case ("number", (str(what), float(low), float(high))):
-                return UnknownNumber(self._body.robot.oracle, what, low, high)
-            case ("text", str(what)):
-                return UnknownText(self._body.robot.oracle, what)
+            case ("number", (str(what), float(low), float(high), bool(whole), frozenset() as others)):
+                return UnknownNumber(self._body.robot.oracle, what, low, high, whole=whole, others=others)
+            case ("text", str(what), frozenset() as others):
+                return UnknownText(self._body.robot.oracle, what, others)
+            case ("items", str(what), PortType() as item):
+                return UnknownItems(self._body.robot.oracle, what, item)
+            case ("any", str(what), bool(fits)):
+                return Unknown(self._body.robot.oracle, what, fits=fits)
             case (_, *_):
                 return self._thawing.moment(value)
         return value
@@ -332,7 +336,7 @@ class Keeper:
 
 def _exactly(node: Node, name: str, value: object) -> Hashable:
     """Return what the class of a robot's own node remembers, as it is; raises UndecidedError where that can't be kept, or may grow."""
-    if isinstance(value, Unknown | dict) or is_unknown(value) or (isinstance(value, int) and abs(value) > MOST):
+    if isinstance(value, dict) or is_unknown(value) or (isinstance(value, int) and abs(value) > MOST):
         what = f"grows beyond {MOST}" if isinstance(value, int) else f"is {value!r}, which the search can't keep"
         raise UndecidedError(f"{node.place()}: its `{name}` {what}")
     if isinstance(value, list | tuple | set):
@@ -347,7 +351,7 @@ def _frozen(value: object) -> Hashable:
     match value:
         case UnknownNumber():
             return ("number", value.frozen)
-        case Moment() | Later() | UnknownText():
+        case Moment() | Later() | UnknownText() | UnknownItems() | Unknown():
             return value.frozen
         case list():
             return ("list", tuple(_frozen(one) for one in value))

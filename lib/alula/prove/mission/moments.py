@@ -7,7 +7,9 @@ from collections.abc import Hashable, Mapping, Sequence
 from typing import Final
 
 from alula.prove.mission.oracle import Oracle
+from alula.prove.mission.unknown import COMPARE, UnknownNumber
 
+PASSED = "the time that has passed"
 OVER: Final = ("over",)
 """A later moment that has come."""
 
@@ -28,8 +30,13 @@ class Moment:
         self.passed = 0.0 if now else max(passed, 0.0)
         self._not_passed = 0.0 if now else math.inf
 
-    def reached(self, duration: float) -> bool:
-        """Tell whether so much time has passed since; the same answer for a whole tick, and for ever once it is yes."""
+    def reached(self, duration: float | str) -> bool:
+        """Tell whether so much time has passed since; the same answer for a whole tick, and for ever once it is yes.
+
+        Of a duration that is not known its name is given: it may be over in any tick.
+        """
+        if isinstance(duration, str):
+            return not self.oracle.choose((COMPARE, duration, ">", PASSED))
         if duration <= self.passed:
             return True
         if duration > self._not_passed or duration == math.inf:
@@ -48,7 +55,7 @@ class Moment:
         return ("since", self.passed)
 
     def __add__(self, duration: float) -> Later:
-        return Later(self, float(duration))
+        return Later(self, _known(duration))
 
     def __sub__(self, since: object) -> Elapsed:
         return Elapsed(since if isinstance(since, Moment) else Moment(self.oracle, math.inf))
@@ -70,11 +77,11 @@ class Moment:
 
 
 class Later:
-    """A moment so much time after another."""
+    """A moment so much time after another; of a time that is not known ``duration`` is its name."""
 
     __slots__ = ("duration", "since")
 
-    def __init__(self, since: Moment, duration: float) -> None:
+    def __init__(self, since: Moment, duration: float | str) -> None:
         self.since = since
         self.duration = duration
 
@@ -86,7 +93,8 @@ class Later:
     @property
     def frozen(self) -> Hashable:
         """What is known of it."""
-        return OVER if self.since.passed >= self.duration else ("until", self.duration)
+        over = not isinstance(self.duration, str) and self.since.passed >= self.duration
+        return OVER if over else ("until", self.duration)
 
 
 class Elapsed:
@@ -99,7 +107,7 @@ class Elapsed:
         self._factor = factor
 
     def __ge__(self, duration: float) -> bool:
-        return self._since.reached(duration / self._factor)
+        return self._since.reached(_known(duration / self._factor))
 
     def __gt__(self, duration: float) -> bool:
         return self >= duration
@@ -115,6 +123,11 @@ class Elapsed:
 
     def __mul__(self, factor: float) -> Elapsed:
         return Elapsed(self._since, self._factor * factor)
+
+
+def _known(duration: float) -> float | str:
+    """Return a duration, or the name of one that is not known."""
+    return duration.what if isinstance(duration, UnknownNumber) else float(duration)
 
 
 def numbered(values: Sequence[Hashable], moments: Mapping[int, tuple[str, Moment | Later]]) -> tuple[Hashable, ...]:
@@ -156,6 +169,6 @@ class Thawing:
                 return Moment(self._oracle, passed, told=told)
             case ("over",):
                 return Later(Moment(self._oracle, math.inf), 0.0)
-            case ("until", float(duration)):
+            case ("until", float() | str() as duration):
                 return Later(Moment(self._oracle, told=told), duration)
         raise TypeError(frozen)

@@ -11,7 +11,7 @@ from alula.prove.mission.oracle import UndecidedError
 from alula.prove.mission.reading import ANOTHER
 from alula.prove.mission.robot import Memory, Robot
 from alula.prove.mission.runnable import names_in, remembered, why_not
-from alula.prove.mission.unknown import Unknown, UnknownText, is_unknown, unknown
+from alula.prove.mission.unknown import any_value, is_unknown
 from alula.trees.access import written_entries
 from alula.trees.ends import ANY_END
 from alula.trees.errors import TickError
@@ -137,10 +137,10 @@ def _known_leaf(robot: Robot, real: type[Node]) -> type[Node]:
     options = _answers(real)
 
     def get(self: Node, port: str) -> object:
-        value = real.get(self, port)
-        if isinstance(value, Unknown | UnknownText):
+        known = self.entry(port) if self.given(port) else None
+        if known is not None and is_unknown(known.value):
             raise UndecidedError(f"{self.place()}: the value of the port '{port}' is not known")
-        return value
+        return real.get(self, port)
 
     def update(self: Node) -> Answer:
         try:
@@ -169,8 +169,11 @@ def _free(robot: Robot, node: Node, options: tuple[str, ...]) -> Answer:
 
 def write(robot: Robot, node: Node) -> None:
     """Write values of which nothing is known to all outputs."""
+    entries = written_entries(node)
     for port in outputs(node):
-        node.put(port.name, unknown(robot.oracle, f"`{written_entries(node)[port.name]}`", port.type))
+        entry = entries[port.name]
+        type_ = robot.uses.type_of(node.wiring.type.name, port, entry)
+        node.put(port.name, any_value(robot.oracle, f"`{entry}`", type_))
 
 
 def outputs(node: Node) -> list[Port]:

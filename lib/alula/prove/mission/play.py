@@ -32,8 +32,7 @@ from alula.prove.mission.playable import AS_WANTED, breaks, playable, refuses
 from alula.prove.mission.robot import Robot, progress_of
 from alula.prove.mission.run import MissionRun
 from alula.prove.mission.state import Event, Kind
-from alula.prove.mission.system import nowhere_made
-from alula.prove.mission.unknown import UNKNOWN
+from alula.prove.mission.system import any_inputs, nowhere_made, uses_of
 from alula.runtime.client import Client
 from alula.runtime.core.execution import Execution
 from alula.runtime.handle import SkillHandle
@@ -97,7 +96,7 @@ def _alike(chosen: Question, asked: Question) -> bool:
     match chosen, asked:
         case ("compare", str(left), str(symbol), str(right)), ("compare", str(one), str(other_symbol), str(other)):
             straight = symbol == other_symbol and (left == one or right == other)
-            return straight or (FLIPPED[symbol] == other_symbol and (left == other or right == one))
+            return straight or (FLIPPED.get(symbol) == other_symbol and (left == other or right == one))
     return False
 
 
@@ -139,9 +138,11 @@ class _Player:
         self.world = LocalWorld(self._served.values(), self._functions)
         source = source_of(mission)
         declared = nowhere_made(source.read(), run.skillsets, part)
-        own = own_nodes(Robot(self._oracle), part, declared, run.why_any_order)
+        uses = uses_of(source, run.skillsets, part)
+        own = own_nodes(Robot(self._oracle, uses=uses), part, declared, run.why_any_order)
         nodes = MissionPart(own.part.nodes, memory=part.memory)
-        plan = plan_of_file(source, source.path.stem, run.skillsets, _Unknown(), nodes)
+        inputs = any_inputs(source.read(), self._oracle, uses)
+        plan = plan_of_file(source, source.path.stem, run.skillsets, inputs, nodes)
         plan = replace(plan, inputs={})
         self._facts = plan.facts
         clock_ns = lambda: self.world.clock.now_ns  # noqa: E731
@@ -370,13 +371,3 @@ class _Player:
         end = self._driver.end or End(Outcome.ABORTED, f"it left the counterexample {left}" if left else "the counterexample ends here")
         self._driver.finish(end)
         return Played(end, left, self.world.now_s, self._facts())
-
-
-class _Unknown(dict[str, object]):
-    """Inputs of which nothing is known, whatever their names."""
-
-    def __missing__(self, _name: str) -> object:
-        return UNKNOWN
-
-    def __contains__(self, _name: object) -> bool:
-        return True

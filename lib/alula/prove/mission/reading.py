@@ -10,7 +10,7 @@ from alula.common.graphs import reachable_from
 from alula.missions.mission_file import DEGRADED, STOPPING
 from alula.missions.world import FUNCTIONS
 from alula.prove.mission.oracle import Oracle
-from alula.prove.mission.unknown import UNKNOWN, UnknownNumber, UnknownText
+from alula.prove.mission.unknown import Unknown, UnknownNumber, UnknownText
 from alula.trees.access import scripts_of
 from alula.trees.document import Element
 from alula.trees.node import pointer
@@ -84,6 +84,8 @@ class Read:
 
     def value(self, name: str, value: object) -> object:
         """Return what is kept of an entry's value."""
+        if isinstance(value, UnknownText) and value.known is not None:
+            value = value.known
         if value is None:
             return None
         if name not in self.names:
@@ -101,7 +103,9 @@ class Read:
     def kind(self, name: str, value: object) -> object:
         """Return something of the kind of a value, so that scripts can go on to compute with it."""
         number = isinstance(value, int | float)
-        return UnknownNumber(self.oracle, f"`{name}`") if number else ANOTHER if isinstance(value, str) else UNKNOWN
+        return (
+            UnknownNumber(self.oracle, f"`{name}`") if number else ANOTHER if isinstance(value, str) else Unknown(self.oracle, f"`{name}`")
+        )
 
     def _number(self, name: str, value: float) -> object:
         known = self.numbers.get(name, set())

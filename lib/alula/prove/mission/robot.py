@@ -17,6 +17,7 @@ from alula.prove.mission.moments import Moment
 from alula.prove.mission.oracle import Oracle
 from alula.prove.mission.states import Compared, SeenState
 from alula.prove.mission.unknown import UnknownNumber, unknown
+from alula.prove.mission.uses import Uses
 from alula.runtime.handle import SkillHandle
 
 NO_END = ("sent",)
@@ -33,6 +34,8 @@ class Robot:
     """What the mission's conditions ask of data."""
     compared: Compared = Compared()  # noqa: RUF009 - a value
     """The resources that its scripts only compare with states."""
+    uses: Uses = Uses()  # noqa: RUF009 - a value
+    """Of which type values are that nodes without a class write."""
     starting: int = -1
     """The leaf that starts a skill now."""
     started: list[int] = field(default_factory=list)

@@ -28,6 +28,7 @@ from alula.missions.palette import palette_of, without_class
 from alula.missions.part import MissionPart
 from alula.missions.plan import InputError, Inputs
 from alula.missions.skill_types import OUTCOME_PORT
+from alula.missions.world import states_of
 from alula.model.execution_state import ExecutionState
 from alula.model.model import Skillset
 from alula.prove.limits import Deadline
@@ -43,9 +44,10 @@ from alula.prove.mission.state import Event, Execution, Kind, Managers, State
 from alula.prove.mission.states import Compared
 from alula.prove.mission.ticking import ABORT, TICK, OneStop, Ticker
 from alula.prove.mission.ticking import Outcome as Ticked
-from alula.prove.mission.unknown import UNKNOWN
+from alula.prove.mission.unknown import any_value
+from alula.prove.mission.uses import Uses
 from alula.trees.node import Node, pointer
-from alula.trees.palette import Direction, NodeType, Port
+from alula.trees.palette import Direction, NodeType, Port, name_in_files
 from alula.trees.reading import TreeFiles, type_name
 from alula.trees.source import TreeSource, source_of
 
@@ -100,9 +102,11 @@ class System:
         skillsets = [one for one in models if one.name in _named(files)]
         oracle = Oracle()
         palette = palette_of(files, models, part)
-        robot = Robot(oracle, Conditions.of(files, palette, skillsets), Compared.of(files, palette, skillsets))
-        inputs = {port.name: UNKNOWN for port in _ports(files)} if known is None else known
-        own = own_nodes(robot, part, nowhere_made(files, models, part), why_any_order, known=known is not None)
+        declared = nowhere_made(files, models, part)
+        uses = uses_of(source, models, part)
+        robot = Robot(oracle, Conditions.of(files, palette, skillsets), Compared.of(files, palette, skillsets), uses)
+        inputs = any_inputs(files, oracle, uses) if known is None else known
+        own = own_nodes(robot, part, declared, why_any_order, known=known is not None)
         plan = plan_of_file(source, path.stem, skillsets, inputs, own.part)
         clients = {one.name: Client(robot, one) for one in skillsets}
         oracle.begin(lambda _: None)
@@ -328,6 +332,22 @@ def nowhere_made(files: TreeFiles, skillsets: Sequence[Skillset], part: MissionP
     return [files.models[name] for name in without_class(files, palette_of(files, skillsets, part))]
 
 
+def uses_of(source: TreeSource, models: Sequence[Skillset], part: MissionPart) -> Uses:
+    """Return how a mission uses what nodes without a class write, and its inputs."""
+    files = source.read()
+    palette = palette_of(files, models, part)
+    declared = [one.name for one in nowhere_made(files, models, part)]
+    skills = (f"{one.name}.{skill.name}" for one in models for skill in one.skills)
+    numbers = [*source.enums, *states_of(models), *(port.name for port in _inputs(files) if port.default is not None)]
+    return Uses.of(files, palette, declared, [*declared, *skills, *map(name_in_files, part.nodes)], numbers)
+
+
+def any_inputs(files: TreeFiles, oracle: Oracle, uses: Uses) -> Inputs:
+    """Return any values for the inputs of a mission."""
+    ports = (port for port in _inputs(files) if port.default is None)
+    return {port.name: any_value(oracle, f"`{port.name}`", uses.type_of_input(port)) for port in ports}
+
+
 def _named(files: TreeFiles) -> frozenset[str]:
     """Return what stands before a dot anywhere in the trees: names of skillsets are among it."""
     found: set[str] = set()
@@ -343,7 +363,8 @@ def _words(text: str) -> list[str]:
     return [part.partition(".")[0] for part in plain.split() if "." in part]
 
 
-def _ports(files: TreeFiles) -> list[Port]:
+def _inputs(files: TreeFiles) -> list[Port]:
+    """Return the inputs and the parameters of a mission, which have a default."""
     model = files.models.get(files.main)
     ports = [] if model is None else list(model.ports.values())
-    return [one for one in ports if one.direction is Direction.INPUT and one.default is None]
+    return [one for one in ports if one.direction is Direction.INPUT]

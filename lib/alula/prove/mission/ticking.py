@@ -20,12 +20,13 @@ from alula.prove.mission.measured import of_data
 from alula.prove.mission.memory import Body, Keeper, TreeMemory
 from alula.prove.mission.oracle import Answer, Asked, Oracle, Question, UndecidedError, View
 from alula.prove.mission.own import DOES
+from alula.prove.mission.unknown import COMPARE, MisfitError
 from alula.trees.node import Node
 from alula.trees.status import Status
 from alula.trees.tree import Tree
 
 TICK, ABORT = "tick", "abort"
-CHOSEN_ANEW = frozenset({DOES, "answer", "compare"})
+CHOSEN_ANEW = frozenset({DOES, "answer", COMPARE})
 
 
 class Outcome(NamedTuple):
@@ -172,14 +173,15 @@ class Ticker:
     def _step(self, director: Director) -> None:
         """Do what the driver of a mission does: a tree that can't be ticked is left, and the robot brought to rest.
 
-        Raises UndecidedError where the real value of something unknown might have been one that it can be ticked with.
+        Raises UndecidedError where the real value of something unknown might have been one that it can be ticked with, unless it was
+        chosen to be none.
         """
         try:
             director.step()
         except UndecidedError:
             raise
         except Exception as error:
-            if self._keeper.unknown or self._body.robot.measurements.any:
+            if not _comes_of_misfit(error) and (self._keeper.unknown or self._body.robot.measurements.any):
                 raise UndecidedError(str(error)) from error
             director.broken(f"the tree raised {type(error).__name__}: {error}")
 
@@ -221,3 +223,8 @@ class Ticker:
         if number == len(self.memories):
             self.memories.append(memory)
         return number
+
+
+def _comes_of_misfit(error: BaseException | None) -> bool:
+    """Tell whether an error, or what it was raised of, is that of a value which a port can't read."""
+    return error is not None and (isinstance(error, MisfitError) or _comes_of_misfit(error.__context__))

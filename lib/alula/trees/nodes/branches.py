@@ -10,7 +10,7 @@ from alula.trees.node import Control, Wiring
 from alula.trees.palette import input_port
 from alula.trees.status import FAILURE, IDLE, RUNNING, SKIPPED, SUCCESS, Answer
 from alula.trees.ticking import Order, Ticking
-from alula.trees.values import BOOL, STRING
+from alula.trees.values import BOOL, STRING, StandIn
 
 EPSILON = 2.0**-23
 """Of a C float: within it two numbers are one."""
@@ -142,8 +142,16 @@ def equal(one: str, other: str, enums: object) -> bool:
     """Tell whether two texts are the same text, the same enumerator, or the same number."""
     if one == other:
         return True
+    if isinstance(one, StandIn) or isinstance(other, StandIn):
+        return any(isinstance(unknown, StandIn) and _said(unknown, text, enums) for unknown, text in ((one, other), (other, one)))
     numbers = [_number(text, enums) for text in (one, other)]
     return None not in numbers and abs((numbers[0] or 0.0) - (numbers[1] or 0.0)) <= EPSILON
+
+
+def _said(unknown: StandIn, text: str, enums: object) -> bool:
+    """Tell whether a text that nobody knows says the number that another one says; of two that nobody knows, enough was asked."""
+    number = None if isinstance(text, StandIn) else _number(text, enums)
+    return number is not None and unknown.says(number)
 
 
 def _number(text: str, enums: object) -> float | None:

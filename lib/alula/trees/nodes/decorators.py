@@ -99,7 +99,8 @@ class _Again(Decorator):
         port, again = self.ticking.rounds, self.ticking.goes_on
         most = self.number(port)
         self.become(RUNNING)
-        while self._count < most or most == -1:
+        more = self._count < most or most == -1
+        while more:
             fresh = self.child.status is IDLE
             answer = self.child.execute()
             if answer is RUNNING:
@@ -112,7 +113,8 @@ class _Again(Decorator):
                 return answer
             self._count += 1
             most = self.number(port) if again is FAILURE else most
-            if fresh and (self._count < most or most == -1):
+            more = self._count < most or most == -1
+            if fresh and more:
                 return self.give_way()
         self._count = 0
         return again

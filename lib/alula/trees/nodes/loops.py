@@ -11,7 +11,7 @@ from alula.trees.node import Decorator, Wiring, pointer
 from alula.trees.palette import inout_port, input_port, output_port
 from alula.trees.status import FAILURE, IDLE, RUNNING, SKIPPED, SUCCESS, Answer, Skipped, Status
 from alula.trees.ticking import AGAIN, Begin, Order, Ticking
-from alula.trees.values import BOOL, DOUBLE, INT, STATUS, STRING, PortType, list_of
+from alula.trees.values import BOOL, DOUBLE, INT, STATUS, STRING, PortType, StandIn, list_of
 
 
 class Loop(Decorator):
@@ -60,7 +60,9 @@ class Loop(Decorator):
         """Have the list that the blackboard has; text is read once for a run of this node."""
         entry = self.entry("queue")
         value = None if entry is None else entry.value
-        if isinstance(value, list):
+        if isinstance(value, StandIn):
+            self._items = self._list(value)
+        elif isinstance(value, list):
             self._items = value
         elif isinstance(value, tuple | str) and self._items is None:
             self._items = self._list(value)

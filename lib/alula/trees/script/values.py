@@ -7,6 +7,7 @@ import re
 from collections.abc import Mapping
 
 from alula.trees.script.scope import Unknown, Value
+from alula.trees.values import STRING, StandIn
 
 MAX_TEXT = 1_000_000
 """Characters of a text that a script makes: `a += a`, ticked a hundred times, must not eat the memory."""
@@ -88,6 +89,8 @@ def truth(value: Value) -> bool:
 
 def as_text(value: Value) -> str:
     """Return a number as C++'s ``std::to_string`` writes it, a text as it is."""
+    if isinstance(value, StandIn):
+        return str(value.read_as(STRING))
     if isinstance(value, str):
         return value
     return f"{value:f}" if isinstance(value, float) else f"{int(as_integer(value))}"
