@@ -12,6 +12,7 @@ distribution = setup(
     package_dir={"": "."},  # so that an editable installation is a path, not an import hook
     package_data={
         "alula": ["py.typed"],
+        "alula.adopt": ["robot/*.in"],
         "alula.report.page": ["program/*"],
         "alula.generate.scaffold": ["robot/**/*.in"],
     },

@@ -62,9 +62,11 @@ ROOMS = {
     "campaign": "common missions mock model prove records runtime trees",
     "console": "common model records report runtime",
     "editor": "check common language missions model prove trees",
+    "adopt": "check generate language missions model trees",
     # What the public API adds, and on top of it the programs; nobody imports these.
     "api": "campaign check common language missions mock model odds prove records report runtime trees",
-    "cli": "api campaign check common console editor generate language missions mock model odds prove records repair report runtime trees",
+    "cli": "adopt api campaign check common console editor generate language missions mock model odds prove records repair report runtime "
+    "trees",
 }
 """The rooms of the library from below, each with those that it may import."""
 PARTS = "alula.parts"

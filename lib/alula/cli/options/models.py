@@ -61,6 +61,11 @@ def _trees(parser: ArgumentParser) -> None:
     """Add what commands about files of trees take in common."""
     enums = 'enumerators that scripts may use, as the program registers them: {"NAME": 1, ...}'
     parser.add_argument("--enums", type=Path, metavar="FILE", help=enums)
+    _main_and_packages(parser)
+
+
+def _main_and_packages(parser: ArgumentParser) -> None:
+    """Add what says which trees are read."""
     parser.add_argument("--main", default="", metavar="ID", help="the main tree, where a file has several and does not say it")
     package = "the folder of a ROS package that an <include> names (default: those around, and those that are sourced)"
     parser.add_argument("--package", action=_AddPackage, default={}, metavar="NAME=DIR", help=package)
@@ -162,6 +167,9 @@ def new(parser: ArgumentParser) -> None:
     parser.add_argument("what", choices=["robot"], help="always robot")
     parser.add_argument("folder", metavar="DIR", type=Path, help="a new folder, whose name is the robot's: a-z, 0-9, _")
     parser.add_argument("--git", action="store_true", help="run git init in it")
+    of_trees = "have its skills, mocks and missions made of a folder, or file, of Behaviour Trees"
+    parser.add_argument("--from-trees", type=Path, metavar="FOLDER", help=of_trees)
+    _main_and_packages(parser)
 
 
 def completion(parser: ArgumentParser) -> None:

@@ -7,6 +7,7 @@ import keyword
 import re
 import subprocess
 import sys
+import tempfile
 from pathlib import Path
 
 TEMPLATES = Path(__file__).parent / "robot"
@@ -45,16 +46,26 @@ def check(folder: Path) -> None:
 
 
 def write(folder: Path, files: dict[str, str]) -> None:
-    """Write the files; sort imports and fold lines, for both depend on the name."""
-    for path, text in files.items():
-        target = folder / path
-        target.parent.mkdir(parents=True, exist_ok=True)
-        target.write_text(text, encoding="utf-8")
-        if text.startswith("#!"):
-            target.chmod(0o755)
-    if importlib.util.find_spec("ruff") is not None:  # an installation that builds nothing goes without
-        for command in (["check", "--quiet", "--select", "I", "--fix"], ["format", "--quiet"]):
-            subprocess.run([sys.executable, "-m", "ruff", *command, "."], cwd=folder, check=True)
+    """Write the files, first beside the folder, so that it has all or none; sort imports and fold lines, for both depend on the name.
+
+    Raises:
+        OSError: the folder can't be written.
+    """
+    folder.parent.mkdir(parents=True, exist_ok=True)
+    with tempfile.TemporaryDirectory(prefix=f".{folder.name}-", dir=folder.parent) as aside:
+        made = Path(aside) / folder.name
+        for path, text in files.items():
+            target = made / path
+            target.parent.mkdir(parents=True, exist_ok=True)
+            target.write_text(text, encoding="utf-8")
+            if text.startswith("#!"):
+                target.chmod(0o755)
+        if importlib.util.find_spec("ruff") is not None:  # an installation that builds nothing goes without
+            for command in (["check", "--select", "I", "--fix"], ["format"]):
+                subprocess.run([sys.executable, "-m", "ruff", *command, "--quiet", "--no-cache", "."], cwd=made, check=True)
+        folder.mkdir(exist_ok=True)
+        for entry in sorted(made.iterdir()):
+            entry.rename(folder / entry.name)
 
 
 def _filled(text: str, name: str) -> str:

@@ -1,0 +1,102 @@
+"""The types of node that trees of others need a robot for: declared, or guessed from their uses."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Mapping, Sequence
+from dataclasses import replace
+
+from alula.trees import nav2
+from alula.trees.document import Element
+from alula.trees.guessing import guessed_types
+from alula.trees.node import pointer
+from alula.trees.palette import Category, Direction, NodeType, Palette, Port
+from alula.trees.reading import AUTOREMAP, TreeFiles, is_port, type_name
+from alula.trees.standard import standard_palette
+from alula.trees.values import ANY, DOUBLE, INT
+
+Given = Mapping[tuple[str, str], Sequence[str]]
+"""What uses give to ports, by type of node and port."""
+
+
+def needed(files: TreeFiles) -> TreeFiles:
+    """Return a main tree's files without the trees that it does not use."""
+    found, left = {files.main}, [files.main]
+    while left:
+        used = {type_name(one) for one in files.uses(left.pop())} & files.trees.keys() - found
+        found |= used
+        left += used
+    return replace(files, trees={name: tree for name, tree in files.trees.items() if name in found})
+
+
+def make_actions_of_missing_trees(files: TreeFiles) -> set[str]:
+    """Have uses of trees that are in no file be actions, in place; return the IDs of those trees."""
+    missing = [one for name in files.trees for one in files.uses(name) if one.get("ID") not in files.trees]
+    for one in missing:
+        one.tag = Category.ACTION.value
+        one.attributes.pop(AUTOREMAP, None)
+    return {one.get("ID") for one in missing}
+
+
+def elements_of(mains: Sequence[TreeFiles]) -> list[Element]:
+    """Return the trees that main trees need, each once, in the order of the files."""
+    return list({id(tree): tree for files in mains for tree in files.trees.values()}.values())
+
+
+def nodes_of(tree: Element) -> Iterator[Element]:
+    """Yield the nodes of a tree; uses of subtrees are none."""
+    yield from (one for top in tree.children for one in top.iterate() if one.tag != Category.SUBTREE.value)
+
+
+def known_palette(mains: Sequence[TreeFiles]) -> Palette:
+    """Return the types that need no robot: BehaviorTree.CPP's, and those of Nav2 with children, unless a file declares others."""
+    declared = {name: one for files in mains for name, one in files.models.items()}
+    palette = standard_palette()
+    for one in nav2.palette():
+        if one.make is not None and one.children != (0, 0) and declared.get(one.name, one).category is one.category:
+            palette.add(one)
+    return palette
+
+
+def foreign_types(mains: Sequence[TreeFiles]) -> dict[str, NodeType]:
+    """Return by their IDs the types of all nodes that trees use and that need a robot; what is not declared is guessed from the uses."""
+    trees, known = elements_of(mains), known_palette(mains)
+    given: dict[tuple[str, str], list[str]] = {}
+    for node in (node for tree in trees for node in nodes_of(tree)):
+        for attribute in filter(is_port, node.attributes):
+            given.setdefault((type_name(node), attribute), []).append(node.get(attribute))
+    used = {type_name(node) for tree in trees for node in nodes_of(tree)}
+    models = {name: one for files in reversed(mains) for name, one in files.models.items() if name in used and known.get(name) is None}
+    declared = Palette(replace(one, category=_category(one)) for one in models.values())
+    guessed = [_widened(one, given) for one in guessed_types(trees, known)]
+    undeclared = [_widened(one, given) for one in guessed_types(trees, known | declared)]
+    both = [_merged(model, one, given) for one in guessed if (model := declared.get(one.name)) is not None]
+    return {one.name: one for one in sorted((*undeclared, *both), key=lambda one: one.name)}
+
+
+def _category(model: NodeType) -> Category:
+    """Return what a declared node is; a subtree that is in no file is an action."""
+    return Category.ACTION if model.category is Category.SUBTREE else model.category
+
+
+def _widened(guess: NodeType, given: Given) -> NodeType:
+    """Return a guess whose whole numbers are real ones where some uses give a number and others an entry: that may hold any number."""
+
+    def is_mixed(name: str) -> bool:
+        return {pointer(one, name) is None for one in given[guess.name, name]} == {True, False}
+
+    ports = guess.ports.items()
+    return replace(guess, ports={name: replace(one, type=DOUBLE) if one.type is INT and is_mixed(name) else one for name, one in ports})
+
+
+def _merged(model: NodeType, guess: NodeType, given: Given) -> NodeType:
+    """Return a declared type with the ports that uses give besides, without inputs that no use gives and that have no default."""
+
+    def port(name: str) -> Port:
+        if name not in model.ports:
+            return guess.ports[name]
+        told = model.ports[name]
+        return replace(told, type=guess.ports[name].type) if told.type is ANY and name in guess.ports else told
+
+    found = [port(name) for name in {**model.ports, **guess.ports}]
+    kept = [one for one in found if (model.name, one.name) in given or one.default is not None or one.direction is Direction.OUTPUT]
+    return replace(model, ports={one.name: one for one in kept}, doc="")

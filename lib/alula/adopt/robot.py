@@ -1,0 +1,100 @@
+"""A robot's folder from trees of others: all that missions, mocks, proofs and reports need, as texts by their paths."""
+
+from __future__ import annotations
+
+import json
+from collections.abc import Iterable, Iterator, Sequence
+from dataclasses import dataclass, replace
+from pathlib import Path
+
+from alula.adopt.code import module_text
+from alula.adopt.entries import GivenEntry
+from alula.adopt.expected import expected_states
+from alula.adopt.foreign import elements_of, foreign_types, known_palette, make_actions_of_missing_trees, needed
+from alula.adopt.missions import MissionOf, Missions
+from alula.adopt.skillset import mocks_text, model_text, types_text
+from alula.adopt.telling import decisions, names_of_nodes
+from alula.adopt.vocabulary import Vocabulary
+from alula.generate.scaffold.skeleton import files_of
+from alula.trees.errors import TreeError
+from alula.trees.palette import Category
+from alula.trees.reading import TreeFiles
+
+TEMPLATES = Path(__file__).parent / "robot"
+
+
+@dataclass(frozen=True)
+class NewRobot:
+    """A robot that is not written yet: ``files`` are texts by path, ``about`` counts, ``decisions`` say what a person has to see to."""
+
+    files: dict[str, str]
+    about: str
+    scenarios: Sequence[str]
+    decisions: Sequence[str]
+
+
+def robot_from_trees(name: str, mains: Sequence[TreeFiles], folder: Path) -> NewRobot:
+    """Return the robot whose skills are the actions of main trees.
+
+    Args:
+        name: the robot's, which is its skillset's, too.
+        mains: each main tree with all that it uses; a use of a tree that is in no file becomes an action in place.
+        folder: what they were read from; their files are told from there on.
+
+    Raises:
+        TreeError: the trees have no action that needs a robot.
+    """
+    every = {tree for files in mains for tree in files.trees}
+    mains = [needed(files) for files in mains]
+    missing = {tree for files in mains for tree in make_actions_of_missing_trees(files)}
+    trees = elements_of(mains)
+    types = {one.name: replace(one, doc=one.doc.replace(f"{folder}/", "")) for one in foreign_types(mains).values()}
+    subtrees = {one.name: one for files in mains for one in files.models.values() if one.category is Category.SUBTREE}
+    vocabulary = Vocabulary.of(name, types, subtrees, trees)
+    if not vocabulary.skills:
+        raise TreeError(f"{folder}: its trees have no action of their own, so there is no skill to make; name a folder whose trees have")
+    missions = Missions(mains, vocabulary, known_palette(mains), folder)
+    unused = every - {tree for files in mains for tree in files.trees}
+    to_decide = list(decisions(vocabulary, missions, missing=missing, unused=unused))
+    files = {
+        f"skillsets/{name}.skill": model_text(vocabulary, missions.entries),
+        "skillsets/types.yaml": types_text(vocabulary, missions.entries),
+        "skillsets/mock.yaml": mocks_text(vocabulary, expected_states(trees, vocabulary)),
+        f"python/{name}_trees.py": module_text(vocabulary),
+        **{f"missions/{file}": text for file, text in missions.texts().items()},
+        **{path: text for one in missions.all for path, text in _scenario(name, one)},
+    }
+    told = {
+        "@first@": missions.all[0].name,
+        "@skill@": next(iter(vocabulary.skills.values())).name,
+        "@names_of_nodes@": "\n".join(names_of_nodes(vocabulary)),
+        "@missions@": "\n".join(f"| `{one.name}` | `{one.main}` | `{one.source}` |" for one in missions.all),
+        "@decisions@": "\n".join(f"- {one}." for one in to_decide) or "Nothing was found.",
+    }
+    for path, text in files_of(name, TEMPLATES).items():
+        files[path] = _filled(text, told.items())
+    counts = {"skill": len(vocabulary.skills), "resource": len(vocabulary.resources), "mission": len(missions.all)}
+    about = ", ".join(f"{count} {what}{'' if count == 1 else 's'}" for what, count in counts.items())
+    return NewRobot(dict(sorted(files.items())), about, [one.name for one in missions.all], to_decide)
+
+
+def _filled(text: str, told: Iterable[tuple[str, str]]) -> str:
+    for mark, words in told:
+        text = text.replace(mark, words)
+    return text
+
+
+def _scenario(robot: str, mission: MissionOf) -> Iterator[tuple[str, str]]:
+    """Yield the files of a scenario: it, and its world where the mission has one."""
+    about = json.dumps(f"the tree {mission.main} of {mission.source}", ensure_ascii=False)
+    lines = [f"about: {about}", f"mission: missions/{mission.name}.xml", f"skillsets: [{robot}]"]
+    lines += [f"world: {mission.name}"] if mission.given else []
+    yield f"scenarios/{mission.name}.yaml", "\n".join([*lines, ""])
+    if mission.given:
+        yield f"worlds/{mission.name}.yaml", _world(mission.given)
+
+
+def _world(given: Iterable[GivenEntry]) -> str:
+    lines = ["# What a program writes on the blackboard before the tree starts, which reads it: these values only stand for its own."]
+    lines += [f"{json.dumps(one.name, ensure_ascii=False)}: {json.dumps(one.value, ensure_ascii=False)}" for one in given]
+    return "\n".join([*lines, ""])
