@@ -215,8 +215,9 @@ def _checked_missions(
         mine = main if path.resolve() in {Path(one.place.path).resolve() for one in library.trees.get(main, ())} or len(paths) == 1 else ""
         source = TreeSource(path, robot.library(path, library), mine, enums, types)
         files[path.resolve()] = CheckedMission(str(path), source=source, named=True)
+    beside = library if len(paths) > 1 else None
     for file in files.values():
-        for finding in _checked(file.source, robot, palettes, tell):
+        for finding in _checked(file.source, robot, palettes, beside, tell):
             its = files.get(Path(finding.span.file).resolve(), file)  # one file's tree is checked in another, too, that uses it
             if finding not in its.findings:
                 its.findings.append(finding)
@@ -320,7 +321,7 @@ def _flown(tell: Tell) -> dict[Path, Scenario]:
         return {}
 
 
-def _checked(mission: TreeSource, robot: _Robot, palettes: Sequence[Path], tell: Tell) -> list[Diagnostic]:
+def _checked(mission: TreeSource, robot: _Robot, palettes: Sequence[Path], beside: Library | None, tell: Tell) -> list[Diagnostic]:
     from alula.check.findings import findings_of  # late: models are checked without it
     from alula.missions.part import NO_PART
 
@@ -330,7 +331,8 @@ def _checked(mission: TreeSource, robot: _Robot, palettes: Sequence[Path], tell:
         own = robot if robot.has(mission.path, source) else _Robot()
         others = own.root is None
         part = own.part or NO_PART
-        found = findings_of(path, source, own.skillsets, palettes, part, own.messages, library, mission.main, of_others=others, enums=enums)
+        known = (own.skillsets, palettes, part, own.messages)
+        found = findings_of(path, source, *known, library, mission.main, of_others=others, enums=enums, checked=beside)
     except FileError as error:
         found = [Diagnostic("ALU001", error.problem.message, Span(path, 0, 0, 0))]
     for finding in found:

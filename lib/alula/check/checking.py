@@ -17,6 +17,7 @@ from alula.check.sites import Site, expand
 from alula.check.traits import Traits
 from alula.trees.access import scripts_of
 from alula.trees.errors import Problem
+from alula.trees.library import Library
 from alula.trees.palette import Direction, Palette
 from alula.trees.reading import TreeFiles, type_name
 from alula.trees.structure import verify
@@ -70,11 +71,12 @@ def check(
     beside: Beside = Beside(),
     foreign: bool = False,
     of_others: bool = False,
+    checked: Library | None = None,
 ) -> list[Problem]:
     """Return what is wrong with the files, each thing once, in the order of the source; ``rules`` are more than those of trees alone.
 
     The blackboard of a ``foreign`` mission may be filled from outside with what no file tells of; trees ``of_others`` have nodes that no
-    file declares.
+    file declares. All files of the library ``checked`` are checked, each by itself: what is wrong in a tree that others use, they tell.
     """
     found: list[Problem] = []
 
@@ -84,8 +86,9 @@ def check(
         found.append(problem)
 
     with suppress(_Enough):
-        verify(files, palette, report, of_others=of_others)
-    if files.trees and not any(problem.code in ENDLESS for problem in found):
+        verify(files, palette, report, of_others=of_others, others=() if checked is None else checked.documents)
+    is_told = checked is not None and files.is_part and files.main in files.trees and checked.has_user(files.trees[files.main])
+    if files.trees and not is_told and not any(problem.code in ENDLESS for problem in found):
         found += _wholes(files, palette, traits, (*RULES, *rules), beside, foreign=foreign)
     places: dict[tuple[object, ...], Problem] = {}
     for problem in found:
@@ -138,7 +141,7 @@ def _missing(whole: Whole) -> Iterator[Problem]:
 
 
 def _unreached(whole: Whole) -> Iterator[Problem]:
-    waited = list(waits_in_vain(whole.root, whole.reach, whole.traits))
+    waited = list(waits_in_vain(whole.root, whole.reach))
     yield from (problem for problem, _ in waited)
     explained = {site for _, site in waited}
     for child, waits_for in unreached(whole.root, whole.reach):

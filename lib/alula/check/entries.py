@@ -56,10 +56,15 @@ class Uses:
 
     def of(self, site: Site) -> Iterator[Use]:
         """Yield those of a node and all below it."""
-        yield from self.before(site)
-        for child in site.children:
-            yield from self.of(child)
-        yield from self.after(site)
+        left = [(site, False)]
+        while left:
+            one, is_over = left.pop()
+            if is_over:
+                yield from self.after(one)
+                continue
+            yield from self.before(one)
+            left.append((one, True))
+            left.extend((child, False) for child in reversed(one.children))
 
     def before(self, site: Site) -> list[Use]:
         """Return those before its children are ticked, of a leaf those before it ends."""
@@ -204,13 +209,14 @@ def read_too_early(root: Site, uses: Uses, given: Collection[str], others: Write
     names = sorted({use.name for use in later.values()} | set(given))
     taken: dict[Key, Site] = {}
 
-    def visit(site: Site) -> Iterator[Problem]:
+    def visit(site: Site, *, within: bool = False) -> Iterator[Problem]:
         yield from judged(uses.before(site))
-        if goes_back(site):  # what one writes, any other may find
+        if not within and goes_back(site):  # what one writes, any other may find
+            within = True
             by_then.update(use.key for child in site.children for use in uses.of(child) if use.write)
         unset: set[Key] = set()
         for child in site.children:
-            yield from visit(child)
+            yield from visit(child, within=within)
             unset |= {key for key in _unset(site, child) if key in by_then}
             by_then.difference_update(unset & set(_unset(site, child)))
             taken.update(dict.fromkeys(_unset(site, child), child))
@@ -247,10 +253,12 @@ def goes_back(site: Site) -> bool:
 def _unset(parent: Site, child: Site) -> tuple[Key, ...]:
     """Return the entry that a child has surely taken away when the next one's turn comes."""
     port = child.described.takes_away if child.described else ""
+    if not port:
+        return ()
     key = child.given(port) or ""
     in_order = parent.ticking.lists and parent.ticking.goes_on is SUCCESS
     sure = in_order and not any(goes_back(one) for one, _ in child.above())
-    if not port or not sure or pointer(key, port) is not None or _ASKED.intersection(child.element.attributes):
+    if not sure or pointer(key, port) is not None or _ASKED.intersection(child.element.attributes):
         return ()
     return (child.board.key(key),)
 

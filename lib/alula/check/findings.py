@@ -33,10 +33,13 @@ def findings_of(
     *,
     of_others: bool = False,
     enums: Collection[str] = (),
+    checked: Library | None = None,
 ) -> list[Diagnostic]:
     """Return what `check_mission` finds wrong with a mission; what keeps it from being read at all is the only finding then (ALU0..)."""
     try:
-        problems = check_mission(Path(path), source, skillsets, palettes, part, messages, library, main, of_others=of_others, enums=enums)
+        problems = check_mission(
+            Path(path), source, skillsets, palettes, part, messages, library, main, of_others=of_others, enums=enums, checked=checked
+        )
     except FileError as error:
         problem = error.problem
         code = problem.code if problem.code.startswith("ALU0") else "ALU004"

@@ -36,12 +36,14 @@ def check_mission(
     *,
     of_others: bool = False,
     enums: Collection[str] = (),
+    checked: Library | None = None,
 ) -> list[Problem]:
     """Return what is wrong with a mission, each thing once.
 
     ``source`` is what its file has, or will have, ``part`` what the robot adds, ``messages`` what is known of the fields of its data,
     ``library`` the files whose trees it may use, ``main`` its main tree instead of what it says itself. A tree ``of_others`` is loaded by a
     program that chooses the main tree, fills the blackboard, and has nodes that no file declares. ``enums`` are names that scripts may use.
+    With it all files of the library ``checked`` are checked, each by itself.
 
     Raises:
         FileError: the file, one that it includes, or a palette can't be read or is no XML of trees.
@@ -52,7 +54,8 @@ def check_mission(
     rules = SkillRules(skills)
     known = palette_for(files, skillsets, palettes, part)
     own = (rules.units, rules.results, rules.resources, NameRules(skills).names)
-    found += check(files, known, SkillTraits(skills, enums), own, beside=BESIDE, foreign=bool(palettes) or of_others, of_others=of_others)
+    foreign = bool(palettes) or of_others
+    found += check(files, known, SkillTraits(skills, enums), own, beside=BESIDE, foreign=foreign, of_others=of_others, checked=checked)
     if of_others:
         found = _told_once([replace(one, warning=one.warning or one.code == "ALU607") for one in found])
     if not palettes and not of_others and (problem := no_class(files, known)) is not None:
@@ -67,6 +70,7 @@ def check_mission(
 _ONCE = {
     "ALU607": "and so it is in {} more, which is right where the program writes it",
     "ALU611": "and so it is in {} more",
+    "ALU616": "and so it is in {} more",
 }
 """Warnings about trees of others of which a file tells the first only."""
 

@@ -24,6 +24,8 @@ class Reach:
     def __init__(self, traits: Traits) -> None:
         self._traits = traits
         self._known: dict[Site, Ends] = {}
+        self._runs: dict[Site, bool | None] = {}
+        self._endless: dict[Site, Site | None] = {}
 
     def ends(self, site: Site) -> Ends:
         """Return how a node may end; none at all: it only ever runs."""
@@ -34,9 +36,17 @@ class Reach:
 
     def runs(self, site: Site) -> bool | None:
         """Tell whether a node may take several ticks; None: nobody knows."""
-        own = self._traits.runs(site)
-        answers = {own, *(self.runs(child) for child in site.children)}
-        return True if True in answers else None if None in answers else False
+        if site not in self._runs:
+            answers = {self._traits.runs(site), *(self.runs(child) for child in site.children)}
+            self._runs[site] = True if True in answers else None if None in answers else False
+        return self._runs[site]
+
+    def endless(self, site: Site) -> Site | None:
+        """Return the first leaf of a node that runs until it is halted; None where there is none."""
+        if site not in self._endless:
+            own = site if self._traits.endless(site) else None
+            self._endless[site] = own or next((leaf for child in site.children if (leaf := self.endless(child)) is not None), None)
+        return self._endless[site]
 
     def never_ticked(self, site: Site) -> list[tuple[Site, Site]]:
         """Return the children of a node that are never ticked, each with the one that does not end as it would have to for that."""
@@ -67,17 +77,17 @@ def unreached(root: Site, reach: Reach) -> Iterator[tuple[Site, Site]]:
         yield from reach.never_ticked(site)
 
 
-def waits_in_vain(root: Site, reach: Reach, traits: Traits) -> Iterator[tuple[Problem, Site]]:
+def waits_in_vain(root: Site, reach: Reach) -> Iterator[tuple[Problem, Site]]:
     """Yield where the success of a leaf is waited for that runs until it is halted, with the node that is waited for."""
     found: set[Site] = set()
     for site in root.walk():
         for child, why in _waited(site, reach):
-            leaf = next((one for one in child.walk() if traits.endless(one)), None)
+            leaf = reach.endless(child)
             if leaf is not None and leaf not in found and SUCCESS not in reach.ends(child):
                 found.add(leaf)
                 yield _in_vain(leaf, why), child
     if not found and SUCCESS not in reach.ends(root):
-        leaf = next((one for one in root.walk() if traits.endless(one)), None)
+        leaf = reach.endless(root)
         if leaf is not None:
             yield _in_vain(leaf, "the tree never succeeds"), root
 

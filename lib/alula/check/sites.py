@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Iterator
 from dataclasses import dataclass, field
+from functools import cached_property
 from typing import TypeAlias
 
 from alula.trees.document import Attribute, Element
@@ -71,7 +72,7 @@ class Site:
         """Whether it is the use of another tree."""
         return self.type is SUBTREE
 
-    @property
+    @cached_property
     def described(self) -> NodeClass | None:
         """The class that tells how it ticks its children and ends; None where nobody does, or where it has not the children for that."""
         known = self.type.described if self.type else None
@@ -80,7 +81,7 @@ class Site:
         least, most = self.type.children
         return known if least <= len(self.children) <= (len(self.children) if most is None else most) else None
 
-    @property
+    @cached_property
     def ticking(self) -> Ticking:
         """How it ticks its children."""
         return self.described.known_ticking() if self.described else ANY_TICKING
@@ -103,9 +104,11 @@ class Site:
 
     def walk(self) -> Iterator[Site]:
         """Yield the node and all below it, in the order of the file."""
-        yield self
-        for child in self.children:
-            yield from child.walk()
+        left = [self]
+        while left:
+            site = left.pop()
+            yield site
+            left.extend(reversed(site.children))
 
     def above(self) -> Iterator[tuple[Site, Site]]:
         """Yield each node above with the child through which it is above, from here up."""

@@ -29,6 +29,7 @@ from alula.trees.format3 import DECLARED, OLD, convert
 from alula.trees.library import Library
 from alula.trees.palette import Palette
 from alula.trees.reading import TreeFiles, read_files
+from alula.trees.structure import missing_trees
 from alula.trees.tree import Tree
 from alula.trees.view import view_of
 
@@ -64,6 +65,7 @@ def run(given: argparse.Namespace) -> int:
     answers = Answers({}) if given.answers is None else read_answers(given.answers, given.seed or 0)
     for files in found:
         clock = StepClock()
+        tell_missing(files)
         try:
             tree = scripted_tree(files, palette(files, given.palette), answers, clock, enums)
         except TreeError as error:
@@ -79,6 +81,13 @@ def run(given: argparse.Namespace) -> int:
     for one in wrong:  # a file of a folder keeps no other from being drawn
         sys.stderr.write(f"{COMMAND}: {one}\n")
     return WRONG if wrong else 0
+
+
+def tell_missing(files: TreeFiles) -> None:
+    """Tell of trees that are used and that are in none of the files."""
+    missing = missing_trees(files)
+    for first, *_ in list(missing.values())[:1]:
+        warner(COMMAND)(f"{first.place}: trees that are in none of the files are drawn as leaves: {', '.join(missing)}")
 
 
 def tick_through(tree: Tree, answers: Answers, clock: StepClock, given: argparse.Namespace, title: str) -> None:

@@ -16,22 +16,25 @@ from pathlib import Path
 from alula.common.errors import AlulaError
 from alula.common.json_files import read_object
 from alula.trees.blackboard import Blackboard, Clock
-from alula.trees.document import Element
+from alula.trees.document import Attribute, Element
 from alula.trees.enums import enums_of
 from alula.trees.errors import TickError, did_you_mean
-from alula.trees.factory import make_tree
+from alula.trees.factory import build_tree
 from alula.trees.guessing import category_of
 from alula.trees.node import Action, Control, Node, Wiring
 from alula.trees.palette import CHILDREN, Category, Direction, NodeType, Palette, Port, node_type
 from alula.trees.reading import TreeFiles, is_port, node_name, type_name
 from alula.trees.standard import standard_palette
 from alula.trees.status import ANSWERS, FAILURE, IDLE, NAMES, RUNNING, SUCCESS, Answer, Status
+from alula.trees.structure import is_slip, missing_trees, verify
 from alula.trees.tree import Tree
 from alula.trees.values import literal
 
 TICK_NS = 100_000_000
 """Mission clock from one tick to the next, as where a robot is: 10 Hz."""
 SUBTREE = "SubTree"
+MISSING = "in none of the files"
+"""The type of the leaf that stands for a tree."""
 NO_CHILDREN = CHILDREN[Category.ACTION]
 WORDS = {name: answer for name, answer in ANSWERS.items() if answer is not IDLE}
 ANY_WORD = "ANY"
@@ -250,6 +253,7 @@ class UnknownNode(Control):
 def scripted_tree(files: TreeFiles, palette: Palette, answers: Answers, clock: Clock, enums: Mapping[str, float] | None = None) -> Tree:
     """Build a tree of any file: what the palette does not know is an action, or with children what stands in for it, or can be drawn.
 
+    A tree that is in none of the files is one leaf of its name (`structure.missing_trees` tells them), unless that name is a slip.
     By the script answer the leaves that it names, and all that only a robot could make. ``enums`` are the numbers of names in scripts.
     On the blackboard are the answers' entries, and the defaults that the model of the main tree has for its inputs.
 
@@ -257,6 +261,7 @@ def scripted_tree(files: TreeFiles, palette: Palette, answers: Answers, clock: C
         AnswersError: it names what is no leaf of the tree, no output of a leaf, or what can't stand in.
         TreeError: something is wrong in a file.
     """
+    files = _whole(files)
     board = Blackboard(clock)
     model = files.models.get(files.main)
     for port in () if model is None else model.ports.values():
@@ -265,7 +270,9 @@ def scripted_tree(files: TreeFiles, palette: Palette, answers: Answers, clock: C
     for name, value in answers.entries.items():
         board.set(name, value)
     known = {**(enums or {}), **answers.enums}
-    tree = make_tree(files, _scripted(files, palette, answers), clock, enums=known, blackboard=board)
+    scripted = _scripted(files, palette, answers)
+    verify(files, Palette({**{one.name: one for one in scripted}, **{one.name: one for one in palette}}.values()), of_others=True)
+    tree = build_tree(files, scripted, clock, enums=known, blackboard=board)
     leaves = {node.name for node in tree.nodes if not node.children}
     for name in answers.script:
         if name not in leaves and name != OTHERS:
@@ -365,6 +372,20 @@ def _leaf_maker(make: Callable[[Wiring], Node] | None, answers: Answers) -> Call
         return ScriptedLeaf(wiring, answers) if make is None or wiring.name in answers.script else make(wiring)
 
     return leaf
+
+
+def _whole(files: TreeFiles) -> TreeFiles:
+    """Return files with a tree of one leaf for each that is in none of them; the leaf has the ports that uses give the tree."""
+    added: dict[str, Element] = {}
+    for name, uses in missing_trees(files).items():
+        if is_slip(name, files.trees):
+            continue  # which is told when the tree is built
+        place = uses[0].place
+        ports = dict.fromkeys(attribute for use in uses for attribute in use.attributes if is_port(attribute))
+        attributes = {"name": Attribute("name", name, place), **{port: Attribute(port, f"{{{port}}}", place) for port in ports}}
+        leaf = Element(MISSING, place, attributes, empty=True)  # as no file can call a node
+        added[name] = Element("BehaviorTree", place, {"ID": Attribute("ID", name, place)}, [leaf])
+    return replace(files, trees={**files.trees, **added})
 
 
 def _uses(files: TreeFiles) -> dict[str, list[Element]]:

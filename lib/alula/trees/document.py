@@ -111,9 +111,11 @@ class Element:
 
     def iterate(self) -> Iterator[Element]:
         """Yield the element and all below it, in the order of the file."""
-        yield self
-        for child in self.children:
-            yield from child.iterate()
+        left = [self]
+        while left:
+            element = left.pop()
+            yield element
+            left.extend(reversed(element.children))
 
     def pieces(self) -> Iterator[str]:
         """Yield its text."""

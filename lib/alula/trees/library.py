@@ -114,6 +114,13 @@ class Library:
         folder = Path(user).parent.resolve()
         return min(self.trees.get(name, ()), key=lambda one: _steps(folder, Path(one.place.path).parent.resolve()), default=None)
 
+    def has_user(self, tree: Element) -> bool:
+        """Tell whether another file takes this very tree, and not one of the same name that stands nearer to it."""
+        name = tree.get("ID")
+        having = {Path(one.place.path).resolve() for one in self.trees.get(name, ())}
+        taken = (self.tree(name, str(user)) for user in self.used.get(name, set()) - having)
+        return any(one is not None and one.place == tree.place for one in taken)
+
     def package(self, name: str, user: Path) -> Path | None:
         """Return the folder of a ROS package that a file names: one that is known, the one the file lies in, one of the environment."""
         if name not in self._packages:

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import re
-from collections.abc import Iterable, Iterator
+from collections.abc import Collection, Iterable, Iterator
 from dataclasses import dataclass, field
 from pathlib import Path
 
@@ -60,6 +60,13 @@ class TreeFiles:
     def path(self) -> str:
         """Of the file that was asked for."""
         return self.documents[0].path
+
+    def trees_but(self, others: Collection[Path]) -> dict[str, Element]:
+        """Return the trees without those that they take of a library's files, which are given by their resolved paths."""
+        if not others:
+            return self.trees
+        own = {document.path for document in self.documents}
+        return {name: tree for name, tree in self.trees.items() if tree.place.path in own or Path(tree.place.path).resolve() not in others}
 
     def declared(self) -> Palette:
         """Return the types of node that a model tells of, without what makes them; subtrees are none."""

@@ -3,7 +3,9 @@
 from __future__ import annotations
 
 import difflib
-from collections.abc import Iterator
+from collections.abc import Collection, Iterable, Iterator, Mapping, Sequence
+from dataclasses import replace
+from pathlib import Path
 
 from alula.trees.document import DEEPEST, Attribute, Element
 from alula.trees.errors import Problem, Report, did_you_mean, refuse
@@ -22,19 +24,52 @@ SHOWN = 5
 """Names of nodes that one message shows."""
 
 
-def verify(files: TreeFiles, palette: Palette, report: Report = refuse, *, of_others: bool = False) -> None:
-    """Report what is wrong with any tree of the files; of trees ``of_others``, what nobody has declared is one warning."""
-    _verify_uses(files, report)
+def verify(files: TreeFiles, palette: Palette, report: Report = refuse, *, of_others: bool = False, others: Collection[Path] = ()) -> None:
+    """Report what is wrong with any tree of the files; of trees ``of_others``, what nobody has declared is one warning.
+
+    Trees that they take of these ``others`` are not looked at: each of those files is verified by itself.
+    """
+    trees = files.trees_but(others)
+    _verify_uses(files, trees, report)
+    declared: set[str] = set()
     if of_others:
-        known = [*palette, *_undeclared(files, palette, report)]
-        palette = Palette(known)
-    for name, tree in files.trees.items():
+        declared = {one.name for one in files.models.values() if palette.get(one.name) is one}
+        palette = Palette([*palette, *_undeclared(files, trees, palette, report)])
+    for name, tree in trees.items():
         if palette.get(name) is not None:
             report(Problem(tree.place_of("ID"), f"the tree '{name}' has the name of a node", "call it otherwise"))
+    differing = _Differing()
+    for tree in trees.values():
         for top in tree.children:
             for element in top.iterate():
-                _verify_node(element, files, palette, report)
+                differs = element.tag != "SubTree" and type_name(element) in declared
+                _verify_node(element, files, palette, differing.of(type_name(element)) if differs else report)
+    differing.tell(report)
     _Sizes(files, report).verify()
+
+
+class _Differing:
+    """How nodes are used otherwise than files of others declare them: one warning, as their program goes by its classes."""
+
+    def __init__(self) -> None:
+        self._found: dict[str, list[Problem]] = {}
+
+    def of(self, name: str) -> Report:
+        """Return what takes the problems of the uses of a type."""
+        return lambda problem: self._found.setdefault(name, []).append(problem)
+
+    def tell(self, report: Report) -> None:
+        """Report them, at the first."""
+        if not self._found:
+            return
+        first = next(iter(self._found.values()))[0]
+        cure = first.cure or "correct the use, or the declaration: the program goes by its class"
+        if len(self._found) == 1:
+            (name,), times = self._found, sum(map(len, self._found.values()))
+            which = f"'{name}' is used otherwise than it is declared" + (f" ({times} times)" if times > 1 else "")
+        else:
+            which = f"{len(self._found)} nodes are used otherwise than they are declared: {_first(list(self._found))}"
+        report(replace(first, message=f"{which}; here {first.message}", cure=cure, warning=True))
 
 
 def _verify_node(element: Element, files: TreeFiles, palette: Palette, report: Report) -> None:
@@ -57,35 +92,62 @@ def _verify_node(element: Element, files: TreeFiles, palette: Palette, report: R
             _verify_reactive(element, report)
 
 
-def _verify_uses(files: TreeFiles, report: Report) -> None:
-    """Report each tree that there is not, where it is used first."""
+def missing_trees(files: TreeFiles, users: Iterable[str] | None = None) -> dict[str, list[Element]]:
+    """Return the trees that are used and that there are not, each with its uses; ``users``: by these trees only."""
     missing: dict[str, list[Element]] = {}
-    for name in files.trees:
+    for name in files.trees if users is None else users:
         for element in files.uses(name):
             if type_name(element) and type_name(element) not in files.trees:
                 missing.setdefault(type_name(element), []).append(element)
-    for name, uses in missing.items():
+    return missing
+
+
+def is_slip(name: str, known: Iterable[str]) -> bool:
+    """Tell whether a name that nobody knows is another one with a slip of the pen."""
+    return bool(difflib.get_close_matches(name, known, n=1, cutoff=ALIKE))
+
+
+def _verify_uses(files: TreeFiles, trees: Mapping[str, Element], report: Report) -> None:
+    """Report, file by file, the trees that there are not."""
+    users: dict[str, list[str]] = {}
+    for name, tree in trees.items():
+        users.setdefault(tree.place.path, []).append(name)
+    for names in users.values():
+        _report_missing(missing_trees(files, names), files, report)
+
+
+def _report_missing(missing: Mapping[str, Sequence[Element]], files: TreeFiles, report: Report) -> None:
+    """Report each tree whose name is a slip, and all others together, where the first of them is used first."""
+    slips = [name for name in missing if is_slip(name, files.trees)]
+    others = [name for name in missing if name not in slips]
+    for name in slips if others[1:] else missing:
+        uses = missing[name]
         more = f", which is used {len(uses)} times" if uses[1:] else ""
         cure = did_you_mean(name, files.trees) or "include the file that has it, or give that file or its folder, too"
         report(Problem(uses[0].place_of("ID"), f"there is no tree '{name}'{more}", cure, code="ALU617"))
+    if others[1:]:
+        message = f"{len(others)} trees are in none of the files: {_first(others)}"
+        cure = "include the files that have them, or give those files or their folder, too"
+        report(Problem(missing[others[0]][0].place_of("ID"), message, cure, code="ALU617"))
 
 
-def _undeclared(files: TreeFiles, palette: Palette, report: Report) -> list[NodeType]:
+def _first(names: Sequence[str]) -> str:
+    """Return the first of many names."""
+    return ", ".join(names[:SHOWN]) + (", ..." if names[SHOWN:] else "")
+
+
+def _undeclared(files: TreeFiles, trees: Mapping[str, Element], palette: Palette, report: Report) -> list[NodeType]:
     """Report the nodes of the files that nobody has declared, and return what their uses show; names that are slips are left out."""
     own = {document.path for document in files.documents}
-    guessed = guessed_types(files.trees.values(), palette)
+    guessed = guessed_types(trees.values(), palette)
     first: dict[str, Element] = {}
-    for tree in files.trees.values():
+    for tree in trees.values():
         for element in tree.iterate():
             first.setdefault(type_name(element), element)
-    guessed = [
-        one
-        for one in guessed
-        if one.name not in files.trees and not difflib.get_close_matches(one.name, palette.names(), n=1, cutoff=ALIKE)
-    ]
+    guessed = [one for one in guessed if one.name not in files.trees and not is_slip(one.name, palette.names())]
     told = sorted((one for one in guessed if first[one.name].place.path in own), key=lambda one: first[one.name].place.line)
     if told:
-        names = ", ".join(one.name for one in told[:SHOWN]) + (", ..." if told[SHOWN:] else "")
+        names = _first([one.name for one in told])
         message = f"{len(told)} nodes are not declared: {names}" if told[1:] else f"the node '{names}' is not declared"
         cure = "`alula palette --guess FOLDER` makes a first list of them, for `--palette`"
         report(Problem(first[told[0].name].place, message, cure, "ALU601", warning=True))

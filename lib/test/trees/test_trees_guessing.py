@@ -111,3 +111,16 @@ def test_types_of_literals(literals, type_):
     files = read_text(f'<root BTCPP_format="4"><BehaviorTree ID="M"><Sequence>{nodes}</Sequence></BehaviorTree></root>')
     (found,) = guessed_types(files.trees.values(), standard_palette())
     assert found.ports["to"].type is type_
+
+
+def test_nodes_of_others_that_are_used_otherwise_than_declared_are_one_warning():
+    model = '<TreeNodesModel><Action ID="Go"><input_port name="to"/><output_port name="at"/></Action><Control ID="Say"/></TreeNodesModel>'
+    uses = '<Sequence><Go to="3" too="1"/><Go at="here"/><Go to="4" too="1"/>{}</Sequence>'
+    text = f'<root BTCPP_format="4"><BehaviorTree ID="M">{uses}</BehaviorTree>{model}</root>'
+    (told,) = findings_of("m.xml", text.format("").encode(), (), of_others=True)
+    assert (told.code, told.severity.value, told.hint) == ("ALU603", "warning", "did you mean to?")
+    assert told.message == "'Go' is used otherwise than it is declared (3 times); here 'Go' has no port 'too'"
+    (told,) = findings_of("m.xml", text.format("<Say/>").encode(), (), of_others=True)
+    assert told.message == "2 nodes are used otherwise than they are declared: Go, Say; here 'Go' has no port 'too'"
+    ours = [(one.code, one.severity.value) for one in findings_of("m.xml", text.format("<Say/>").encode(), ())]
+    assert [one for one in ours if one[0] != "ALU620"] == [(f"ALU60{number}", "error") for number in (3, 5, 3, 2)]

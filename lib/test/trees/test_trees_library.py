@@ -1,5 +1,6 @@
 """Folders of trees: what files use of one another without including it."""
 
+import json
 from pathlib import Path
 
 import pytest
@@ -111,12 +112,30 @@ def test_a_folder_is_drawn_tree_by_tree(tmp_path, capsys):
 
 
 def test_a_file_that_is_wrong_keeps_no_other_of_the_folder_from_being_drawn(tmp_path, capsys):
-    write(tmp_path, a=tree("A", "Gone"), b=TREE.format("B", ""), c=tree("C"))
+    write(tmp_path, a=TREE.format("A", '<Sleep mse="1"/>'), b=TREE.format("B", ""), c=tree("C"))
     (tmp_path / "d.xml").write_text("<root><BehaviorTree></root>")
     assert main([str(tmp_path)]) == 2
     out, err = capsys.readouterr()
     assert out.startswith("c.xml: C\n")
     assert sorted(line.partition(".xml")[0][-1] for line in err.splitlines()) == ["a", "b", "d"]
+
+
+def test_a_tree_that_is_in_no_file_is_drawn_and_ticked_as_a_leaf(tmp_path, capsys):
+    write(tmp_path, main=tree("Main", "Dock", "Undock", "Charge"), dock=tree("Dock"))
+    (tmp_path / "main.xml").write_text((tmp_path / "main.xml").read_text().replace('ID="Charge"', 'ID="Charge" level="{power}"'))
+    assert main([str(tmp_path)]) == 0
+    out, err = capsys.readouterr()
+    assert out.count("(in none of the files)") == 2
+    assert err.endswith("main.xml:1:78: trees that are in none of the files are drawn as leaves: Undock, Charge\n")
+    answers = tmp_path / "answers.json"
+    charge = ["RUNNING", {"answer": "SUCCESS", "outputs": {"level": 3}}]
+    answers.write_text(json.dumps({"answers": {"Undock": ["SUCCESS"], "Charge": charge}}))
+    assert main([str(tmp_path), "--answers", str(answers), "--ticks", "2", "--json", "--trace"]) == 0
+    last = json.loads(capsys.readouterr().out.splitlines()[-1])
+    assert (last["root"], last["calls"], last["written"]) == ("SUCCESS", [["tick", "Charge"]], {"power": 3})
+    (tmp_path / "main.xml").write_text(FILE.format(tree("Main", "Undockk") + tree("Undock")))
+    assert main([str(tmp_path / "main.xml"), "--main", "Main"]) == 2
+    assert "there is no tree 'Undockk'; did you mean Undock?" in capsys.readouterr().err
 
 
 def test_a_folder_without_trees_and_a_package_without_folder_are_refused(tmp_path, capsys):
@@ -133,6 +152,26 @@ def test_a_folder_is_checked_file_by_file_each_thing_once(tmp_path):
         files = checked_files([str(tmp_path)])
     found = {Path(file.path).name: [one.code for one in file.findings] for file in files}
     assert found == {"dock.xml": ["ALU602"], "main.xml": ["ALU617"], "other.xml": []}
+
+
+def test_trees_that_are_in_no_file_are_one_finding_of_each_file_that_uses_them(tmp_path):
+    write(tmp_path, main=tree("Main", "DockNow", "Gone", "Away", "DockNoww"), dock=tree("DockNow", "Far", "Off", "Far"))
+    with meaning(None):
+        files = checked_files([str(tmp_path)])
+    found = {Path(file.path).name: sorted(one.message for one in file.findings) for file in files}
+    assert found == {
+        "main.xml": ["2 trees are in none of the files: Gone, Away", "there is no tree 'DockNoww'"],
+        "dock.xml": ["2 trees are in none of the files: Far, Off"],
+    }
+
+
+def test_a_tree_that_others_use_is_told_of_by_them_and_one_that_they_do_not_take_by_itself(tmp_path):
+    part = TREE.format("Dock", "<Fallback><AlwaysSuccess/><AlwaysFailure/></Fallback>")
+    write(tmp_path, main=tree("Main", "Dock"), again=tree("Again", "Dock"), dock=part, backup__old__dock=part)
+    with meaning(None):
+        files = checked_files([str(tmp_path)])
+    found = {str(Path(file.path).relative_to(tmp_path)): [one.code for one in file.findings] for file in files}
+    assert found == {"main.xml": [], "again.xml": [], "dock.xml": ["ALU610"], "backup/old/dock.xml": ["ALU622", "ALU610"]}
 
 
 def test_a_broken_file_of_a_folder_keeps_no_other_from_being_checked(tmp_path):
