@@ -339,7 +339,7 @@ def test_the_clock_of_another_computer(ahead_s: float, level: Level) -> None:
         protocol_version = "HTTP/1.1"
 
         def date_time_string(self, timestamp: float | None = None) -> str:
-            return super().date_time_string(math.floor(time.time() + ahead_s))
+            return super().date_time_string(math.floor(time.time() + ahead_s))  # noqa: TID251 - it compares wall clocks
 
     with SimpleXMLRPCServer(("127.0.0.1", 0), Handler, logRequests=False) as server:
         server.register_function(lambda _caller: (1, "", 7), "getPid")

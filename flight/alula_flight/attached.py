@@ -20,6 +20,7 @@ from alula.common.signals import on_end_signal
 from alula.report.deaths import Death, describe_exit, note_again, note_death
 from alula.report.ends import SIGNAL, SUPERVISOR, ReportedEnd, note_end
 from alula.runtime.live.spec import RunSpec
+from alula_flight.mission_clock import MissionClock
 from alula_flight.outcome import GIVEN_UP, finish
 from alula_flight.station import state as states
 from alula_flight.station.parts import recording
@@ -65,7 +66,9 @@ class AttachedSupervisor:
         self._parts = PartsWatch(self._out, self._station.folder)
         self._front = os.getppid()
         self._asked: signal.Signals | None = None
-        self._began_s = time.time()
+        self._clock = MissionClock()
+        self._clock.begin(simulated=False)
+        self._began_s = self._clock.now_s or 0.0
         self.front_died = False
 
     def run(self) -> int:
@@ -103,10 +106,9 @@ class AttachedSupervisor:
         while mission.poll() is None:
             with contextlib.suppress(subprocess.TimeoutExpired):
                 mission.wait(LOOK_S)
-            self._parts.look(time.time())
+            self._parts.look(self._clock.now_s or 0.0)
             self._look_for_the_front()
-            over = bool(self._spec.limit_s) and time.time() - self._began_s > self._spec.limit_s
-            if told_s is None and (self._asked is not None or self.front_died or over):
+            if told_s is None and (self._asked is not None or self.front_died or self._over_time):
                 told_s = time.monotonic()
                 self._note_abort()
                 mission.send_signal(signal.SIGINT)
@@ -115,21 +117,26 @@ class AttachedSupervisor:
                 return GIVEN_UP
         if mission.returncode >= 0:
             return mission.returncode
-        note_death(self._out, Death("mission", describe_exit(mission.returncode), time.time()))
+        note_death(self._out, Death("mission", describe_exit(mission.returncode), self._clock.now_s))
         return GIVEN_UP
+
+    @property
+    def _over_time(self) -> bool:
+        """Tell whether the mission has lasted for as long as it may."""
+        return bool(self._spec.limit_s) and (self._clock.now_s or 0.0) - self._began_s > self._spec.limit_s
 
     def _note_abort(self) -> None:
         if self.front_died:
-            note_end(self._out, ReportedEnd(SUPERVISOR, "the front has died", time.time()))
+            note_end(self._out, ReportedEnd(SUPERVISOR, "the front has died", self._clock.now_s))
         elif self._asked is not None:
-            note_end(self._out, ReportedEnd(SIGNAL, f"{self._asked.name} to the supervisor", time.time()))
+            note_end(self._out, ReportedEnd(SIGNAL, f"{self._asked.name} to the supervisor", self._clock.now_s))
         else:
-            note_end(self._out, ReportedEnd(SUPERVISOR, f"its limit of {self._spec.limit_s:g} s is over", time.time()))
+            note_end(self._out, ReportedEnd(SUPERVISOR, f"its limit of {self._spec.limit_s:g} s is over", self._clock.now_s))
 
     def _look_for_the_front(self) -> None:
         if os.getppid() != self._front and not self.front_died:
             self.front_died = True
-            note_death(self._out, Death("front", "gone", time.time()))
+            note_death(self._out, Death("front", "gone", self._clock.now_s))
 
     def _end_asked(self, number: signal.Signals) -> None:
         self._asked = number

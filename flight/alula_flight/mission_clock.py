@@ -6,6 +6,8 @@ import time
 from collections.abc import Callable
 from typing import Any
 
+from alula.common.steady_clock import STEADY_CLOCK
+
 STANDSTILL_TIMEOUT_S = 60.0  # wall clock without a tick of the mission clock
 START_TIMEOUT_S = 120.0  # wall clock until the mission clock runs
 
@@ -30,7 +32,7 @@ class MissionClock:
             rospy.Subscriber("/clock", Clock, self._tick, queue_size=1)
 
     def begin(self, *, simulated: bool) -> None:
-        """Be ``/clock``, or the wall clock."""
+        """Be ``/clock``, or the wall clock without its steps."""
         self._simulated, self._moved = simulated, time.monotonic()
 
     @property
@@ -46,7 +48,7 @@ class MissionClock:
     @property
     def now_s(self) -> float | None:
         """Mission clock in seconds, or None before it is known."""
-        return time.time() if self._simulated is False else self._now_s
+        return STEADY_CLOCK.now_ns() / 1e9 if self._simulated is False else self._now_s
 
     @property
     def began(self) -> bool:

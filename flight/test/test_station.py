@@ -39,9 +39,10 @@ from alula_flight.station.keeper import end_all
 from alula_flight.station.master import why_no_master
 from alula_flight.station.notify import VARIABLE, notify
 from alula_flight.station.parts import Part, Places, bridge_file, environment_of, network_profile, parts_of
-from alula_flight.station.state import PartState, StationState, living
+from alula_flight.station.state import PartState, StationState, living, start_of
 from alula_flight.station.station import Station
 from alula_testing.waits import until
+from alula_testing.wall_clock import WallClock, needs_faketime
 
 ROOT = Path(__file__).resolve().parents[2]
 
@@ -142,16 +143,30 @@ def test_dds_binds_to_the_address_of_the_deployment_besides_loopback(deployment,
 
 
 def test_a_process_is_known_by_its_start_as_ids_are_used_again(tmp_path):
-    me = psutil.Process()
-    assert living(me.pid, me.create_time()) == me
-    assert living(me.pid, me.create_time() - 5.0) is None
-    assert living(0, 0.0) is None
-    state = StationState("id", 5, 6.0, 7, "full", {"bridge": PartState(1, 2.0, states.RUNNING, ("a", "b"), {"ROS_IP": "x"}, 3, "why")})
+    me, start = psutil.Process(), start_of(os.getpid())
+    boot, ticks = start.split()
+    assert living(me.pid, start) == me
+    assert living(me.pid, f"{boot} {int(ticks) - 500}") is None
+    assert living(me.pid, f"another-{boot} {ticks}") is None, "after a reboot ids and ticks may be the same"
+    assert living(0, "") is None
+    state = StationState(
+        "id", 5, "boot 6", 7, "full", {"bridge": PartState(1, "boot 2", states.RUNNING, ("a", "b"), {"ROS_IP": "x"}, 3, "why")}
+    )
     state.save(tmp_path)
     assert StationState.load(tmp_path) == state
     for text in ("", "{}", '{"parts": {"x": {}}}', "[]"):
         (tmp_path / states.FILE).write_text(text)
         assert StationState.load(tmp_path).parts == {}
+
+
+@needs_faketime
+@pytest.mark.parametrize("by_s", [3600, -3600])
+def test_a_process_is_known_to_another_one_whose_wall_clock_was_set_since(tmp_path, by_s):
+    clock = WallClock(tmp_path)
+    clock.step(by_s)
+    asked = f"from alula_flight.station.state import living; print(living({os.getpid()}, {start_of(os.getpid())!r}) is not None)"
+    done = subprocess.run([sys.executable, "-c", asked], env=clock.environment, capture_output=True, text=True, check=True)
+    assert done.stdout == "True\n"
 
 
 def test_a_lock_is_held_as_long_as_its_process_lives(tmp_path):
@@ -170,8 +185,8 @@ def test_what_a_keeper_that_died_has_left_is_ended_and_nothing_else(places):
     try:
         for one in (ours, theirs):
             one.stdout.readline()
-        reused = PartState(theirs.pid, psutil.Process(theirs.pid).create_time() - 60.0, states.RUNNING)
-        state = StationState(parts={"bridge": PartState(ours.pid, psutil.Process(ours.pid).create_time(), states.RUNNING), "page": reused})
+        reused = PartState(theirs.pid, "another-boot 1", states.RUNNING)
+        state = StationState(parts={"bridge": PartState(ours.pid, start_of(ours.pid), states.RUNNING), "page": reused})
         end_all(state)
         assert ours.poll() is not None
         assert theirs.poll() is None

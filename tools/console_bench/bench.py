@@ -129,7 +129,7 @@ async def wait_for_all(port: int, last_s: float) -> float:
 async def listen(socket: ClientConnection, ages_s: list[float]) -> None:
     """Note how old each sample is when it comes."""
     async for message in socket:
-        now = time.time()
+        now = time.monotonic()
         for topic, _, value in json.loads(message).get("entries", []):
             if topic == DATA and "sent" in value:
                 ages_s.append(now - value["sent"])
@@ -147,7 +147,7 @@ async def live(
     for number in range(round(options.seconds * options.rate)):
         t_s = options.hours * 3600 + number / options.rate
         topic, value = entry(number, t_s, options.nodes)
-        writer.write(topic, round(t_s * 1e9), {**value, "sent": time.time()})
+        writer.write(topic, round(t_s * 1e9), {**value, "sent": time.monotonic()})
         await asyncio.sleep(max(0.0, begun + (number + 1) / options.rate - time.monotonic()))
     core = (sum(server.cpu_times()[:2]) - before_s) / (time.monotonic() - begun)
     for task in listening:

@@ -53,7 +53,7 @@ class Diagnostics:
             if isinstance(one, Refused)
         ]
         array = self._array(status=statuses)
-        array.header.stamp.sec, array.header.stamp.nanosec = divmod(time.time_ns(), 1_000_000_000)  # the bridge has wall time alone
+        array.header.stamp.sec, array.header.stamp.nanosec = divmod(time.time_ns(), 1_000_000_000)  # noqa: TID251 - a stamp; the bridge has wall time alone
         cdr = serialize_message(array)
         self._ros2.publish(cdr)
         self._ros1.publish(self._pair.to_ros1(cdr))

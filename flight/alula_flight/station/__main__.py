@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import json
 import sys
-import time
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import asdict
 from pathlib import Path
@@ -87,7 +86,8 @@ def the_only_one() -> str:
 def told(station: Station, state: StationState) -> dict[str, object]:
     """Return how a deployment is, as JSON has it."""
     parts: Mapping[str, Any] = {
-        name: {key: value for key, value in asdict(part).items() if key not in {"words", "graph"}} for name, part in state.parts.items()
+        name: {key: value for key, value in asdict(part).items() if key not in {"words", "graph", "start"}}
+        for name, part in state.parts.items()
     }
     return {
         "deployment": station.deployment.name,
@@ -113,7 +113,7 @@ def lines_of(station: Station, state: StationState) -> list[str]:
     if said["master_problem"]:
         lines.append(f"  the ROS master does not answer: {said['master_problem']}")
     for name, part in state.parts.items():
-        lasting = f" for {time.time() - part.started_s:.0f} s, process {part.pid}" if part.pid else ""
+        lasting = f" for {states.lasting_s(part.start):.0f} s, process {part.pid}" if part.pid else ""
         deaths = f"; ended {part.deaths} times by itself, last with {part.why}" if part.deaths else ""
         lines.append(f"  {name}: {part.state}{lasting}{deaths}")
     lines += [f"  mission: {said['mission'] or 'none'}"] if said["up"] else []

@@ -149,8 +149,7 @@ class Kept:
         self.state.pid, self.state.state = self._child.pid, states.STARTING
         self.state.words, self.state.graph = self.part.words, graph_of(self.part)
         self._begun_s = time.monotonic()
-        with contextlib.suppress(psutil.Error):
-            self.state.started_s = psutil.Process(self._child.pid).create_time()
+        self.state.start = states.start_of(self._child.pid)
         log.info("%s is started, process %d", self.part.name, self._child.pid)
 
     def _note_end(self) -> None:
@@ -189,7 +188,7 @@ class Keeper:
         self._places = places
         self._state = StationState.load(places.folder)
         self._state.run_id = self._state.run_id or uuid.uuid4().hex
-        self._state.keeper, self._state.keeper_started_s = os.getpid(), psutil.Process().create_time()
+        self._state.keeper, self._state.keeper_start = os.getpid(), states.start_of(os.getpid())
         self._kept: dict[str, Kept] = {}
         self._master = MasterWatch(deployment.master)
         self._tidy_s = 0.0

@@ -57,7 +57,9 @@ class Offset:
 
 
 def offset_of(
-    second: Callable[[], int], clock: Callable[[], float] = time.time, pause: Callable[[float], None] = time.sleep
+    second: Callable[[], int],
+    clock: Callable[[], float] = time.time,  # noqa: TID251 - it compares wall clocks
+    pause: Callable[[float], None] = time.sleep,
 ) -> Offset | None:
     """Return the offset of a clock that tells whole seconds; None where it tells no change.
 

@@ -5,6 +5,7 @@ from __future__ import annotations
 import fcntl
 import json
 import os
+import time
 from collections.abc import Mapping
 from dataclasses import asdict, dataclass, field
 from pathlib import Path
@@ -17,8 +18,8 @@ from alula.common.files import write_json
 FILE, KEEPER_LOCK, MISSION_LOCK, WANTED = "state.json", "keeper.lock", "mission.lock", "wanted.json"
 STARTING, RUNNING, WAITING, REFUSED, GIVEN_UP, ENDED = "starting", "running", "waiting", "refused", "given up", "ended"
 """Of a part: has it lived for a moment; is it started again soon; does it say itself that it can't; has it died too often; was it ended."""
-SAME_S = 0.05
-"""Of the starts of one process: the kernel counts in hundredths of a second."""
+BOOT = Path("/proc/sys/kernel/random/boot_id")
+TICKS_A_SECOND = os.sysconf("SC_CLK_TCK")
 
 
 @dataclass
@@ -27,7 +28,7 @@ class PartState:
 
     Attributes:
         pid: of its process; 0: it has none.
-        started_s: when that was started, seconds since 1970, as the kernel has it: process ids are used again.
+        start: which start of a process with this id that was, see `start_of`; process ids are used again.
         state: one of the words above.
         words: its command.
         graph: what its environment says of the graph.
@@ -36,7 +37,7 @@ class PartState:
     """
 
     pid: int = 0
-    started_s: float = 0.0
+    start: str = ""
     state: str = STARTING
     words: tuple[str, ...] = ()
     graph: Mapping[str, str] = field(default_factory=dict)
@@ -46,7 +47,7 @@ class PartState:
     @property
     def process(self) -> psutil.Process | None:
         """Return its process where that lives, and is the one that was started."""
-        return living(self.pid, self.started_s)
+        return living(self.pid, self.start)
 
 
 @dataclass
@@ -55,7 +56,7 @@ class StationState:
 
     Attributes:
         run_id: what their processes carry in their environment.
-        keeper: process id of what keeps them up; ``keeper_started_s``: when it was started.
+        keeper: process id of what keeps them up; ``keeper_start``: which start of it that was.
         answered: the number of the last request that the keeper has done.
         disk: what is to be said of the disk; empty: nothing.
         master: of the ROS 1 master, see `MasterWatch.told`.
@@ -63,7 +64,7 @@ class StationState:
 
     run_id: str = ""
     keeper: int = 0
-    keeper_started_s: float = 0.0
+    keeper_start: str = ""
     answered: int = 0
     disk: str = ""
     parts: dict[str, PartState] = field(default_factory=dict)
@@ -87,14 +88,30 @@ class StationState:
             return cls()
 
 
-def living(pid: int, started_s: float) -> psutil.Process | None:
-    """Return a process that lives and was started at that moment."""
+def start_of(pid: int) -> str:
+    """Return which start of a process with this id the present one is: the boot, and the kernel's ticks from there; "" where it is gone.
+
+    The wall clock, by which psutil tells it, may be set while the process lives.
+    """
     try:
-        process = psutil.Process(pid) if pid else None
-        same = process is not None and abs(process.create_time() - started_s) < SAME_S and process.status() != psutil.STATUS_ZOMBIE
+        ticks = Path(f"/proc/{pid}/stat").read_text(encoding="utf-8", errors="replace").rpartition(")")[2].split()[19]  # proc(5): starttime
+        return f"{BOOT.read_text(encoding='ascii').strip()} {ticks}"
+    except (OSError, IndexError):
+        return ""
+
+
+def lasting_s(start: str) -> float:
+    """Return how long ago a start of this boot was."""
+    return max(0.0, time.clock_gettime(time.CLOCK_BOOTTIME) - int(start.split()[1]) / TICKS_A_SECOND)
+
+
+def living(pid: int, start: str) -> psutil.Process | None:
+    """Return a process that lives and is of that start."""
+    try:
+        process = psutil.Process(pid) if pid and start and start_of(pid) == start else None
+        return process if process is not None and process.status() != psutil.STATUS_ZOMBIE else None
     except psutil.Error:
         return None
-    return process if same else None
 
 
 def take(path: Path) -> TextIO | None:

@@ -53,7 +53,7 @@ class Station:
     @staticmethod
     def keeper_lives(state: StationState) -> bool:
         """Tell whether something keeps the parts up."""
-        return living(state.keeper, state.keeper_started_s) is not None
+        return living(state.keeper, state.keeper_start) is not None
 
     @property
     def is_up(self) -> bool:
@@ -93,14 +93,14 @@ class Station:
     def end(self) -> None:
         """End all parts and their keeper, or what a keeper that has died has left; raises StationError."""
         state = StationState.load(self.folder)
-        keeper = living(state.keeper, state.keeper_started_s)
+        keeper = living(state.keeper, state.keeper_start)
         if keeper is None:
             end_all(state)
             state.keeper = 0
             state.save(self.folder)
             return
         keeper.send_signal(signal.SIGTERM)
-        if not self._wait(lambda: living(state.keeper, state.keeper_started_s) is None, DOWN_S):
+        if not self._wait(lambda: living(state.keeper, state.keeper_start) is None, DOWN_S):
             raise StationError(f"the keeper, process {state.keeper}, has not ended within {DOWN_S:g} s; end it, and ask again")
 
     @staticmethod

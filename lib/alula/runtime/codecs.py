@@ -27,6 +27,7 @@ from alula.runtime.middleware import (
     Topic,
     WhyReply,
 )
+from alula.runtime.mission_clock import MissionClock
 from alula.runtime.views import DataReading, Sample
 
 NANOSECONDS = 1_000_000_000
@@ -79,54 +80,8 @@ def _encode_describe(model_json: str, response: Any) -> None:
     response.model_json = model_json
 
 
-def _encode_data(reading: DataReading, response: Any) -> None:
-    response.known, response.received, response.stale = reading.known, reading.received, reading.stale
-    response.stamp_ns, response.value_json = reading.stamp_ns, reading.value_json
-
-
-def _stamp(number: int) -> int | None:
-    """Return a stamp of a message, where a number below 0 says that it has not happened."""
-    return None if number < 0 else number
-
-
-def _record_of(skill: str, message: Any) -> ExecutionRecord:
-    return ExecutionRecord(
-        message.id,
-        skill,
-        ExecutionState(message.state),
-        message.result,
-        message.message,
-        json.loads(message.inputs_json or "null"),
-        json.loads(message.outputs_json or "{}"),
-        message.requested_ns,
-        _stamp(message.started_ns),
-        _stamp(message.ended_ns),
-    )
-
-
-def _decode_why(response: Any) -> WhyReply:
-    if not response.known:
-        return WhyReply(response.reason)
-    found = tuple(
-        Unmet(
-            one.name,
-            one.condition,
-            one.reason,
-            {resource.name: resource.state for resource in one.resources},
-            {data.name: json.loads(data.value_json) if data.value_json else None for data in one.data},
-        )
-        for one in response.unmet
-    )
-    history = tuple(
-        TransitionEvent(0, one.stamp_ns, one.resource, one.from_state, one.to_state, one.cause, reason=one.reason)
-        for one in response.history
-    )
-    return WhyReply("", Why("", response.ready, response.reason, response.refusal, found, history))
-
-
-def event_of(message: Any) -> EngineEvent:
-    """Return an event; inputs and outputs are plain values."""
-    stamp_ns = stamp_ns_of(message.header.stamp)
+def event_of(message: Any, stamp_ns: int) -> EngineEvent:
+    """Return an event of this moment; inputs and outputs are plain values."""
     if message.kind == type(message).TRANSITION:
         states = (message.resource, message.from_state, message.to_state)
         return TransitionEvent(message.sequence, stamp_ns, *states, message.cause, message.skillset, message.reason, message.instance_id)
@@ -147,12 +102,6 @@ def event_of(message: Any) -> EngineEvent:
     )
 
 
-def states_of(message: Any) -> ResourceStates:
-    """Read ``ResourceStates``."""
-    values = {one.name: ResourceStatus(one.state, one.previous_state, one.stamp_ns, one.reason) for one in message.resources}
-    return ResourceStates(message.instance_id, message.sequence, stamp_ns_of(message.header.stamp), values)
-
-
 class Codecs:
     """The codecs of one skillset's topics and services, for the messages of one ROS world.
 
@@ -162,18 +111,22 @@ class Codecs:
     Args:
         messages: the module ``skillset_interfaces.msg`` of the world, ``services`` its ``skillset_interfaces.srv``.
         message_class: returns the class of ``package/Name``.
+        clock: converts the stamps.
     """
 
-    def __init__(self, messages: Any, services: Any, message_class: Callable[[str], Any]) -> None:
+    def __init__(self, messages: Any, services: Any, message_class: Callable[[str], Any], clock: MissionClock) -> None:
         self._messages = messages
         self._message_class = message_class
+        self._clock = clock
+        # What is kept is true as long as the wall clock is not set.
+        self._set_ns = clock.set_ns
         self._resources: dict[str, tuple[ResourceStatus, Any]] = {}
         self._encoded: dict[str, tuple[SkillRecord, Any]] = {}
         self._decoded: dict[str, tuple[tuple[Any, ...], SkillRecord]] = {}
         self._topics: Mapping[str, TopicCodec] = {
-            EVENTS.name: TopicCodec(messages.Event, self._event_message, event_of),
-            RESOURCE_STATES.name: TopicCodec(messages.ResourceStates, self._states_message, states_of),
-            REPORTED.name: TopicCodec(messages.ResourceStates, self._states_message, states_of),
+            EVENTS.name: TopicCodec(messages.Event, self._event_message, self._event_of),
+            RESOURCE_STATES.name: TopicCodec(messages.ResourceStates, self._states_message, self._states_of),
+            REPORTED.name: TopicCodec(messages.ResourceStates, self._states_message, self._states_of),
             SKILL_STATES.name: TopicCodec(messages.SkillStates, self._skills_message, self._skills_of),
         }
         self.services: Mapping[str, ServiceCodec] = self._service_codecs(services)
@@ -190,11 +143,28 @@ class Codecs:
 
     # --- topics ------------------------------------------------------------------------------------------------------
 
+    def _stamp(self, message: Any, moment_ns: int) -> None:
+        set_stamp(message.header.stamp, self._clock.stamp_ns(moment_ns))
+
+    def _moment_of(self, message: Any) -> int:
+        return self._clock.moment_ns(stamp_ns_of(message.header.stamp))
+
+    def _forget_where_set(self) -> None:
+        """Keep nothing that was made before the wall clock was set: its stamps would be of another time."""
+        set_ns = self._clock.set_ns
+        if set_ns != self._set_ns:
+            self._set_ns = set_ns
+            for kept in (self._resources, self._encoded, self._decoded):
+                kept.clear()
+
+    def _event_of(self, message: Any) -> EngineEvent:
+        return event_of(message, self._moment_of(message))
+
     def _event_message(self, skillset: str, event: EngineEvent) -> Any:
         """Return an event as a message; its outputs are there when it is the last of its execution."""
         kind = self._messages.Event
         message = kind(skillset=skillset, instance_id=event.instance_id, sequence=event.sequence)
-        set_stamp(message.header.stamp, event.stamp_ns)
+        self._stamp(message, event.stamp_ns)
         if isinstance(event, ExecutionEvent):
             message.kind = kind.EXECUTION
             message.skill, message.id, message.state = event.skill, event.id, event.state.value
@@ -212,23 +182,33 @@ class Codecs:
 
     def _states_message(self, skillset: str, states: ResourceStates) -> Any:
         """Return resource states as a message."""
+        self._forget_where_set()
         resources = [self._resource(name, one) for name, one in states.resources.items()]
         message = self._messages.ResourceStates(
             skillset=skillset, instance_id=states.instance_id, sequence=states.sequence, resources=resources
         )
-        set_stamp(message.header.stamp, states.stamp_ns)
+        self._stamp(message, states.stamp_ns)
         return message
 
+    def _states_of(self, message: Any) -> ResourceStates:
+        values = {
+            one.name: ResourceStatus(one.state, one.previous_state, self._clock.moment_ns(one.stamp_ns), one.reason)
+            for one in message.resources
+        }
+        return ResourceStates(message.instance_id, message.sequence, self._moment_of(message), values)
+
     def _skills_message(self, skillset: str, states: SkillStates) -> Any:
+        self._forget_where_set()
         skills = [self._skill(name, one) for name, one in states.skills.items()]
         message = self._messages.SkillStates(skillset=skillset, instance_id=states.instance_id, skills=skills)
-        set_stamp(message.header.stamp, states.stamp_ns)
+        self._stamp(message, states.stamp_ns)
         return message
 
     def _skills_of(self, message: Any) -> SkillStates:
         """Return skill states; inputs and outputs are plain values."""
+        self._forget_where_set()
         skills = {one.name: self._skill_of(one) for one in message.skills}
-        return SkillStates(message.instance_id, stamp_ns_of(message.header.stamp), skills)
+        return SkillStates(message.instance_id, self._moment_of(message), skills)
 
     def _resource(self, name: str, value: ResourceStatus) -> Any:
         kept, message = self._resources.get(name, (None, None))
@@ -239,7 +219,7 @@ class Codecs:
 
     def _resource_state(self, name: str, state: str, status: ResourceStatus) -> Any:
         return self._messages.ResourceState(
-            name=name, state=state, previous_state=status.previous, stamp_ns=status.stamp_ns, reason=status.reason
+            name=name, state=state, previous_state=status.previous, stamp_ns=self._clock.stamp_ns(status.stamp_ns), reason=status.reason
         )
 
     def _skill(self, name: str, skill: SkillRecord) -> Any:
@@ -256,8 +236,8 @@ class Codecs:
         now = (len(message.last), *((e.id, e.state, e.requested_ns, e.started_ns, e.ended_ns) for e in executions))
         kept = self._decoded.get(message.name)
         if kept is None or kept[0] != now:
-            last = [_record_of(message.name, execution) for execution in message.last]
-            record = SkillRecord(tuple(_record_of(message.name, one) for one in message.open), last[0] if last else None)
+            last = [self._record_of(message.name, execution) for execution in message.last]
+            record = SkillRecord(tuple(self._record_of(message.name, one) for one in message.open), last[0] if last else None)
             kept = self._decoded[message.name] = (now, record)
         return kept[1]
 
@@ -269,19 +249,35 @@ class Codecs:
             message=record.message,
             inputs_json=json.dumps(to_plain(record.inputs)),
             outputs_json=json.dumps(to_plain(record.outputs) if record.state.terminal else {}),
-            requested_ns=record.requested_ns,
-            started_ns=-1 if record.started_ns is None else record.started_ns,
-            ended_ns=-1 if record.ended_ns is None else record.ended_ns,
+            requested_ns=self._clock.stamp_ns(record.requested_ns),
+            started_ns=-1 if record.started_ns is None else self._clock.stamp_ns(record.started_ns),
+            ended_ns=-1 if record.ended_ns is None else self._clock.stamp_ns(record.ended_ns),
         )
+
+    def _record_of(self, skill: str, message: Any) -> ExecutionRecord:
+        return ExecutionRecord(
+            message.id,
+            skill,
+            ExecutionState(message.state),
+            message.result,
+            message.message,
+            json.loads(message.inputs_json or "null"),
+            json.loads(message.outputs_json or "{}"),
+            self._clock.moment_ns(message.requested_ns),
+            self._happened(message.started_ns),
+            self._happened(message.ended_ns),
+        )
+
+    def _happened(self, stamp_ns: int) -> int | None:
+        """Return the moment of a stamp; one below 0 says that it has not happened."""
+        return None if stamp_ns < 0 else self._clock.moment_ns(stamp_ns)
 
     # --- services ----------------------------------------------------------------------------------------------------
 
     def _service_codecs(self, services: Any) -> Mapping[str, ServiceCodec]:
         return {
             "describe": ServiceCodec(services.Describe, (), _encode_describe, lambda response: response.model_json),
-            "get_data": ServiceCodec(
-                services.GetData, ("name",), _encode_data, lambda r: DataReading(r.known, r.received, r.stale, r.stamp_ns, r.value_json)
-            ),
+            "get_data": ServiceCodec(services.GetData, ("name",), self._encode_data, self._decode_data),
             "pause": ServiceCodec(services.SetPaused, ("id", "paused"), _encode_trigger, lambda r: PauseReply(r.accepted, r.reason)),
             "transition": ServiceCodec(
                 services.Transition,
@@ -292,8 +288,17 @@ class Codecs:
             "trigger": ServiceCodec(
                 services.TriggerEvent, ("event",), _encode_trigger, lambda r: TransitionReply(r.accepted, r.reason, "")
             ),
-            "why": ServiceCodec(services.Why, ("skill", "inputs_json"), self._encode_why, _decode_why),
+            "why": ServiceCodec(services.Why, ("skill", "inputs_json"), self._encode_why, self._decode_why),
         }
+
+    def _encode_data(self, reading: DataReading, response: Any) -> None:
+        response.known, response.received, response.stale = reading.known, reading.received, reading.stale
+        response.stamp_ns = self._clock.stamp_ns(reading.stamp_ns) if reading.received else 0
+        response.value_json = reading.value_json
+
+    def _decode_data(self, response: Any) -> DataReading:
+        moment_ns = self._clock.moment_ns(response.stamp_ns)
+        return DataReading(response.known, response.received, response.stale, moment_ns, response.value_json)
 
     def _encode_why(self, reply: WhyReply, response: Any) -> None:
         response.known = reply.why is not None
@@ -305,10 +310,36 @@ class Codecs:
         response.unmet = [self._unmet(one, reply) for one in why.unmet]
         response.history = [
             self._messages.ResourceTransition(
-                stamp_ns=e.stamp_ns, resource=e.resource, from_state=e.from_state, to_state=e.to_state, cause=e.cause, reason=e.reason
+                stamp_ns=self._clock.stamp_ns(one.stamp_ns),
+                resource=one.resource,
+                from_state=one.from_state,
+                to_state=one.to_state,
+                cause=one.cause,
+                reason=one.reason,
             )
-            for e in why.history
+            for one in why.history
         ]
+
+    def _decode_why(self, response: Any) -> WhyReply:
+        if not response.known:
+            return WhyReply(response.reason)
+        found = tuple(
+            Unmet(
+                one.name,
+                one.condition,
+                one.reason,
+                {resource.name: resource.state for resource in one.resources},
+                {data.name: json.loads(data.value_json) if data.value_json else None for data in one.data},
+            )
+            for one in response.unmet
+        )
+        history = tuple(
+            TransitionEvent(
+                0, self._clock.moment_ns(one.stamp_ns), one.resource, one.from_state, one.to_state, one.cause, reason=one.reason
+            )
+            for one in response.history
+        )
+        return WhyReply("", Why("", response.ready, response.reason, response.refusal, found, history))
 
     def _unmet(self, one: Unmet, reply: WhyReply) -> Any:
         values = {name: "" if value is None else json.dumps(to_plain(value)) for name, value in one.data.items()}

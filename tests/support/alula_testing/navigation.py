@@ -3,12 +3,14 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
+from dataclasses import replace
 from typing import Any, Protocol
 
 from geometry_msgs.msg import Point
 from skillset_interfaces.srv import Transition
 
 from alula.model.execution_state import ExecutionState
+from alula.model.model import Skillset
 from alula.runtime.handle import SkillHandle
 from alula_testing.recorder import Recorder
 from alula_testing.waits import until
@@ -69,3 +71,11 @@ def check_interrupt_and_violation(navigation: Navigation, soon_s: float) -> None
     assert handle.wait(soon_s)
     assert (handle.state, handle.result) == (S.RESOURCE_INVARIANT_VIOLATED, "keep_sdk_authority")
     until(lambda: "on_violation" in hooks.calls, "the function is stopped", soon_s)
+
+
+def with_silence(skillset: Skillset, name: str, silence_s: float) -> Skillset:
+    """Return a skillset with a resource whose reporter may fall silent; its arrows lead both ways, as managers need them to."""
+    resource = skillset.resource(name)
+    arrows = {*resource.transitions, *(replace(arrow, target=resource.initial, source=arrow.target) for arrow in resource.transitions)}
+    silent = replace(resource, silence_s=silence_s, transitions=tuple(arrow for arrow in arrows if arrow.source != arrow.target))
+    return replace(skillset, resources=tuple(silent if one.name == name else one for one in skillset.resources))

@@ -42,7 +42,7 @@ class LogWriter:
         self._began_us = now_us
         self._file: BinaryIO = path.open("wb")
         content = xml.encode()
-        self._write(MAGIC + bytes([VERSION]) + _LENGTH.pack(len(content)) + content + _DATE.pack(time.time_ns() // 1000))
+        self._write(MAGIC + bytes([VERSION]) + _LENGTH.pack(len(content)) + content + _DATE.pack(time.time_ns() // 1000))  # noqa: TID251 - a date
 
     def take(self, changes: Sequence[Change], now_us: int) -> None:
         """Write what has changed in a tick, in the order of the changes."""

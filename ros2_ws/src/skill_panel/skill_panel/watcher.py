@@ -7,7 +7,6 @@ from collections.abc import Callable, Mapping, Sequence
 from functools import partial
 from typing import Any, TypeVar
 
-from rclpy.clock import Clock, ClockType
 from rclpy.node import Node
 from rclpy.qos import QoSProfile
 
@@ -21,6 +20,7 @@ from alula.runtime.views import DataReading
 from alula.runtime.waiting import Pending
 from skillset_ros2.actions import execution_id
 from skillset_ros2.client import SkillsetClient
+from skillset_ros2.mission_clock import STEADY, NodeClock
 from skillset_ros2.names import action_module, action_type
 from skillset_ros2.session import Session
 
@@ -201,9 +201,9 @@ class Watcher:
         self._lock = threading.Lock()
         self._watched: dict[str, Watched] = {}
         self._problems: dict[str, str] = {}
-        steady = Clock(clock_type=ClockType.STEADY_TIME)
+        self._mission_clock = NodeClock(self.node)
         self._timers = [
-            self.node.create_timer(period_s, job, clock=steady) for period_s, job in ((LOOK_S, self._look), (DATA_S, self._ask))
+            self.node.create_timer(period_s, job, clock=STEADY) for period_s, job in ((LOOK_S, self._look), (DATA_S, self._ask))
         ]
 
     @property
@@ -221,7 +221,7 @@ class Watcher:
     @property
     def now_ns(self) -> int:
         """Mission clock, nanoseconds."""
-        return int(self.node.get_clock().now().nanoseconds)
+        return self._mission_clock.now_ns()
 
     def close(self) -> None:
         """End listening; what runs goes on running."""
@@ -236,7 +236,7 @@ class Watcher:
                 self._meet(space, name, root)
         for one in list(self._watched.values()):
             one.look()
-        if not self.node.get_clock().ros_time_is_active:  # the clock's publisher may be found later than the skillsets
+        if not self._mission_clock.simulated:  # the clock's publisher may be found later than the skillsets
             self._session.follow_clock()
 
     def _meet(self, space: str, name: str, root: str) -> None:

@@ -10,7 +10,6 @@ from collections.abc import Callable
 from typing import Any, TypeVar
 
 from rclpy.callback_groups import MutuallyExclusiveCallbackGroup
-from rclpy.clock import Clock, ClockType
 from rclpy.event_handler import PublisherEventCallbacks, SubscriptionEventCallbacks
 from rclpy.node import Node
 from rclpy.qos import QoSProfile
@@ -21,9 +20,10 @@ from alula.runtime.waiting import Waiter
 from alula.runtime.workers import Workers
 from skillset_ros2.calls import Calls
 from skillset_ros2.empty_wakes import watch_empty_wakes
+from skillset_ros2.mission_clock import NodeClock
 from skillset_ros2.names import SERVICE
 from skillset_ros2.spinning import NodeWaiter
-from skillset_ros2.timers import RclpyTimers
+from skillset_ros2.timers import MissionTimers
 
 LOOK_S = 0.05
 """How often (wall clock) the graph is looked at for what it does not tell."""
@@ -74,9 +74,8 @@ class RclpyBase:
         self._root = root or skillset
         self._group = RestingGroup()
         self._here = threading.local()
-        self._steady = Clock(clock_type=ClockType.STEADY_TIME)
-        self._timers = RclpyTimers(node, node.get_clock(), self._group, self._is_here)
-        self._delays = RclpyTimers(node, self._steady, self._group, self._is_here)
+        self._clock = NodeClock(node)
+        self._timers = MissionTimers(node, self._clock, self._group, self._is_here)
         self._jobs: queue.SimpleQueue[Job] = queue.SimpleQueue()
         self._wake: Any = node.create_guard_condition(self.on_loop(self._work), callback_group=self._group)
         self._workers = Workers(f"{skillset}_hooks", self.log)
@@ -87,7 +86,7 @@ class RclpyBase:
 
     def now_ns(self) -> int:
         """Return the mission clock, nanoseconds; after the end, the moment of the end."""
-        return self._ended_ns or int(self.node.get_clock().now().nanoseconds)
+        return self._ended_ns or self._clock.now_ns()
 
     def at(self, when_ns: int, job: Job) -> Timer:
         """Run a job at a moment of the mission clock."""
@@ -95,7 +94,7 @@ class RclpyBase:
 
     def later(self, delay_s: float, job: Job) -> Timer:
         """Run a job after a delay of wall clock."""
-        return self._delays.after(delay_s, self.on_loop(job))
+        return self._timers.later(delay_s, self.on_loop(job))
 
     def submit(self, job: Job) -> None:
         """Run a job on the executor."""

@@ -6,6 +6,7 @@ from rclpy.node import Node
 from skillset_interfaces.msg import ResourceState, ResourceStates
 
 from alula.runtime.middleware import REPORTED
+from skillset_ros2.mission_clock import NodeClock
 from skillset_ros2.names import latched
 
 HEARTBEAT_S = 0.5
@@ -22,7 +23,7 @@ class Heartbeat:
         self._node = node
         self._message = ResourceStates(skillset=skillset, resources=[ResourceState(name=name) for name in resources])
         self._publisher = node.create_publisher(ResourceStates, f"{skillset}/{REPORTED.name}", latched(REPORTED.depth))
-        self._timer = node.create_timer(HEARTBEAT_S, self._beat)
+        self._timer = NodeClock(node).every(HEARTBEAT_S, self._beat)
 
     def close(self) -> None:
         """Beat no more."""

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import functools
 import importlib
-import time
 from collections.abc import Callable, Mapping
 from typing import Any
 
@@ -15,6 +14,7 @@ from rclpy.event_handler import SubscriptionEventCallbacks
 from rclpy.node import Node
 from skillset_interfaces.msg import Heartbeat
 
+from alula.common.steady_clock import STEADY_CLOCK
 from alula.runtime.codecs import Codecs, ServiceCodec, set_stamp, stamp_ns_of
 from alula.runtime.middleware import ALIVE_PERIOD_S, CALL_S, Goal, GoalListener, OnError, OnHeartbeat, OnReply, OnValue, Serve, Topic
 from alula.runtime.timers import Job
@@ -38,7 +38,7 @@ class RclpyMiddleware(RclpyBase):
     def __init__(self, node: Node, skillset: str, *, root: str = "", interfaces: Any = None) -> None:
         super().__init__(node, skillset, root=root)
         self._interfaces = interfaces
-        self._codecs = Codecs(skillset_interfaces.msg, skillset_interfaces.srv, message_class)
+        self._codecs = Codecs(skillset_interfaces.msg, skillset_interfaces.srv, message_class, self._clock)
         self._send_heartbeat: Job = lambda: None
 
     # --- topics ------------------------------------------------------------------------------------------------------
@@ -150,13 +150,13 @@ class RclpyMiddleware(RclpyBase):
 
     def announce(self, instance_id: str, on_rival: OnError) -> None:
         """Send heartbeats, latched, from the executor: one that hangs goes silent. Those that were there first stay."""
-        begun_ns = time.time_ns()
-        heartbeat = Heartbeat(instance_id=instance_id, begun_ns=begun_ns)
+        begun_ns = STEADY_CLOCK.now_ns()
+        heartbeat = Heartbeat(instance_id=instance_id)
         told = f"managers of {self._skillset} are there already ({self.node.resolve_topic_name(self.name('alive'))}); end them first"
         later: set[str] = set()
 
         def hear(other: Any) -> None:
-            mine, others = (begun_ns, instance_id), (other.begun_ns, other.instance_id)
+            mine, others = (STEADY_CLOCK.stamp_ns(begun_ns), instance_id), (other.begun_ns, other.instance_id)
             if others[1] != instance_id and others < mine:
                 on_rival(told)
             elif others[1] != instance_id and others[1] not in later:
@@ -169,7 +169,9 @@ class RclpyMiddleware(RclpyBase):
                 self.later(ALIVE_PERIOD_S, beat)
 
         def send() -> None:
-            set_stamp(heartbeat.header.stamp, self.now_ns())
+            # Both in wall time as that is set now: whoever began first still did when the clock was set meanwhile.
+            heartbeat.begun_ns = STEADY_CLOCK.stamp_ns(begun_ns)
+            set_stamp(heartbeat.header.stamp, self._clock.stamp_ns(self.now_ns()))
             publisher.publish(heartbeat)
 
         self.listen(self.name("alive"), Heartbeat, hear, latched(1))
@@ -183,7 +185,7 @@ class RclpyMiddleware(RclpyBase):
 
         def hear(heartbeat: Any) -> None:
             last[:] = [heartbeat.instance_id]
-            on_heartbeat(heartbeat.instance_id, stamp_ns_of(heartbeat.header.stamp))
+            on_heartbeat(heartbeat.instance_id, self._clock.moment_ns(stamp_ns_of(heartbeat.header.stamp)))
 
         def changed(info: Any) -> None:
             # By the changes: the counts are wrong where both sides are in one process (alive from 0 to -1).

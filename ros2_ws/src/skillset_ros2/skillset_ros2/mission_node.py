@@ -40,6 +40,7 @@ from alula.trees.view import NodeView
 from skillset_ros2 import NodeExecutor, SkillsetClient
 from skillset_ros2.base import QUIET_PUBLISHER
 from skillset_ros2.fleet_clock import FleetClock
+from skillset_ros2.mission_clock import NodeClock
 from skillset_ros2.simulated_time import SimulatedTime
 
 TURN_S = 0.1  # wall clock; how soon a signal is seen when nothing else happens
@@ -54,6 +55,7 @@ class MissionNode(Node):  # type: ignore[misc]  # rclpy is not typed
         # Its parameters are what it was started with; their services are entities that each turn of the executor gathers.
         super().__init__("mission", start_parameter_services=False)
         self._simulated_time = SimulatedTime(self)
+        self._mission_clock = NodeClock(self)
         self._plan = plan
         values = {name: self._parameter(name, value) for name, value in plan.parameters.items()}
         joins = bool(self.declare_parameter("joins", value=False).value)
@@ -78,7 +80,7 @@ class MissionNode(Node):  # type: ignore[misc]  # rclpy is not typed
         self._tree = self.create_publisher(String, "mission/tree", LATCHED, event_callbacks=QUIET_PUBLISHER)
         self.create_service(Trigger, "mission/abort", self._on_abort)
         self.create_service(SetBool, "mission/pause", self._on_pause)
-        self.create_timer(TICK_PERIOD_S, self.driver.wake)
+        self._mission_clock.every(TICK_PERIOD_S, self.driver.wake)
 
     @property
     def now_s(self) -> float:
@@ -86,7 +88,7 @@ class MissionNode(Node):  # type: ignore[misc]  # rclpy is not typed
         return self._clock_ns() / 1e9
 
     def _clock_ns(self) -> int:
-        return int(self.get_clock().now().nanoseconds)
+        return self._mission_clock.now_ns()
 
     def turn(self) -> None:
         """Do what is due in this turn of the main loop: several events in one turn make one tick."""

@@ -11,9 +11,10 @@ from skillset_interfaces.msg import Event
 from alula.runtime.managers import DataBindings
 from alula.runtime.timers import Job, Timer
 from skillset_ros2.convert import fields_of, fill, message_class
+from skillset_ros2.mission_clock import NodeClock
 from skillset_ros2.names import EVENTS, in_namespace
 from skillset_ros2.node import SkillsetNode
-from skillset_ros2.timers import RclpyTimers
+from skillset_ros2.timers import MissionTimers
 
 
 class RosMockHost:
@@ -25,7 +26,8 @@ class RosMockHost:
         self._node = node
         self._bindings = bindings
         self._publishers: dict[tuple[str, str], Any] = {}
-        self._timers = RclpyTimers(node, node.get_clock(), node.default_callback_group, lambda: False)
+        self._clock = NodeClock(node)
+        self._timers = MissionTimers(node, self._clock, node.default_callback_group, lambda: False)
 
     def watch(self, skillsets: Sequence[str], on_state: Callable[[str, str, str], None]) -> None:
         """Call ``on_state(skillset, resource, state)`` for every transition."""
@@ -40,10 +42,7 @@ class RosMockHost:
     @property
     def now_s(self) -> float:
         """Mission clock, seconds."""
-        return self._now_ns() / 1e9
-
-    def _now_ns(self) -> int:
-        return int(self._node.get_clock().now().nanoseconds)
+        return self._clock.now_ns() / 1e9
 
     def after(self, delay_s: float, job: Job) -> Timer:
         """Run a job after a delay of mission clock; one that raises is told and ends nothing but itself."""
@@ -54,7 +53,7 @@ class RosMockHost:
             except Exception as error:  # noqa: BLE001 - the robot goes on
                 self.note(f"{type(error).__name__}: {error}")
 
-        return self._timers.after(delay_s, attempt)
+        return self._timers.at(self._clock.now_ns() + round(delay_s * 1e9), attempt)
 
     def transition(self, skillset: str, resource: str, to: str, reason: str) -> str:
         """Take an extern transition; return why it was refused, empty where it was taken."""

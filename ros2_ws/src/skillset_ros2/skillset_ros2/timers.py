@@ -11,6 +11,7 @@ from rclpy.clock import Clock
 from rclpy.node import Node
 
 from alula.runtime.timers import Job, Timer, TimerQueue
+from skillset_ros2.mission_clock import STEADY, NodeClock
 
 NEVER_NS = 10**18
 """Thirty years. rcl wakes the executor at each tick of a simulated clock behind a timer's moment, also when the timer is cancelled."""
@@ -72,3 +73,27 @@ class RclpyTimers:
         with self._lock:
             due = self._queue.pop_due(int(self._clock.now().nanoseconds))
         return None if due is None else due[1]
+
+
+class MissionTimers:
+    """Jobs at moments of a node's mission clock, and after delays of wall clock.
+
+    Args:
+        node: whose executor does them.
+        clock: its mission clock.
+        group: of the callbacks.
+        on_loop: as of ``RclpyTimers``.
+    """
+
+    def __init__(self, node: Node, clock: NodeClock, group: CallbackGroup, on_loop: Callable[[], bool]) -> None:
+        self._clock = clock
+        self._simulated = RclpyTimers(node, node.get_clock(), group, on_loop)
+        self._steady = RclpyTimers(node, STEADY, group, on_loop)
+
+    def at(self, when_ns: int, job: Job) -> Timer:
+        """Run a job at a moment of the mission clock; soon, when that has passed."""
+        return self._simulated.at(when_ns, job) if self._clock.simulated else self._steady.at(self._clock.steady_ns(when_ns), job)
+
+    def later(self, delay_s: float, job: Job) -> Timer:
+        """Run a job after a delay of wall clock."""
+        return self._steady.after(delay_s, job)

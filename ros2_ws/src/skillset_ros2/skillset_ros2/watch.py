@@ -3,25 +3,37 @@
 from __future__ import annotations
 
 from collections.abc import Callable
+from typing import Any
 
 from rclpy.node import Node
+
+from skillset_ros2.mission_clock import NodeClock
 
 PERIOD_S = 0.2
 
 
 class Watch:
-    """Calls what it is given every 0.2 s of mission clock, on the executor of its node: one timer for all hooks of a node."""
+    """Calls what it is given every period of mission clock, on the executor of its node: one timer for all hooks of a node.
 
-    def __init__(self, node: Node) -> None:
+    Where nothing publishes ``/clock`` its mission clock is the wall clock without the steps that NTP may take: what hooks
+    measure by it does not end early or late. ``Node.create_timer`` and ``Node.get_clock`` follow such a step.
+
+    Args:
+        node: whose executor calls.
+        period_s: how often.
+        options: those of ``Node.create_timer``, as ``callback_group``.
+    """
+
+    def __init__(self, node: Node, period_s: float = PERIOD_S, **options: Any) -> None:
         self.node = node
-        self._clock = node.get_clock()
+        self._clock = NodeClock(node)
         self._looks: list[Callable[[], None]] = []
-        node.create_timer(PERIOD_S, self._look)
+        self._clock.every(period_s, self._look, **options)
 
     @property
     def now_s(self) -> float:
         """Mission clock."""
-        return float(self._clock.now().nanoseconds) / 1e9
+        return self._clock.now_ns() / 1e9
 
     def every(self, look: Callable[[], None]) -> None:
         """Call this from now on."""

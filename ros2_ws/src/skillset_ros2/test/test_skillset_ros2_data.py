@@ -17,10 +17,12 @@ from alula.runtime.codecs import Codecs
 from alula.runtime.core.events import ExecutionEvent, TransitionEvent
 from alula.runtime.core.records import ResourceStatus
 from alula.runtime.middleware import EVENTS, RESOURCE_STATES, SKILL_STATES, ResourceStates, SkillStates, Topic
+from alula.runtime.mission_clock import MissionClock
 from alula.runtime.views import Sample
 from skillset_ros2.convert import message_class
 
-CODECS = Codecs(skillset_interfaces.msg, skillset_interfaces.srv, message_class)
+MISSION_CLOCK = MissionClock(lambda: True, lambda: 0)
+CODECS = Codecs(skillset_interfaces.msg, skillset_interfaces.srv, message_class, MISSION_CLOCK)
 
 
 def test_a_primitive_is_compared_by_what_its_message_carries():

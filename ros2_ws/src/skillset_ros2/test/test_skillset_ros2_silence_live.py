@@ -2,8 +2,6 @@
 
 from __future__ import annotations
 
-from dataclasses import replace
-
 import pytest
 
 rclpy = pytest.importorskip("rclpy")
@@ -15,20 +13,13 @@ from skillset_interfaces.msg import ResourceStates  # noqa: E402
 from skillset_ros2_rig import READY_S, NavigationRecorder, take, until  # noqa: E402
 
 from alula.runtime.middleware import REPORTED  # noqa: E402
+from alula_testing.navigation import with_silence  # noqa: E402
 from skillset_ros2 import Heartbeat, SkillsetClient, SkillsetNode  # noqa: E402
 from skillset_ros2.names import latched  # noqa: E402
 
 
-def with_silence(name: str, silence_s: float):
-    """Return the drone's navigation with a resource that can be silent: all that managers need of it."""
-    resource = SKILLSET.resource(name)
-    arrows = {*resource.transitions, *(replace(arrow, target=resource.initial, source=arrow.target) for arrow in resource.transitions)}
-    silent = replace(resource, silence_s=silence_s, transitions=tuple(arrow for arrow in arrows if arrow.source != arrow.target))
-    return replace(SKILLSET, resources=tuple(silent if one.name == name else one for one in SKILLSET.resources))
-
-
 def test_a_resource_whose_reporter_falls_silent_is_unknown(spinning):
-    model = with_silence("SDK_authority", 2.0)
+    model = with_silence(SKILLSET, "SDK_authority", 2.0)
     spinning.spin(SkillsetNode(model, navigation_actions, lambda _: {skill.name: NavigationRecorder() for skill in model.skills}))
     node = Node("silence_tester")
     client = SkillsetClient(node, "navigation")

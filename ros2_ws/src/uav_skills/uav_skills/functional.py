@@ -18,7 +18,7 @@ from std_srvs.srv import SetBool, Trigger
 from uav_msgs.msg import GuidanceState, MappingState, Obstacle, VideoState
 from uav_msgs.srv import Command, SetHeadingReference, SetPositionReference, Stream, Takeoff
 
-from skillset_ros2 import QUIET
+from skillset_ros2 import QUIET, Watch
 from uav_skills.calls import CallQueue, Reply, ignore_response
 
 WATCH_PERIOD_S = 0.1
@@ -38,21 +38,19 @@ class FunctionalPart:
     def __init__(self, node: Node) -> None:
         self.now_s = 0.0
         self._node = node
-        self._clock_s = self._read_clock_s()
         self._group = ReentrantCallbackGroup()
+        self._clock = Watch(node, WATCH_PERIOD_S, callback_group=self._group)
+        self._clock_s = self._clock.now_s
         self._calls = CallQueue(lambda: self.now_s)
         self._watchers: list[Callable[[], None]] = []
-        node.create_timer(WATCH_PERIOD_S, self._watch, callback_group=self._group)
+        self._clock.every(self._watch)
 
     def watch(self, watcher: Callable[[], None]) -> None:
         """Call ``watcher`` ten times a second of mission clock."""
         self._watchers.append(watcher)
 
-    def _read_clock_s(self) -> float:
-        return int(self._node.get_clock().now().nanoseconds) / 1e9
-
     def _watch(self) -> None:
-        clock_s = self._read_clock_s()
+        clock_s = self._clock.now_s
         self.now_s += min(max(clock_s - self._clock_s, 0.0), LONGEST_STEP_S)
         self._clock_s = clock_s
         self._calls.tick()

@@ -6,7 +6,7 @@ import threading
 from collections.abc import Callable
 from typing import Any
 
-from alula.runtime.codecs import event_of
+from alula.runtime.codecs import event_of, stamp_ns_of
 from alula.runtime.core.events import event_record
 from alula_testing import waits
 
@@ -56,7 +56,7 @@ class Listener:
     def hear(self, event: Any) -> None:
         """Take an ``Event`` of either world."""
         with self._lock:
-            self._heard[event.sequence] = event_record(event_of(event))
+            self._heard[event.sequence] = event_record(event_of(event, stamp_ns_of(event.header.stamp)))
 
     def events(self) -> list[dict[str, Any]]:
         """Return all, in order; none while one is missing in between."""

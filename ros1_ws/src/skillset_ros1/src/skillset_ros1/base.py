@@ -14,7 +14,7 @@ from alula.runtime.timers import Job, Timer
 from alula.runtime.waiting import Waiter
 from alula.runtime.workers import Workers
 from skillset_ros1.loop import Loop
-from skillset_ros1.names import now_ns
+from skillset_ros1.names import MISSION_CLOCK
 
 LOOK_S = 0.02
 """How often (wall clock) connections are looked at while they are being made."""
@@ -43,7 +43,7 @@ class RospyBase:
 
     def now_ns(self) -> int:
         """Return the mission clock, nanoseconds."""
-        return now_ns()
+        return MISSION_CLOCK.now_ns()
 
     def at(self, when_ns: int, job: Job) -> Timer:
         """Run a job at a moment of the mission clock."""

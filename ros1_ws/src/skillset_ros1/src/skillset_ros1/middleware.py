@@ -18,6 +18,7 @@ import skillset_interfaces.srv
 from roslib.message import get_message_class
 from skillset_interfaces.msg import Heartbeat
 
+from alula.common.steady_clock import STEADY_CLOCK
 from alula.runtime.codecs import Codecs, set_stamp, stamp_ns_of
 from alula.runtime.middleware import (
     ALIVE_PERIOD_S,
@@ -37,7 +38,7 @@ from skillset_ros1.actions import RospyLink, RospyServer, is_connected
 from skillset_ros1.base import RospyBase
 from skillset_ros1.calls import call
 from skillset_ros1.convert import message_class
-from skillset_ros1.names import QUEUE, action_types, now_ns
+from skillset_ros1.names import MISSION_CLOCK, QUEUE, action_types
 
 LEASE_S = 2.0
 """Without a heartbeat for so long (wall clock), managers are doubted, as in the ROS 2 world."""
@@ -63,7 +64,7 @@ class RospyMiddleware(RospyBase):
     def __init__(self, skillset: str, place: str, interfaces: ModuleType | None = None) -> None:
         super().__init__(skillset, place, f"the client of {skillset}" if interfaces is None else f"the managers of {skillset}")
         self._interfaces = interfaces
-        self._codecs = Codecs(skillset_interfaces.msg, skillset_interfaces.srv, message_class)
+        self._codecs = Codecs(skillset_interfaces.msg, skillset_interfaces.srv, message_class, MISSION_CLOCK)
 
     # --- topics ------------------------------------------------------------------------------------------------------
 
@@ -158,12 +159,12 @@ class RospyMiddleware(RospyBase):
         """Send heartbeats from a thread of their own: simulated time may stand still, and hooks be slow."""
         publisher = rospy.Publisher(self.name("alive"), Heartbeat, latch=True, queue_size=1)
         self._parts.append(publisher.unregister)
-        begun_ns = time.time_ns()
+        begun_ns = STEADY_CLOCK.now_ns()
 
         def beat() -> None:
             while not self._over.is_set() and not rospy.is_shutdown():
-                heartbeat = Heartbeat(instance_id=instance_id, begun_ns=begun_ns)
-                set_stamp(heartbeat.header.stamp, now_ns())
+                heartbeat = Heartbeat(instance_id=instance_id, begun_ns=STEADY_CLOCK.stamp_ns(begun_ns))
+                set_stamp(heartbeat.header.stamp, MISSION_CLOCK.stamp_ns(MISSION_CLOCK.now_ns()))
                 publisher.publish(heartbeat)
                 self._over.wait(ALIVE_PERIOD_S)
 
@@ -176,7 +177,7 @@ class RospyMiddleware(RospyBase):
         def hear(heartbeat: Any) -> None:
             self.server = heartbeat._connection_header["callerid"]  # noqa: SLF001 - rospy's way to tell the sender
             heard_s[:] = [time.monotonic()]
-            on_heartbeat(heartbeat.instance_id, stamp_ns_of(heartbeat.header.stamp))
+            on_heartbeat(heartbeat.instance_id, MISSION_CLOCK.moment_ns(stamp_ns_of(heartbeat.header.stamp)))
 
         heartbeats = self.listen(self.name("alive"), Heartbeat, hear)
 

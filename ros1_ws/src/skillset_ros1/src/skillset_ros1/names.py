@@ -10,6 +10,7 @@ from typing import Any
 import rospy
 
 from alula.model.ros_types import camel
+from alula.runtime.mission_clock import MissionClock
 
 QUEUE = 2000
 """Messages that wait for a slow subscriber; more than the history of the events, which is sent in one go."""
@@ -53,7 +54,5 @@ def place(namespace: str, skillset: str) -> str:
     return name
 
 
-def now_ns() -> int:
-    """Return the mission clock, nanoseconds."""
-    stamp: int = rospy.get_rostime().to_nsec()
-    return stamp
+MISSION_CLOCK = MissionClock(lambda: not rospy.rostime.is_wallclock(), lambda: int(rospy.get_rostime().to_nsec()))
+"""Of the one node that a process of ROS 1 has."""
