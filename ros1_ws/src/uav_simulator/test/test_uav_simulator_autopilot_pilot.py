@@ -7,6 +7,7 @@ from pymavlink.dialects.v20 import ardupilotmega as mavlink
 from uav_simulator_link import (
     ACCEPTED,
     BRAKE,
+    FAILED,
     GROUND,
     GUIDED,
     LAND,
@@ -34,6 +35,82 @@ def test_a_breached_fence_says_so_and_brakes_or_returns(action, mode):
         held = link.position
         link.run(10.0, each_tick=lambda: link.setpoint(POSITION, (12.0, 0.0, -3.0)))
         assert (link.pilot.mode, link.pilot.armed, link.distance_to(held) < 0.15) == (BRAKE, True, True), "it hovers for ever"
+
+
+# --- 18 the GPS ---
+
+EKF, GPS = mavlink.MAVLINK_MSG_ID_EKF_STATUS_REPORT, mavlink.MAVLINK_MSG_ID_GPS_RAW_INT
+SYS, LOCAL = mavlink.MAVLINK_MSG_ID_SYS_STATUS, mavlink.MAVLINK_MSG_ID_LOCAL_POSITION_NED
+HORIZONTAL = mavlink.EKF_POS_HORIZ_ABS
+
+
+def lose_gps(way):
+    link = Link().flying()
+    link.ask(EKF, GPS, SYS, LOCAL)
+    link.run(0.3)
+    assert link.of("GPS_RAW_INT")[-1].fix_type == 3
+    assert link.of("EKF_STATUS_REPORT")[-1].flags == 831
+    assert link.of("SYS_STATUS")[-1].onboard_control_sensors_health & 0x20
+    link.received.clear()
+    setattr(link.pilot.estimator.satellites, way, True)
+    return link
+
+
+def test_a_gps_that_is_lost_is_told_at_once_and_the_position_after_seven_seconds():
+    for way, told in (("jammed", [1]), ("silent", [])):
+        link = lose_gps(way)
+        link.run(3.0)
+        assert sorted({message.fix_type for message in link.of("GPS_RAW_INT")}) == told
+        assert not link.of("SYS_STATUS")[-1].onboard_control_sensors_health & 0x20
+        assert link.of("EKF_STATUS_REPORT")[-1].flags & HORIZONTAL
+        link.received.clear()
+        link.run(1.3)
+        assert link.of("GPS_RAW_INT")[-1].fix_type == (1 if way == "jammed" else 0)
+        assert link.of("LOCAL_POSITION_NED")
+        link.run(2.9)
+        flags = link.of("EKF_STATUS_REPORT")[-1].flags
+        assert (flags & HORIZONTAL, flags & mavlink.EKF_CONST_POS_MODE) == (0, mavlink.EKF_CONST_POS_MODE)
+        link.received.clear()
+        link.run(0.5)
+        assert not link.of("LOCAL_POSITION_NED")
+
+
+def test_without_a_gps_it_drifts_and_lands_by_itself_after_8_seconds():
+    link = lose_gps("silent")
+    begun = link.position
+    assert link.run_until(lambda: link.pilot.mode == LAND, timeout_s=10.0) == pytest.approx(7.8, abs=0.1)
+    assert 0.3 < math.dist(link.position[:2], begun[:2]) < 1.5, "m: it flies by a position that runs away"
+    link.run(1.1)
+    assert "EKF Failsafe: changed to LAND Mode" in link.texts()
+    assert link.of("HEARTBEAT")[-1].system_status == 5
+    link.received.clear()
+    assert link.command(176, 1, GUIDED) == FAILED
+    assert "Mode change to GUIDED failed: requires position" in link.texts()
+    link.run_until(lambda: not link.pilot.armed, timeout_s=20.0)
+
+
+def test_a_landing_goes_on_without_a_gps_and_is_not_told_of():
+    link = lose_gps("jammed")
+    link.run(5.0)
+    assert link.command(176, 1, LAND) == ACCEPTED
+    link.run(4.0)
+    assert link.of("HEARTBEAT")[-1].system_status == 5
+    assert not [text for text in link.texts() if "EKF" in text]
+    link.run_until(lambda: not link.pilot.armed, timeout_s=20.0)
+
+
+def test_a_gps_that_comes_back_leaves_home_and_origin():
+    link = lose_gps("silent")
+    home = link.pilot.home
+    link.run(7.2)
+    assert not link.pilot.located
+    link.pilot.estimator.satellites.silent = False
+    link.received.clear()
+    link.run(1.0)
+    assert link.pilot.located
+    assert (link.pilot.home, link.pilot.mode) == (home, GUIDED)
+    assert not link.of("GPS_GLOBAL_ORIGIN")
+    assert math.dist(link.pilot.estimate.position, link.position) < 0.05
 
 
 # --- 10 failsafes --------------------------------------------------------------------------------------------------------

@@ -270,15 +270,15 @@ def test_the_barometer_of_an_autopilot_that_is_not_simulated_can_not_be_broken()
     faults = parse_faults("barometer@3", FAULTS)
     assert SensorBoard(faults).modes["barometer"] == "ok"
     with pytest.raises(ConfigError, match="no fault of the barometer: it is the autopilot's"):
-        SensorBoard(faults, absent="barometer")
+        SensorBoard(faults, absent=("barometer",))
     with pytest.raises(ConfigError, match="no fault of the barometer: it is the autopilot's"):
-        SensorBoard([], absent="barometer").set("barometer", "drifting", 0.0)
+        SensorBoard([], absent=("barometer",)).set("barometer", "drifting", 0.0)
 
 
 def test_scheduled_faults_happen_at_their_moment_after_lift_off():
     board = SensorBoard(parse_faults("zed@3,imu", FAULTS))
     assert board.apply_due(0.0, None)
-    assert board.modes == {"zed": "ok", "lidar": "ok", "camera": "ok", "imu": "dead", "barometer": "ok", "motor": "ok"}
+    assert board.modes == {"zed": "ok", "lidar": "ok", "camera": "ok", "imu": "dead", "barometer": "ok", "gps": "ok", "motor": "ok"}
     assert not board.apply_due(100.0, None), "not lifted off yet"
     assert not board.apply_due(12.9, 10.0)
     assert board.apply_due(13.0, 10.0)

@@ -7,7 +7,7 @@ from typing import Protocol
 
 from uav_simulator.autopilot.core import Autopilot
 from uav_simulator.autopilot.endpoint import Endpoint
-from uav_simulator.autopilot.estimator import PERFECT, Barometer
+from uav_simulator.autopilot.estimator import PERFECT, Estimator
 from uav_simulator.autopilot.types import LandedState
 from uav_simulator.frames import Vec3
 from uav_simulator.imperfections import Imperfections
@@ -25,8 +25,8 @@ class Flown(Protocol):
         """The rigid body in the simulated world."""
 
     @property
-    def barometer(self) -> Barometer | None:
-        """What the autopilot measures its height by; None: the autopilot is not the simulator's, and nothing can be done to it."""
+    def estimator(self) -> Estimator | None:
+        """What the autopilot knows its place by; None: the autopilot is not the simulator's, and nothing can be done to it."""
 
     @property
     def landed_state(self) -> LandedState:
@@ -69,9 +69,9 @@ class SimulatedAutopilotVehicle:
         return self.vehicle.body
 
     @property
-    def barometer(self) -> Barometer:
+    def estimator(self) -> Estimator:
         """The simulated autopilot's."""
-        return self.autopilot.barometer
+        return self.autopilot.estimator
 
     @property
     def landed_state(self) -> LandedState:

@@ -16,7 +16,7 @@ from uav_simulator.autopilot.types import LandedState
 from uav_simulator.contacts import ContactMonitor
 from uav_simulator.flown import Flown
 from uav_simulator.imperfections import Imperfections
-from uav_simulator.sensors.faults import SensorBoard, SensorMode
+from uav_simulator.sensors.faults import AUTOPILOTS, SensorBoard, SensorMode
 from uav_simulator.sensors.imu import Imu
 from uav_simulator.sensors.lidar import Lidar
 from uav_simulator.sensors.pose_track import Pose, PoseTrack
@@ -64,7 +64,7 @@ class Simulation:
         self.stereo = StereoPair(self.world, seed, noise=imperfections.pixel_noise, exposure=imperfections.exposure)
         self.lidar = Lidar(self.world, seed, noise_m=imperfections.range_noise_m)
         self.imu = Imu(seed, gyro_bias_rad_s=imperfections.gyro_bias_rad_s, accel_bias_m_s2=imperfections.accel_bias_m_s2)
-        self.sensors = SensorBoard(faults, absent="" if flown.barometer else "barometer")
+        self.sensors = SensorBoard(faults, absent=() if flown.estimator else AUTOPILOTS)
         self.track = PoseTrack()
         self._contacts = ContactMonitor(self.world, flown.body.airframe.radius_m)
         self.lift_off_s: float | None = None
@@ -95,8 +95,10 @@ class Simulation:
             self._distance_m += math.dist(before, body.position)
         self._contacts.step(body, landed_state)
         self.sensors.apply_due(self.now_s, self.lift_off_s)
-        if self.flown.barometer is not None:
-            self.flown.barometer.broken = self.sensors.mode("barometer") is SensorMode.DRIFTING
+        if self.flown.estimator is not None:
+            self.flown.estimator.barometer.broken = self.sensors.mode("barometer") is SensorMode.DRIFTING
+            satellites, gps = self.flown.estimator.satellites, self.sensors.mode("gps")
+            satellites.silent, satellites.jammed = gps is SensorMode.DEAD, gps is SensorMode.JAMMED
         body.stopped_rotor = STOPPED_ROTOR if self.sensors.mode("motor") is SensorMode.STOPPED else None
         self.track.add(self.pose)
         return True

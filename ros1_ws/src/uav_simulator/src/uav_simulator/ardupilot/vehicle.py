@@ -96,7 +96,7 @@ class ArduPilotVehicle:
                 return True
 
     @property
-    def barometer(self) -> None:
+    def estimator(self) -> None:
         """Return None: it is not the simulator's."""
         return None
 

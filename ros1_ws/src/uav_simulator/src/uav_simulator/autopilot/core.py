@@ -29,6 +29,7 @@ SPOOL_UP_S = 2.4
 DISARM_AFTER_LANDING_S = 0.5
 SLOW_LANDING_BELOW_M = 10.0
 MANUAL = (Mode.STABILIZE, Mode.ALT_HOLD)  # need no position
+UNLOCATED = (*MANUAL, Mode.LAND)  # can be flown in the air without a position
 EARLY_S, EARLY_STAY_S = 2.0, 1.4  # a mode that needs a position and is taken so early after power-up does not stay
 PREARM_PERIOD_S = 30.0  # of the texts that say what is missing
 STEERED = (Mode.LOITER, Mode.POSHOLD)  # where the pilot's sticks fly
@@ -62,9 +63,8 @@ class Autopilot:
         self._vehicle = vehicle
         self._boot_before_s = boot_before_s
         self.params = Parameters(params)
-        self._estimator = Estimator(seed, imperfections)
-        self.barometer = self._estimator.barometer
-        self.estimate = self._estimator.step(vehicle.body, 0.0)
+        self.estimator = Estimator(seed, imperfections)
+        self.estimate = self.estimator.step(vehicle.body, 0.0)
         self._position_loop = PositionLoop(airframe, Gains())
         self._touch_down = TouchDown(airframe.hover_thrust_n)
         self._navigator = Navigator(self.params)
@@ -97,9 +97,14 @@ class Autopilot:
         return self.now_s + self._boot_before_s
 
     @property
-    def located(self) -> bool:
-        """Return whether the estimator has a position [4]."""
+    def has_origin(self) -> bool:
+        """Return whether there has been a position since power-up: its origin stays [4, 9]."""
         return self.boot_s >= LOCATED_AFTER_S
+
+    @property
+    def located(self) -> bool:
+        """Return whether the estimator has a position [4, 18]."""
+        return self.has_origin and not self.estimator.satellites.given_up
 
     @property
     def ready(self) -> bool:
@@ -151,6 +156,8 @@ class Autopilot:
         mode = Mode(number)
         if mode is Mode.AUTO:
             return self._refused("Mode change to AUTO failed: init failed")
+        if self.armed and self.has_origin and not self.located and mode not in UNLOCATED:
+            return self._refused(f"Mode change to {mode.name} failed: requires position")
         if mode is not self.mode:
             self._enter(mode)
             early = self.boot_s < EARLY_S and mode not in MANUAL
@@ -261,10 +268,10 @@ class Autopilot:
 
     def step(self, now_s: float, dt_s: float) -> None:
         """Decide and set the vehicle's targets for the next period."""
-        was_located = self.located
+        had_origin = self.has_origin
         self.now_s = now_s
-        self.estimate = self._estimator.step(self._vehicle.body, dt_s)
-        if self.located and not was_located:
+        self.estimate = self.estimator.step(self._vehicle.body, dt_s)
+        if self.has_origin and not had_origin:
             self._notices.append(Notice.ORIGIN)
             self._set_home()
         self._wait_for_readiness()
@@ -272,6 +279,7 @@ class Autopilot:
             self._fail_safe("GCS Failsafe")
         if self.armed and not self.landed and self._failsafes.fence_breaks(self.estimate.position, self.home):
             self._leave_fence()
+        self._watch_position(dt_s)
         self._watch_motors()
         self._follow_sticks()
         self._progress_takeoff()
@@ -338,7 +346,14 @@ class Autopilot:
         if self.armed and self.landed:
             self.disarm()
         elif self.armed and self.mode is not Mode.LAND:
-            self.set_mode(Mode.RTL)
+            self.set_mode(Mode.RTL if self.located else Mode.LAND)
+
+    def _watch_position(self, dt_s: float) -> None:
+        """Land without a position, where the mode needs one; a landing goes on [18]."""
+        flying = self.armed and not self.landed
+        if self._failsafes.position_fails(dt_s, located=self.located or not flying) and self.mode not in UNLOCATED:
+            self.set_mode(Mode.LAND)
+            self._say(Severity.CRITICAL, "EKF Failsafe: changed to LAND Mode")
 
     def _watch_motors(self) -> None:
         """Tell of a motor that has stopped in the air, and go on all the same [19]."""

@@ -6,6 +6,7 @@ import math
 import random
 from dataclasses import dataclass
 
+from uav_simulator.autopilot.satellites import Satellites
 from uav_simulator.frames import Quat, Vec3, wrap_pi
 from uav_simulator.imperfections import Imperfections
 from uav_simulator.vehicle.noise import SlowNoise
@@ -129,6 +130,7 @@ class Estimator:
     def __init__(self, seed: int, imperfections: Imperfections = PERFECT) -> None:
         self._drift, self._leaning = Drift(imperfections, seed), Leaning(imperfections, seed)
         self.barometer = Barometer(imperfections, seed)
+        self.satellites = Satellites(seed)
         self._position = SlowNoise(sigma=0.007, tau_s=20.0, limit=0.017, seed=f"ekf position {seed}")
         self._velocity = SlowNoise(sigma=0.01, tau_s=2.0, limit=0.03, seed=f"ekf velocity {seed}")
         self._yaw = SlowNoise(sigma=math.radians(0.3), tau_s=30.0, limit=math.radians(1.0), seed=f"ekf yaw {seed}")
@@ -138,13 +140,15 @@ class Estimator:
         dp, dv = self._position.step(dt_s), self._velocity.step(dt_s)
         self._drift.step(body, dt_s)
         up_m, climb_m_s = self.barometer.step(dt_s, flying=not body.on_ground)
+        self.satellites.step(dt_s, flying=not body.on_ground)
+        reckoned, reckoned_m_s = self.satellites.offset, self.satellites.velocity
         yaw, drift = self._yaw.step(dt_s)[0] + self._drift.yaw_rad, self._drift.offset
         if body.on_ground:
             dv = (0.0, 0.0, 0.0)  # zero-velocity updates hold the filter while the vehicle stands
         p, v = body.position, body.velocity
         return Estimate(
-            position=(p[0] + dp[0] + drift[0], p[1] + dp[1] + drift[1], p[2] + dp[2] + drift[2] + up_m),
-            velocity=(v[0] + dv[0], v[1] + dv[1], v[2] + dv[2] + climb_m_s),
+            position=(p[0] + dp[0] + drift[0] + reckoned[0], p[1] + dp[1] + drift[1] + reckoned[1], p[2] + dp[2] + drift[2] + up_m),
+            velocity=(v[0] + dv[0] + reckoned_m_s[0], v[1] + dv[1] + reckoned_m_s[1], v[2] + dv[2] + climb_m_s),
             attitude=multiply(multiply(from_yaw(yaw), body.attitude), self._leaning.step(dt_s)),
             rates=body.rates,
             yaw_error_rad=yaw,

@@ -1,4 +1,4 @@
-"""Which of the links to people on the ground are lost [10], and whether the vehicle is beyond its fence [19]."""
+"""Which of the links to people on the ground are lost [10], whether the vehicle is beyond its fence [19], or without a position [18]."""
 
 from __future__ import annotations
 
@@ -6,6 +6,8 @@ import math
 
 from uav_simulator.autopilot.params import Parameters
 from uav_simulator.frames import Vec3
+
+POSITION_LOST_S = 0.8  # without a position, ten checks in a row
 
 
 class Failsafes:
@@ -17,11 +19,17 @@ class Failsafes:
         self.rc_lost = False
         self.gcs_lost = False
         self._beyond = False
+        self._unlocated_s = 0.0
 
     @property
     def active(self) -> bool:
         """Return whether a cause lasts."""
-        return self.rc_lost or self.gcs_lost
+        return self.rc_lost or self.gcs_lost or self.position_lost
+
+    @property
+    def position_lost(self) -> bool:
+        """Return whether the estimator has been without a position for too long."""
+        return self._unlocated_s >= POSITION_LOST_S
 
     def hear_gcs(self, now_s: float) -> bool:
         """Note a heartbeat of the ground station; return whether that ends its failsafe."""
@@ -42,6 +50,12 @@ class Failsafes:
             return False
         self.gcs_lost = now_s - heard > self._params["FS_GCS_TIMEOUT"]
         return self.gcs_lost
+
+    def position_fails(self, dt_s: float, *, located: bool) -> bool:
+        """Return whether the estimator's failsafe begins now, of a vehicle that flies."""
+        was_lost = self.position_lost
+        self._unlocated_s = 0.0 if located else self._unlocated_s + dt_s
+        return self.position_lost and not was_lost
 
     def fence_breaks(self, position: Vec3, home: Vec3 | None) -> bool:
         """Return whether the fence is breached now; once, until the vehicle is inside again."""

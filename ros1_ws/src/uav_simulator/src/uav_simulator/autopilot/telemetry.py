@@ -9,6 +9,8 @@ from typing import Any
 from pymavlink.dialects.v20 import ardupilotmega as mavlink
 
 from uav_simulator.autopilot.core import Autopilot
+from uav_simulator.autopilot.estimator import ALIGNED_AFTER_S
+from uav_simulator.autopilot.satellites import FIX_3D
 from uav_simulator.frames import (
     Vec3,
     frd_from_flu,
@@ -21,9 +23,17 @@ from uav_simulator.frames import (
 ORIGIN: Vec3 = (43.5660, 1.4740, 150.0)  # degrees, degrees, metres above the sea
 EPOCH_US = 1_767_225_600_000_000  # 2026-01-01: the GPS time at which the simulated clock begins
 PREARM_CHECK = 0x10000000
-SENSORS = 0x0020 | 0x0008 | 0x0004 | 0x0002 | 0x0001 | 0x1000 | 0x2000 | 0x200000  # GPS, baro, mag, gyro, accel, xy, z, AHRS
+GPS_SENSOR = 0x0020
+SENSORS = GPS_SENSOR | 0x0008 | 0x0004 | 0x0002 | 0x0001 | 0x1000 | 0x2000 | 0x200000  # GPS, baro, mag, gyro, accel, xy, z, AHRS
 FULL_MV, EMPTY_MV, ENDURANCE_S = 25200, 19800, 1500.0
 CELLS = 6
+SATELLITES = 12
+RELATIVE_FLAGS = (
+    mavlink.EKF_ATTITUDE | mavlink.EKF_VELOCITY_HORIZ | mavlink.EKF_VELOCITY_VERT | mavlink.EKF_POS_VERT_ABS
+)  # known without a position
+LOCATED_FLAGS = (
+    mavlink.EKF_POS_HORIZ_REL | mavlink.EKF_POS_HORIZ_ABS | mavlink.EKF_PRED_POS_HORIZ_REL | mavlink.EKF_PRED_POS_HORIZ_ABS
+)  # with one
 Message = Any  # pymavlink's messages have no types
 
 
@@ -55,6 +65,7 @@ def sys_status(pilot: Autopilot) -> Message:
     """Return SYS_STATUS; the PREARM_CHECK bit says whether the vehicle can be armed."""
     known = SENSORS | PREARM_CHECK
     health = known if pilot.ready else SENSORS & ~0x200000
+    health &= ~(0 if pilot.estimator.satellites.fix == FIX_3D else GPS_SENSOR)
     current_ca = 4500 if not pilot.landed else 50
     return mavlink.MAVLink_sys_status_message(
         known, known, health, 150, battery_mv(pilot), current_ca, round(100.0 * charge(pilot)), 0, 0, 0, 0, 0, 0
@@ -139,10 +150,28 @@ def home_position(pilot: Autopilot) -> Message | None:
 
 def gps_global_origin(pilot: Autopilot) -> Message | None:
     """Return GPS_GLOBAL_ORIGIN, None as long as there is none."""
-    if not pilot.located:
+    if not pilot.has_origin:
         return None
     lat, lon, alt = ORIGIN
     return mavlink.MAVLink_gps_global_origin_message(round(lat * 1e7), round(lon * 1e7), round(alt * 1000))
+
+
+def gps_raw(pilot: Autopilot) -> Message | None:
+    """Return GPS_RAW_INT; None where the receiver says nothing [18]."""
+    fix = pilot.estimator.satellites.fix
+    if fix is None:
+        return None
+    lat, lon, alt = geodetic_from_enu(pilot.estimate.position, ORIGIN) if fix == FIX_3D else (0.0, 0.0, 0.0)
+    seen = SATELLITES if fix == FIX_3D else 0
+    place = (round(lat * 1e7), round(lon * 1e7), round(alt * 1000))
+    return mavlink.MAVLink_gps_raw_int_message(round(pilot.boot_s * 1e6), fix, *place, 121, 200, 65535, 65535, seen)
+
+
+def ekf_status(pilot: Autopilot) -> Message:
+    """Return the message EKF_STATUS_REPORT: what the estimator knows, as flags [18]."""
+    aligned = pilot.boot_s >= ALIGNED_AFTER_S
+    flags = (RELATIVE_FLAGS if aligned else 0) | (LOCATED_FLAGS if pilot.located else mavlink.EKF_CONST_POS_MODE)
+    return mavlink.MAVLink_ekf_status_report_message(flags, 0.05, 0.05, 0.05, 0.05, 0.0)
 
 
 BUILDERS: dict[int, Callable[[Autopilot], Message | None]] = {
@@ -156,6 +185,8 @@ BUILDERS: dict[int, Callable[[Autopilot], Message | None]] = {
     mavlink.MAVLINK_MSG_ID_EXTENDED_SYS_STATE: extended_sys_state,
     mavlink.MAVLINK_MSG_ID_POSITION_TARGET_LOCAL_NED: position_target,
     mavlink.MAVLINK_MSG_ID_BATTERY_STATUS: battery_status,
+    mavlink.MAVLINK_MSG_ID_GPS_RAW_INT: gps_raw,
+    mavlink.MAVLINK_MSG_ID_EKF_STATUS_REPORT: ekf_status,
     mavlink.MAVLINK_MSG_ID_HOME_POSITION: home_position,
     mavlink.MAVLINK_MSG_ID_GPS_GLOBAL_ORIGIN: gps_global_origin,
 }

@@ -63,7 +63,7 @@ class FollowedVehicle:
         return newest_s is not None and newest_s >= now_s
 
     @property
-    def barometer(self) -> None:
+    def estimator(self) -> None:
         """Return None: it is not the simulator's."""
         return None
 

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import threading
-from collections.abc import Sequence
+from collections.abc import Collection, Sequence
 from dataclasses import dataclass
 from enum import Enum
 
@@ -33,6 +33,7 @@ class SensorMode(Enum):
     LATE = "late"  # arrives half a second after its stamp
     FUTURE = "future"  # stamps ten seconds ahead
     DRIFTING = "drifting"  # the height that is measured runs away
+    JAMMED = "jammed"  # a GPS that says that it has no fix
     STOPPED = "stopped"  # a motor of six
 
 
@@ -52,10 +53,13 @@ FAULTS: dict[str, tuple[str, ...]] = {
     "camera": tuple(mode.value for mode in _ALWAYS if mode is not SensorMode.FLICKERING),
     "imu": tuple(mode.value for mode in (*_ALWAYS, SensorMode.BIASED)),
     "barometer": (SensorMode.DRIFTING.value,),
+    "gps": (SensorMode.DEAD.value, SensorMode.JAMMED.value),
     "motor": (SensorMode.STOPPED.value,),
 }
-"""The sensors, each with the ways in which it can fail; the first one counts where none is named. The barometer is the autopilot's. A motor
-is no sensor, but fails alike."""
+"""The sensors, each with the ways in which it can fail; the first one counts where none is named. Barometer and GPS are the autopilot's. A
+motor is no sensor, but fails alike."""
+AUTOPILOTS = {"barometer": "SIM_BARO_DRIFT", "gps": "SIM_GPS1_ENABLE (SIM_GPS_DISABLE in older ones)"}
+"""Those of the autopilot, each with the parameter that breaks it in ArduPilot's own simulator."""
 
 
 @dataclass(frozen=True)
@@ -77,8 +81,8 @@ class _Change:
 class SensorBoard:
     """The sensors' modes. Set from a service's thread, read from the simulation's."""
 
-    def __init__(self, faults: Sequence[FaultRequest], *, absent: str = "") -> None:
-        """``faults`` of the sensors, as `alula.common.faults` reads them with FAULTS; ``absent``: one that can't be broken here."""
+    def __init__(self, faults: Sequence[FaultRequest], *, absent: Collection[str] = ()) -> None:
+        """``faults`` of the sensors, as `alula.common.faults` reads them with FAULTS; ``absent``: those that can't be broken here."""
         self._absent = absent
         for fault in faults:
             self._check(fault.what)
@@ -117,8 +121,8 @@ class SensorBoard:
             self._records.append(FaultRecord(sensor, SensorMode(mode), t_s))
 
     def _check(self, sensor: str) -> None:
-        if sensor == self._absent:
-            raise ConfigError(f"no fault of the {sensor}: it is the autopilot's, which is not simulated; set ArduPilot's SIM_BARO_DRIFT")
+        if sensor in self._absent:
+            raise ConfigError(f"no fault of the {sensor}: it is the autopilot's, which is not simulated; set ArduPilot's {AUTOPILOTS[sensor]}")
 
     def apply_due(self, now_s: float, lift_off_s: float | None) -> bool:
         """Let the scheduled changes happen that are due; return whether one did."""
