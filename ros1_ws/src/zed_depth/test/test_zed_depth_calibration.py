@@ -9,6 +9,7 @@ import numpy as np
 import pytest
 
 from zed_depth import CalibrationError, StereoCalibration
+from zed_depth.calibration import BESIDE_PX
 
 WIDTH, HEIGHT = 480, 270
 
@@ -84,12 +85,25 @@ def test_what_the_raw_image_does_not_show_is_told_apart() -> None:
     """Rectified with a shorter focal length than that of the raw image, the image has a border that no camera saw."""
     raw = {"D": [-0.05, 0.0, 0.0, 0.0, 0.0], "K": [300.0, 0, 240.0, 0, 300.0, 135.0, 0, 0, 1], "fx": 240.0}
     unseen = calibration(info(**raw), info(right=True, **raw)).unseen
-    assert unseen is not None
-    assert unseen.shape == (HEIGHT, WIDTH)
-    assert unseen[:, :25].all()
-    assert unseen[:8].all()
-    assert not unseen[40:-40, 60:-60].any()
-    assert calibration().unseen is None
+    for each in unseen:
+        assert each is not None
+        assert each.shape == (HEIGHT, WIDTH)
+        assert each[:, :25].all()
+        assert each[:8].all()
+        assert not each[40:-40, 60:-60].any()
+    assert calibration().unseen == (None, None)
+
+
+def test_what_one_raw_image_does_not_show_can_not_be_compared_up_to_a_disparity() -> None:
+    whole, narrow = info(), info(right=True, K=[300.0, 0, 240.0, 0, 300.0, 135.0, 0, 0, 1])
+    made = calibration(whole, narrow)
+    assert made.unseen[0] is None
+    assert made.unseen[1] is not None
+    last = int(np.flatnonzero(made.unseen[1][HEIGHT // 2, : WIDTH // 2])[-1])  # of the left border
+    incomparable = made.incomparable(20)
+    assert incomparable is not None
+    assert np.flatnonzero(~incomparable[HEIGHT // 2])[0] == last + BESIDE_PX + 20 + 1
+    assert calibration().incomparable(20) is None
 
 
 NAN_P = [float("nan")] * 12

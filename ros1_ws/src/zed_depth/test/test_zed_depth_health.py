@@ -427,3 +427,19 @@ def test_pairs_without_any_depth_are_unknown_until_there_is_one_again() -> None:
         assert "of the image has a depth" in finding.reason or "too little texture" in finding.reason
     assert rig.finding(StereoPair(4 * NS // 10, noisy(left, 3), noisy(right, 4))).ok
     assert rig.finding(StereoPair(5 * NS // 10, noisy(left, 5), noisy(right, 6))).ok
+
+
+@pytest.mark.parametrize("shown", [0.85, 0.7, 0.55])
+def test_the_border_that_no_raw_image_shows_is_no_texture_without_a_depth(shown) -> None:
+    """Rectified with a shorter focal length, images have a border that repeats what is at the raw ones' edge."""
+    from test_zed_depth_calibration import info
+
+    rig = StereoRig(ZedSettings())
+    for side in ("left", "right"):
+        rig.take_info(side, info(right=side == "right", fx=240.0 * shown, K=[240.0, 0, 240.0, 0, 240.0, 135.0, 0, 0, 1]))
+    left, right = wall_pair(9.5, seed=1)
+    good = [(noisy(left, 2 * k), noisy(right, 2 * k + 1)) for k in range(4)]
+    findings = [rig.finding(StereoPair(k * NS // 2, *pair)) for k, pair in enumerate(good)]
+    assert all(finding.ok for finding in findings), [finding.reason for finding in findings]
+    strange = rig.finding(StereoPair(2 * NS, noisy(left, 9), noisy(gained(right, 4.0), 10)))
+    assert not strange.ok

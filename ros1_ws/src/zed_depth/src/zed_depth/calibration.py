@@ -15,6 +15,7 @@ if TYPE_CHECKING:
 
     Floats = NDArray[np.float64]
     Gray = NDArray[np.uint8]
+    Mask = NDArray[np.bool_]
 
 ROW_TOLERANCE_PX = 1.0  # by which the rows of both projections may disagree
 FOCAL_LIMITS = (0.2, 10.0)  # of the width: views of 136 and of 6 degrees
@@ -22,6 +23,7 @@ BASELINE_LIMITS_M = (0.005, 3.0)
 SIZE_LIMITS_PX = (32, 16_384)
 CENTRE_LIMITS = (0.0, 1.0)  # of the size: the principal point of a cropped or convergent pair may be anywhere in the image, along one axis
 SAME_SIZE = (0.3, 0.7)  # of the size: with half of its P, or twice, the point is beyond these to one side along both axes
+BESIDE_PX = 5  # of what a raw image does not show: half of a block that is matched, and of a patch that is compared
 LEAST_SEEN = 0.25  # of a rectified image that its raw image must show
 FISHEYE = "equidistant"
 
@@ -201,15 +203,28 @@ class StereoCalibration:
         self.divisor = max(1, round(cameras[0].width / max_width_px))
         self.geometry = self.full.scaled(self.divisor)
         self._maps = tuple(None if rectified or camera.rectified else camera.maps() for camera in cameras)
-        self.unseen = self._unseen(cameras[0])
-        """Which pixels of the prepared left image its raw image does not show, (h, w), or None where it shows all of them."""
+        self.unseen = tuple(self._unseen(camera, maps) for camera, maps in zip(cameras, self._maps, strict=True))
+        """Which pixels of the prepared left and right image their raw image does not show, (h, w) each; None where it shows all of them."""
 
-    def _unseen(self, left: Camera) -> NDArray[np.bool_] | None:
-        if self._maps[0] is None:
+    def _unseen(self, camera: Camera, maps: tuple[NDArray[np.int16], NDArray[np.uint16]] | None) -> Mask | None:
+        if maps is None:
             return None
-        shown = self._scaled(255 * left.shown(self._maps[0][0]).astype(np.uint8))
-        unseen: NDArray[np.bool_] = shown < 255
+        unseen: Mask = self._scaled(255 * camera.shown(maps[0]).astype(np.uint8)) < 255
         return unseen if unseen.any() else None
+
+    def incomparable(self, reach_px: int) -> Mask | None:
+        """Return which pixels (h, w) of the left image can't be found in the right one up to a disparity, or None.
+
+        Where a raw image shows nothing, the prepared one repeats its border: these pixels, those beside them, and those that would be there
+        in the right image.
+        """
+        beside = np.ones((2 * BESIDE_PX + 1, 2 * BESIDE_PX + 1), np.uint8)
+        # The right image's are carried to the right alone, as far as a disparity is: so the anchor is the kernel's last column.
+        reached = np.ones((1, max(0, reach_px) + 1), np.uint8)
+        left, right = (None if each is None else cv2.dilate(each.astype(np.uint8), beside) for each in self.unseen)
+        right = None if right is None else cv2.dilate(right, reached, anchor=(reached.shape[1] - 1, 0))
+        masks = [np.asarray(each) > 0 for each in (left, right) if each is not None]
+        return np.any(masks, axis=0) if masks else None
 
     def prepared(self, left: Gray, right: Gray) -> tuple[Gray, Gray]:
         """Return both images ready for matching; raise CalibrationError when they have another size than the camera_info says."""

@@ -43,9 +43,10 @@ class Fit:
     doubt: str = ""
 
 
-def fit_of(disparity_px: Pixels, left: Gray, right: Gray, *, last_px: float, noise: float) -> Fit:
+def fit_of(disparity_px: Pixels, left: Gray, right: Gray, *, last_px: float, noise: float, incomparable: Mask | None = None) -> Fit:
     """Return whether the images fit at the disparities (h, w) of the left one; ``last_px`` is the near limit, ``noise`` in grey levels.
 
+    ``incomparable`` (h, w) are pixels that a raw image does not show: the repeated border there is no texture.
     Where a half of the image does not fit, it is old, or missing, or the vehicle stands on the ground, nearer than can be seen: a doubt.
     """
     pixels = disparity_px[::EVERY_ROW]
@@ -55,6 +56,8 @@ def fit_of(disparity_px: Pixels, left: Gray, right: Gray, *, last_px: float, noi
     textured, alike = _compared(pixels, left[::EVERY_ROW], right[::EVERY_ROW], noise)
     textured &= cv2.dilate(near.astype(np.uint8), np.ones(NEAR_PATCH[::-1], np.uint8)) == 0
     textured[:, : int(UNSEEN * textured.shape[1])] = False
+    if incomparable is not None:
+        textured &= ~incomparable[::EVERY_ROW]
     known = textured & np.isfinite(pixels)
     share, known_share = _shares(textured, known, alike)
     if share < FIT or known_share < KNOWN_FIT:

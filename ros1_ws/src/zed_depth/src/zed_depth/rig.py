@@ -28,6 +28,8 @@ if TYPE_CHECKING:
     from zed_depth.pairing import StereoPair
     from zed_depth.settings import ZedSettings
 
+    Gray = NDArray[np.uint8]
+    Mask = NDArray[np.bool_]
 
 MEND_SHARE = 0.6  # of max_vertical_px
 JUMPED_PX = 0.7  # the middle change of the disparities from pair to pair; with more, it is in doubt
@@ -75,9 +77,10 @@ class StereoRig:
         self._matching = Lock()
         self._calibration: StereoCalibration | None = None
         self._info_finding = unsure(FaultKind.INFO, "no camera_info of both sides yet")
-        self._matcher: tuple[StereoGeometry, StereoMatcher] | None = None
+        self._matcher: tuple[StereoCalibration, StereoMatcher, Mask | None] | None = None
         self._view = FINE
         self._view_ns: int | None = None
+        self._judged_ns: int | None = None  # the last pair that was held against another one, and of which it is known whether it fits
         self._sharpness: float | None = None  # of the images that were last held against each other
         self._valid = FINE  # of the last pair of which the depth was asked for
         self._fit = FINE  # of the last pair that was matched
@@ -131,21 +134,28 @@ class StereoRig:
         except CalibrationError as error:
             return broken(FaultKind.INFO, str(error))
         if prepared is not None:
-            view = view_of(*prepared, offset_px=calibration.geometry.offset_px, limits=self._view_limits())
-            self._view = view.finding
-            if view.landmarks is not None and view.right is not None:
-                if self._vergence.look(pair.stamp_ns, view.landmarks, view.right, calibration.geometry, self._camera_pose):
-                    self._views.clear()
-                apart = self._views.take(pair.stamp_ns, view.landmarks, self._camera_pose)
-                if apart is not None:
-                    compared = Compared.of(*apart, calibration.geometry)
-                    self._vergence.compare(compared, calibration.geometry)
-                    self._scale.compare(compared, calibration.geometry)
-            self._sharpness = self._images.sharpness
-            with self._lock:
-                self._view_ns = pair.stamp_ns
+            self._view_checked(pair.stamp_ns, prepared, calibration.geometry)
         with self._lock:
             return first_trouble(self._view, self._vergence.finding, self._scale.finding, self._fit, self._valid)
+
+    def _view_checked(self, stamp_ns: int, images: tuple[Gray, Gray], geometry: StereoGeometry) -> None:
+        """Hold both images (h, w) against each other, and their features against those of views before."""
+        view, judged = view_of(*images, offset_px=geometry.offset_px, limits=self._view_limits()), True
+        self._view = view.finding
+        if view.landmarks is not None and view.right is not None:
+            knocked = self._vergence.look(stamp_ns, view.landmarks, view.right, geometry, self._camera_pose)
+            judged = knocked is not None
+            if knocked:
+                self._views.clear()
+            apart = self._views.take(stamp_ns, view.landmarks, self._camera_pose)
+            if apart is not None:
+                compared = Compared.of(*apart, geometry)
+                self._vergence.compare(compared, geometry)
+                self._scale.compare(compared, geometry)
+        self._sharpness = self._images.sharpness
+        with self._lock:
+            self._view_ns = stamp_ns
+            self._judged_ns = stamp_ns if judged else self._judged_ns
 
     def _view_limits(self) -> ViewLimits:
         """Return the limits; once found off, the rows must be clearly right again, or what is at the limit would flap."""
@@ -156,8 +166,8 @@ class StereoRig:
     def _due(self, pair: StereoPair) -> bool:
         """Return whether both images must be held against each other now."""
         with self._lock:
-            checked_ns, doubted_ns = self._view_ns, self._doubted_ns
-        if checked_ns is None or not self._view.ok or (doubted_ns is not None and checked_ns <= doubted_ns):
+            checked_ns, doubted_ns, judged_ns = self._view_ns, self._doubted_ns, self._judged_ns
+        if checked_ns is None or not self._view.ok or (doubted_ns is not None and (judged_ns is None or judged_ns <= doubted_ns)):
             return True
         if self._sharpness is not None and self._images.sharpness < SHARPNESS_FELL * self._sharpness:
             return True
@@ -194,12 +204,12 @@ class StereoRig:
         """Match a pair, and judge whether its images fit; raise CalibrationError."""
         geometry, images = calibration.geometry, calibration.prepared(pair.left, pair.right)
         with self._matching:
-            matcher = self._matcher_for(geometry)
+            matcher, incomparable = self._matcher_for(calibration)
             disparity = matcher.disparity(*images)
             noise = matcher.noise
-        if calibration.unseen is not None:
-            disparity[calibration.unseen] = np.nan
-        fit = fit_of(disparity, *images, last_px=matcher.search.last, noise=noise)
+        if calibration.unseen[0] is not None:
+            disparity[calibration.unseen[0]] = np.nan
+        fit = fit_of(disparity, *images, last_px=matcher.search.last, noise=noise, incomparable=incomparable)
         with self._lock:
             self._fit, self._matched_ns = fit.finding, pair.stamp_ns
             if not self._valid.ok:
@@ -208,8 +218,8 @@ class StereoRig:
 
     def _doubt(self, shares: dict[str, float], sample: NDArray[np.float32], stamp_ns: int) -> str:
         """Return why a pair with these shares of pixels and these disparities is in doubt, or an empty text; with the lock held."""
-        before, doubted_ns, checked_ns = self._shares, self._doubted_ns, self._view_ns
-        fits = doubted_ns is not None and checked_ns is not None and doubted_ns < checked_ns <= stamp_ns
+        before, doubted_ns, judged_ns = self._shares, self._doubted_ns, self._judged_ns
+        fits = doubted_ns is not None and judged_ns is not None and doubted_ns < judged_ns <= stamp_ns
         again = doubted_ns is not None and stamp_ns < doubted_ns  # the clock went back
         fell = [name for name in before if shares[name] < SHARE_FELL * before[name]]
         jump_px = 0.0 if self._sample is None else middle_change(self._sample, sample)
@@ -228,11 +238,13 @@ class StereoRig:
             self._valid = FINE
             self._shares, self._sample, self._doubted_ns = {}, None, None
 
-    def _matcher_for(self, geometry: StereoGeometry) -> StereoMatcher:
-        if self._matcher is None or self._matcher[0] != geometry:
-            search = DisparityRange.to_see(geometry, self._settings.near_depth_m)
-            self._matcher = geometry, StereoMatcher(self._settings.matcher, search)
-        return self._matcher[1]
+    def _matcher_for(self, calibration: StereoCalibration) -> tuple[StereoMatcher, Mask | None]:
+        """Return the matcher of a calibration, and which pixels of the left image (h, w) it can't find in the right one."""
+        if self._matcher is None or self._matcher[0] is not calibration:
+            search = DisparityRange.to_see(calibration.geometry, self._settings.near_depth_m)
+            matcher = StereoMatcher(self._settings.matcher, search)
+            self._matcher = calibration, matcher, calibration.incomparable(int(np.ceil(search.last)))
+        return self._matcher[1:]
 
 
 def middle_change(before: NDArray[np.float32], now: NDArray[np.float32]) -> float:

@@ -2,8 +2,9 @@
 
 No single pair shows it, unless what is far away seems to be beyond infinity (`view_health`). It shows in two ways:
 
-- A knock changes the disparities of all features at once. How features moved in the left image since the view before tells how the vehicle
-  did, so what each disparity should be now: what the right camera sees of it instead is the knock, also while the vehicle stands.
+- A knock changes the disparities of all features at once: by the same, where the sensor has moved behind its lens, or by more towards the
+  edges, as a turn does. How features moved in the left image since the view before tells how the vehicle did, so what each disparity should
+  be now: what the right camera sees of it instead is the knock, also while the vehicle stands.
 - In flight, what is at a depth moves as that depth says. Disparities that are too large by a constant make what is far move as if it were
   near: the motion of the features tells the constant beside the scale of the depths, however long it has been there.
 """
@@ -67,13 +68,25 @@ class VergenceJudge:
         self.finding: Finding = FINE
         """What was found last: what is turned stays so until a knock, or motion, shows otherwise."""
 
-    def look(self, stamp_ns: int, landmarks: Landmarks, right: Gray, geometry: StereoGeometry, camera_pose: CameraPose) -> bool:
-        """Take a view's features, and its right image by the light of the left one; return whether there was a knock since the last."""
-        before, self._before = self._before, (stamp_ns, landmarks)
+    def look(self, stamp_ns: int, landmarks: Landmarks, right: Gray, geometry: StereoGeometry, camera_pose: CameraPose) -> bool | None:
+        """Take a view's features, and its right image by the light of the left one; return whether there was a knock since the last judged.
+
+        None where that can't be said yet: the next view is then held against the same one, for a view after the knock shows none any more.
+        A view is given up when it is too old, or when the left camera sees too little of it.
+        """
+        before = self._before
         if before is None or not 0 < stamp_ns - before[0] <= LONGEST_NS:
+            self._before = (stamp_ns, landmarks)
             return False
-        knock_px = knock_of(before[1], landmarks.image, right, _told(before[0], stamp_ns, camera_pose), geometry)
-        if knock_px is None or abs(knock_px) <= self._limits.max_knock_px:
+        seen = SeenAgain.of(before[1], landmarks.image, _told(before[0], stamp_ns, camera_pose), geometry)
+        if seen is None:
+            self._before = (stamp_ns, landmarks)
+            return None
+        knock_px = seen.change_px(landmarks.image, right, geometry)
+        if knock_px is None:
+            return None
+        self._before = (stamp_ns, landmarks)
+        if abs(knock_px) <= self._limits.max_knock_px:
             return False
         self._knocked_px += knock_px
         self._estimates.clear()
@@ -112,36 +125,66 @@ def _told(earlier_ns: int, later_ns: int, camera_pose: CameraPose) -> Floats | N
     return None if earlier is None or later is None else np.asarray(np.linalg.inv(later) @ earlier, dtype=np.float64)
 
 
-def knock_of(
-    earlier: Landmarks,
-    left: Gray,
-    right: Gray,
-    T_later_earlier: Floats | None,  # noqa: N803 -- T_target_source
-    geometry: StereoGeometry,
-) -> float | None:
-    """Return by how many pixels all disparities have changed at once since the landmarks were seen, or None where that can't be said."""
-    if T_later_earlier is None:
-        seen, places = earlier, followed(earlier.image, left, earlier.places, earlier.places, levels=LEVELS)
-        seen, places = seen.only(np.isfinite(places[:, 0])), places[np.isfinite(places[:, 0])]
-        T_later_earlier = NOT_TURNED  # noqa: N806
-    else:
-        seen, places = tracked(earlier, left, T_later_earlier, geometry)
-    if turned_far(T_later_earlier) or len(places) < LEAST_FOLLOWED:
-        return None
-    inverse_m = (seen.disparity_px - geometry.offset_px) / (geometry.fx * geometry.baseline_m)
-    rays = predicted(seen, T_later_earlier, geometry)[0]
-    motion = motion_of(rays, inverse_m[:, None] * np.eye(3)[:, None], places, geometry, np.array([T_later_earlier[:3, 3]]))
-    if motion is None:
-        return None
-    expected_px = (seen.disparity_px - geometry.offset_px) / motion.rays[:, 2] + geometry.offset_px
-    found = followed(left, right, places, places - np.stack([expected_px, np.zeros_like(expected_px)], axis=1), levels=LEVELS)
-    with np.errstate(invalid="ignore"):  # of those that are not found
-        usable = (motion.weights > 0.5) & (np.abs(found[:, 1] - places[:, 1]) < ROW_PX)
-    change = (places[:, 0] - found[:, 0] - expected_px)[usable]
+@dataclass(frozen=True)
+class SeenAgain:
+    """Landmarks that the left camera sees again: their places (N, 2) in its image, and the disparities (N,) that they should have now."""
+
+    places: Floats
+    expected_px: Floats
+
+    @classmethod
+    def of(
+        cls,
+        earlier: Landmarks,
+        left: Gray,
+        T_later_earlier: Floats | None,  # noqa: N803 -- T_target_source
+        geometry: StereoGeometry,
+    ) -> SeenAgain | None:
+        """Follow the landmarks to a later left image; None where too few are seen again, or the camera has turned far."""
+        if T_later_earlier is None:
+            seen, places = earlier, followed(earlier.image, left, earlier.places, earlier.places, levels=LEVELS)
+            seen, places = seen.only(np.isfinite(places[:, 0])), places[np.isfinite(places[:, 0])]
+            T_later_earlier = NOT_TURNED  # noqa: N806
+        else:
+            seen, places = tracked(earlier, left, T_later_earlier, geometry)
+        if turned_far(T_later_earlier) or len(places) < LEAST_FOLLOWED:
+            return None
+        inverse_m = (seen.disparity_px - geometry.offset_px) / (geometry.fx * geometry.baseline_m)
+        rays = predicted(seen, T_later_earlier, geometry)[0]
+        motion = motion_of(rays, inverse_m[:, None] * np.eye(3)[:, None], places, geometry, np.array([T_later_earlier[:3, 3]]))
+        if motion is None:
+            return None
+        sure = motion.weights > 0.5
+        expected_px = (seen.disparity_px - geometry.offset_px) / motion.rays[:, 2] + geometry.offset_px
+        return cls(places[sure], expected_px[sure])
+
+    def change_px(self, left: Gray, right: Gray, geometry: StereoGeometry) -> float | None:
+        """Return by how many pixels, in the middle of the image, all disparities are greater than expected; None where few agree.
+
+        Of a sensor that moved behind its lens all change alike. Of a camera that turned about its vertical axis they change by 1 + u^2 of
+        that, and the rows by u v, at (u, v) focal lengths from the right image's centre.
+        """
+        expected = np.stack([self.expected_px, np.zeros_like(self.expected_px)], axis=1)
+        found = followed(left, right, self.places, self.places - expected, levels=LEVELS)
+        known = np.isfinite(found[:, 0])
+        change = (self.places - found - expected)[known]
+        u, v = ((found[known] - [geometry.cx - geometry.offset_px, geometry.cy]) / [geometry.fx, geometry.fy]).T
+        moved, turned = np.stack([np.ones_like(u), np.zeros_like(u)], axis=1), np.stack([1.0 + u * u, u * v], axis=1)
+        share, change_px = max(_agreeing(change, way) for way in (moved, turned))
+        return change_px if share >= LEAST_AGREEING else None
+
+
+def _agreeing(change: Floats, way: Floats) -> tuple[float, float]:
+    """Return the share of changes (N, 2) that are the same multiple of their ways (N, 2), and that multiple; of few the share is 0."""
     if len(change) < LEAST_FOLLOWED:
-        return None
-    middle = float(np.median(change))
-    return middle if np.mean(np.abs(change - middle) < AGREE_PX) >= LEAST_AGREEING else None
+        return 0.0, 0.0
+    rough = float(np.median(change[:, 0] / way[:, 0]))
+    usable = np.abs(change[:, 1] - rough * way[:, 1]) < ROW_PX
+    if np.count_nonzero(usable) < LEAST_FOLLOWED:
+        return 0.0, 0.0
+    multiple = change[usable, 0] / way[usable, 0]
+    middle = float(np.median(multiple))
+    return float(np.mean(np.abs(multiple - middle) * way[usable, 0] < AGREE_PX)), middle
 
 
 def offset_of(
