@@ -82,6 +82,7 @@ class Repair:
         text: the mission's file with it.
         tried: how many branches were judged before it.
         not_asked: properties of the mission that ask for nodes which it has not.
+        left: what `check` finds in the mission as it is, and in the repaired one, too.
         before, after: what becomes of the mission by faults, without and with it.
         not_looked_at: faults, alone or one after another, of which that was not found out: too many situations, or no time left.
     """
@@ -90,6 +91,7 @@ class Repair:
     text: str
     tried: int
     not_asked: tuple[str, ...]
+    left: tuple[str, ...]
     before: dict[tuple[str, ...], Fate] = field(default_factory=dict)
     after: dict[tuple[str, ...], Fate] = field(default_factory=dict)
     not_looked_at: tuple[tuple[str, ...], ...] = ()
@@ -256,7 +258,8 @@ class Search:
         if not whole.complete:
             return "not all its runs in which hooks raise, managers die, or somebody aborts or pauses it were looked at"
         written, _ = branch.written(self._subject)
-        return Repair(branch, written, 0, tuple(not_asked))
+        left = dict.fromkeys(one.message for one in whole.findings if one.severity is not Severity.NOTE)
+        return Repair(branch, written, 0, tuple(not_asked), tuple(left))
 
     def _why_impossible(self, text: str, failing: Failing) -> list[str]:
         """Return why no tree can have done what a skill is for that the mission needs; empty where one might."""

@@ -32,6 +32,7 @@ def _of_repair(repair: Repair, what: str, odds: Both | None, reasons: Sequence[s
     lines += [f"  it can't be accomplished then, and ends safely: {one}" for one in reasons]
     lines += ["", branch.as_xml(), ""] if branch.tree is not None else []
     lines += [f"  not proved: the property `{one}` asks for a node that the mission has not" for one in repair.not_asked]
+    lines += [f"  left as it was: {one}" for one in repair.left]
     for faults, after in repair.after.items():
         before = repair.before[faults]
         if len(faults) == 1 or after.survives or not after.safe:
@@ -60,6 +61,7 @@ def as_dict(answer: Answer, odds: Both | None) -> dict[str, object]:
     branch = {"name": repair.branch.name, "nodes": repair.branch.size, "at": places, "wraps": repair.branch.wraps}
     found["repair"] = {**branch, "xml": repair.branch.as_xml(), "use": "".join(repair.branch.use.pieces())}
     found["not_asked"] = list(repair.not_asked)
+    found["left"] = list(repair.left)
     found["not_looked_at"] = [list(one) for one in repair.not_looked_at]
     found["fates"] = [{"before": repair.before[one].as_dict(), "after": fate.as_dict()} for one, fate in repair.after.items()]
     if odds is not None:
