@@ -35,6 +35,7 @@ TYPED = [
     "tools/bridge_tools",
     "tools/skill_bench",
     "tools/start_bench",
+    "tools/folder_bench",
     "tools/flight_bench",
     "tools/console_bench",
     "tools/perception_bench",

@@ -1,0 +1,1 @@
+"""Measures the check of folders of trees."""
