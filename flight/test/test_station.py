@@ -119,6 +119,23 @@ def test_missions_of_the_page_are_not_the_deployments_to_end(deployment, places)
     assert parts["page"].words[-5:] == ("--host", "10.0.0.2", "--port", "80", "--plain")
 
 
+def test_managers_are_told_the_silences_that_the_deployment_gives_their_resources(deployment, places):
+    managers = {"base": ("python", "-m", "x"), "base2": ("python", "-m", "y")}
+    given = replace(deployment, managers=managers, silences={"base.link": 4.0, "base2.estop": 1.5})
+    parts = {part.name: part.words for part in parts_of(given, places, "id", {})}
+    assert parts["base"][-5:] == ("x", "--ros-args", "-p", "silence.link:=4.0", "__name:=base")
+    assert parts["base2"][-4:] == ("--ros-args", "-p", "silence.estop:=1.5", "__name:=base2")
+
+
+def test_a_silence_of_what_has_none_in_its_model_begins_nothing(robot, capsys):
+    path = robot / "deployments/robot.yaml"
+    text = path.read_text(encoding="utf-8")
+    path.write_text(f"{text}\nsilence: {{rover.lnk: 4}}\n", encoding="utf-8")
+    assert commands(["up", "robot"]) == 2
+    assert "`silence`: rover.lnk has no `silence` in its model; did you mean `rover.link`?" in capsys.readouterr().err
+    assert not (robot / ".alula/up/robot" / states.FILE).exists()
+
+
 def test_the_bridges_configuration_is_the_robots_file_or_what_set_up_has_generated(deployment, places):
     named = replace(deployment, bridge="rover_bridge.yaml")
     (places.robot / "generated/other_bridge.yaml").touch()

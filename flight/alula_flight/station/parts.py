@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import os
 import re
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass
 from ipaddress import ip_address
 from pathlib import Path
@@ -13,6 +13,8 @@ from alula.common.deployments import Deployment, DeploymentError, Discovery, Pag
 from alula.common.processes import NAMESPACE_VARIABLE, RUN_ID_VARIABLE
 from alula.common.robots import RobotFolder
 from alula.common.runs import up_folder
+from alula.common.suggestions import nearest
+from alula.model.model import Skillset
 
 DEPLOYMENT_VARIABLE = "ALULA_DEPLOYMENT"
 """In the environment of a deployment's parts: its name, which ``alula run`` takes where none is given; so the page's missions fly on it."""
@@ -115,7 +117,9 @@ def parts_of(deployment: Deployment, places: Places, run_id: str, caller: Mappin
         stats = str(places.logs / "bridge.json")
         words = ("python", "-m", "ros_bridge", "--config", str(bridge_file(deployment, places)), "--stats", stats)
         parts.append(Part("bridge", places.in_ros2("ros_bridge", *words), ours))
-    parts += [Part(name, places.in_ros2(name, *words), ours) for name, words in deployment.managers.items()]
+    parts += [
+        Part(name, places.in_ros2(name, *words, *silence_words(deployment, name)), ours) for name, words in deployment.managers.items()
+    ]
     if deployment.topics:
         parts.append(
             Part("recorder", places.in_ros1(*recording(places.bags / deployment.name, deployment.topics, all_the_time=True)), ours)
@@ -126,6 +130,21 @@ def parts_of(deployment: Deployment, places: Places, run_id: str, caller: Mappin
         console = ("python", "-m", "skill_panel.console", "--host", page.address, "--port", str(page.port), *plainly)
         parts.append(Part("page", (str(places.root / "setup/in_ros2"), *console), plain))
     return parts
+
+
+def silence_words(deployment: Deployment, skillset: str) -> list[str]:
+    """Return what the managers of a skillset are told of the silences that the deployment gives its resources."""
+    given = {name.removeprefix(f"{skillset}."): s for name, s in deployment.silences.items() if name.startswith(f"{skillset}.")}
+    return ["--ros-args", *(word for name, s in given.items() for word in ("-p", f"silence.{name}:={s!r}"))] if given else []
+
+
+def check_silences(deployment: Deployment, skillsets: Iterable[Skillset]) -> None:
+    """Refuse silences of what has none in the model: nothing could follow them; raises DeploymentError."""
+    known = [f"{skillset.name}.{one.name}" for skillset in skillsets for one in skillset.resources if one.silence_s is not None]
+    for name in deployment.silences:
+        if name not in known:
+            hint = nearest(name, known) or "no resource has one"
+            raise DeploymentError(f"{deployment.path}: `silence`: {name} has no `silence` in its model; {hint}")
 
 
 def recording(path: Path, topics: Sequence[str], *, all_the_time: bool) -> tuple[str, ...]:

@@ -14,9 +14,10 @@ from alula.common.deployments import Deployment, load_deployment
 from alula.common.errors import AlulaError
 from alula.common.files import write_json
 from alula.common.robots import find_robot
+from alula.language.fleet import load_models
 from alula_flight.station import state as states
 from alula_flight.station.keeper import end_all, read_wanted
-from alula_flight.station.parts import Places, places_of
+from alula_flight.station.parts import Places, check_silences, places_of
 from alula_flight.station.state import StationState, living
 
 UP_S, DOWN_S = 60.0, 120.0  # wall clock, until all parts have lived for a moment, and until all have ended
@@ -34,6 +35,7 @@ class Station:
 
     def __init__(self, name: str) -> None:
         robot = find_robot()
+        self._robot = robot
         self.deployment: Deployment = load_deployment(name, robot)
         self.places: Places = places_of(self.deployment, robot)
 
@@ -66,7 +68,8 @@ class Station:
         return states.holder(self.folder / states.MISSION_LOCK)
 
     def begin(self, until: int = 0) -> None:
-        """Have a keeper start what does not run; with ``until`` it ends with that process. Raises StationError."""
+        """Have a keeper start what does not run; with ``until`` it ends with that process. Raises AlulaError."""
+        self._check()
         self.places.logs.mkdir(parents=True, exist_ok=True)
         words = [sys.executable, "-m", "alula_flight.station.keeper", self.deployment.name, *([f"--until={until}"] if until else [])]
         log = self.places.logs / KEEPER_LOG
@@ -78,12 +81,17 @@ class Station:
             raise StationError(lines[-1].removeprefix("alula up: ") if lines else f"the keeper ended with {keeper.returncode}")
 
     def ask(self, restart: Iterable[str] = ()) -> None:
-        """Have the keeper read the deployment again, start these parts again, and those that are down; raises StationError."""
+        """Have the keeper read the deployment again, start these parts again, and those that are down; raises AlulaError."""
+        self._check()
         number = read_wanted(self.folder)[1] + 1
         write_json(self.folder / states.WANTED, {"restart": sorted(restart), "number": number})
         os.kill(StationState.load(self.folder).keeper, signal.SIGHUP)
         if not self._wait(lambda: StationState.load(self.folder).answered >= number, UP_S):
             raise StationError(f"the keeper has not answered within {UP_S:g} s; {self.places.logs / KEEPER_LOG} says what it does")
+
+    def _check(self) -> None:
+        if self.deployment.silences:
+            check_silences(self.deployment, load_models(self._robot).skillsets)
 
     def settle(self) -> StationState:
         """Wait until each part has lived for a moment, or will not; return how they are."""

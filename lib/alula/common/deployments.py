@@ -19,12 +19,14 @@ from alula.common.robots import RobotError, RobotFolder, find_robot
 from alula.common.suggestions import nearest
 
 FOLDER = "deployments"
-KEYS = ("about", "ros1", "ros2", "managers", "bridge", "record", "page")
+KEYS = ("about", "ros1", "ros2", "managers", "silence", "bridge", "record", "page")
 ROS1_KEYS, ROS2_KEYS = ("master", "address"), ("domain", "discovery", "peers", "namespace")
 RECORD_KEYS, PAGE_KEYS = ("topics", "disk_gb"), ("users", "address", "port")
 LOOPBACK = "127.0.0.1"
 PAGE_PORT, MAX_PORT = 8440, 65535
 DISK_GB, MAX_DISK_GB = 20.0, 1e6
+SHORTEST_SILENCE_S, LONGEST_SILENCE_S = 1.0, 3600.0
+"""Of a resource whose reporter is not heard of, in a model or a deployment; reporters beat twice a second."""
 EnumT = TypeVar("EnumT", bound=Enum)
 _WORD = re.compile(r"[a-z][a-z0-9_]*")
 _TOPIC = re.compile(r"/[A-Za-z][A-Za-z0-9_/]*")
@@ -75,6 +77,8 @@ class Deployment:
         peers: addresses of computers that are found without multicast.
         namespace: what the robot's names in ROS 2 begin with, as ``/rover``; empty: nothing.
         managers: the commands that serve the skillsets here, each as words, by the skillset's name.
+        silences: seconds after which a resource whose reporter is not heard of is unknown, by its name as ``rover.estop``, where this link
+            needs another time than the model says.
         bridge: the bridge's configuration: one that set-up generates, by its name, or a file of the robot; empty: it runs elsewhere.
         topics: of ROS 1, recorded all the time and in each mission; none: there is no recorder.
         disk_gb: what the missions and recordings of this deployment may take together, 1e9 bytes.
@@ -91,6 +95,7 @@ class Deployment:
     peers: tuple[str, ...] = ()
     namespace: str = ""
     managers: Mapping[str, tuple[str, ...]] = field(default_factory=dict)
+    silences: Mapping[str, float] = field(default_factory=dict)
     bridge: str = ""
     topics: tuple[str, ...] = ()
     disk_gb: float = DISK_GB
@@ -155,6 +160,7 @@ def read_deployment(path: Path) -> Deployment:
         peers=tuple(_host(one, "a peer") for one in ros2["peers"].elements()) if "peers" in ros2 else (),
         namespace=_namespace(ros2["namespace"]) if "namespace" in ros2 else "",
         managers=_managers(said["managers"]) if "managers" in said else {},
+        silences=_silences(said["silence"], said.get("managers")) if "silence" in said else {},
         bridge=said["bridge"].text("`bridge`") if "bridge" in said else "",
         topics=tuple(_topic(one) for one in record["topics"].elements()) if "topics" in record else (),
         disk_gb=record["disk_gb"].number("`disk_gb`", 0.1, MAX_DISK_GB) if "disk_gb" in record else DISK_GB,
@@ -245,6 +251,19 @@ def _managers(part: Located) -> dict[str, tuple[str, ...]]:
         if not words:
             raise command.wrong(f"the command of {name} is empty; write one as python -m my_robot.hooks")
         found[name] = tuple(words)
+    return found
+
+
+def _silences(part: Located, managers: Located | None) -> dict[str, float]:
+    served = () if managers is None else tuple(managers.entries("`managers`"))
+    found: dict[str, float] = {}
+    for name, seconds in part.entries("`silence`").items():
+        skillset, _, resource = name.partition(".")
+        if _WORD.fullmatch(skillset) is None or not resource.isidentifier():
+            raise seconds.wrong(f"`silence`: `{name}` names no resource; write SKILLSET.RESOURCE, as rover.estop")
+        if skillset not in served:
+            raise seconds.wrong(f"`silence`: the managers of {skillset} do not run here; here run {choices(skillset, served)}")
+        found[name] = seconds.number(f"the silence of {name}", SHORTEST_SILENCE_S, LONGEST_SILENCE_S)
     return found
 
 

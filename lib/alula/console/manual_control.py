@@ -141,7 +141,8 @@ def _end(last: ExecutionRecord) -> dict[str, Any]:
 
 
 def _resource(row: ResourceRow) -> dict[str, Any]:
-    return {"name": row.name, "state": row.state, "targets": list(row.targets), "every_target": list(row.every_target)}
+    targets = {"targets": list(row.targets), "every_target": list(row.every_target)}
+    return {"name": row.name, "state": row.state, "reason": row.reason, **targets}
 
 
 def _fields(one: Skillset, skill: str) -> list[Field]:

@@ -5,7 +5,7 @@ from __future__ import annotations
 import json
 import threading
 from collections import deque
-from collections.abc import Mapping
+from collections.abc import Iterable, Mapping
 from dataclasses import dataclass, replace
 from types import SimpleNamespace
 from typing import Any
@@ -23,12 +23,16 @@ VALUE_WIDTH = 60
 
 @dataclass(frozen=True)
 class ResourceRow:
-    """A resource; ``targets`` are the states that an extern transition leads to from here, ``every_target`` those from anywhere."""
+    """A resource; ``targets`` are the states that an extern transition leads to from here, ``every_target`` those from anywhere.
+
+    ``reason``: why it is in its state, as the functional layer or the managers have told; empty where they told nothing.
+    """
 
     name: str
     state: str
     targets: tuple[str, ...]
     every_target: tuple[str, ...]
+    reason: str = ""
 
 
 @dataclass(frozen=True)
@@ -87,16 +91,17 @@ class SkillsetView:
         self.logged = 0
         self._lock = threading.RLock()
         self._states: dict[str, str] = {}
+        self._reasons: dict[str, str] = {}
         self._readings: dict[str, _Reading] = {}
         self._running: dict[str, Running] = {}
         self._last: dict[str, str] = {}
 
     # --- what was heard ----------------------------------------------------------------------------------------------
 
-    def heard_states(self, states: Mapping[str, str]) -> None:
-        """Take the states of all resources, by name."""
+    def heard_states(self, states: Mapping[str, str], reasons: Mapping[str, str]) -> None:
+        """Take the states of all resources, and why they are so, by name."""
         with self._lock:
-            self._states = dict(states)
+            self._states, self._reasons = dict(states), dict(reasons)
             self.version += 1
 
     def heard_event(self, event: EngineEvent) -> None:
@@ -154,7 +159,9 @@ class SkillsetView:
         state = self._states.get(resource.name, "?")
         arrows = [arrow for arrow in resource.transitions if arrow.extern]
         here = tuple(arrow.target for arrow in arrows if arrow.source == state)
-        return ResourceRow(resource.name, state, here, tuple(dict.fromkeys(arrow.target for arrow in arrows)))
+        return ResourceRow(
+            resource.name, state, here, tuple(dict.fromkeys(arrow.target for arrow in arrows)), self._reasons.get(resource.name, "")
+        )
 
     def data_rows(self, now_ns: int) -> list[DataRow]:
         """Return the data in the model's order; ``now_ns`` is the mission clock."""
@@ -182,7 +189,12 @@ class SkillsetView:
         if not self._states:
             return ("nothing was heard of the resources yet",)
         fresh = {name: json.loads(r.value_json, object_hook=_named) for name, r in self._readings.items() if not r.stale}
-        return tuple(one.reason for one in unmet(self.model, Situation(self._states, data=fresh), self.model.skill(skill)))
+        found = unmet(self.model, Situation(self._states, data=fresh), self.model.skill(skill))
+        return tuple(one.reason + self._because(one.states) for one in found)
+
+    def _because(self, resources: Iterable[str]) -> str:
+        told = [f"{name}: {self._reasons[name]}" for name in resources if self._reasons.get(name)]
+        return f" ({'; '.join(told)})" if told else ""
 
 
 def one_line(value_json: str, width: int = VALUE_WIDTH) -> str:

@@ -4,7 +4,10 @@ from __future__ import annotations
 
 import threading
 from collections.abc import Callable
+from dataclasses import replace
 from typing import TYPE_CHECKING
+
+from alula.model.model import Skillset
 
 if TYPE_CHECKING:
     from alula.runtime.middleware import Middleware
@@ -22,6 +25,16 @@ def is_stale(age_ns: int, period_s: float | None) -> bool:
     """Tell whether a value of this age is stale."""
     limit = limit_ns(period_s)
     return limit is not None and age_ns > limit
+
+
+def with_silences(skillset: Skillset, given_s: Callable[[str, float], float]) -> Skillset:
+    """Return the skillset as a deployment has it: ``given_s(resource, model_s)`` returns a resource's silence, seconds."""
+    return replace(
+        skillset,
+        resources=tuple(
+            one if one.silence_s is None else replace(one, silence_s=given_s(one.name, one.silence_s)) for one in skillset.resources
+        ),
+    )
 
 
 class StalenessWatch:
@@ -49,6 +62,11 @@ class StalenessWatch:
             self._watched.add(name)
         if first:
             self._look_at(name, stamp_ns, limit_ns)
+
+    def silent_ns(self, name: str) -> int | None:
+        """Return for how long a source was not heard of that is stale; None: it is not."""
+        with self._lock:
+            return None if name in self._watched or name not in self._heard_ns else self._middleware.now_ns() - self._heard_ns[name]
 
     def _look_at(self, name: str, stamp_ns: int, limit_ns: int) -> None:
         def look() -> None:

@@ -73,6 +73,17 @@ def test_what_is_left_out_does_not_run_here_and_all_binds_to_loopback(tmp_path):
     [
         ("", "", "is empty; a deployment needs `ros1` and `ros2`"),
         ("ros1: {master: 'http://a:1'}\n", ":1", "a deployment needs `ros2`"),
+        (f"{LEAST}silence: {{rover.estop: 4}}\n", ":3", "`silence`: the managers of rover do not run here; here run none"),
+        (
+            f"{LEAST}managers: {{rover: x}}\nsilence: {{estop: 4}}\n",
+            ":4",
+            "`estop` names no resource; write SKILLSET.RESOURCE, as rover.estop",
+        ),
+        (
+            f"{LEAST}managers: {{rover: x}}\nsilence: {{rover.estop: 0.5}}\n",
+            ":4",
+            "the silence of rover.estop should be a number from 1 to 3600",
+        ),
         (f"{LEAST}bridges: x\n", ":3", "a deployment has no `bridges`; it may have .*did you mean `bridge`"),
         ("ros1: {address: 10.0.0.1}\nros2: {}\n", ":1", "`ros1` needs `master`"),
         ("ros1: {master: 10.0.0.1}\nros2: {}\n", ":1", "`master` should be the URI of a ROS master"),

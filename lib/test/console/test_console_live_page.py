@@ -404,7 +404,15 @@ BY_HAND = {
                     "inputs": [{"name": "duration", "kind": "float64", "said": "> 0", "text": "0.0"}],
                 },
             ],
-            "resources": [{"name": "flight_status", "state": "IN_AIR", "targets": ["ON_GROUND"], "every_target": ["IN_AIR", "ON_GROUND"]}],
+            "resources": [
+                {
+                    "name": "flight_status",
+                    "state": "IN_AIR",
+                    "reason": "not heard of for 4.1 s",
+                    "targets": ["ON_GROUND"],
+                    "every_target": ["IN_AIR", "ON_GROUND"],
+                }
+            ],
             "data": [{"name": "guidance_state", "value": HOSTILE, "age_s": 0.2, "stale": False}],
         }
     ],
@@ -465,6 +473,7 @@ def test_skills_are_driven_by_hand(
         assert page.run("document.querySelector('.skills progress:not([style*=hidden])').value") == 0.5
         interrupt = "document.querySelector('.skill .danger')"
         page.run(f"{interrupt}.click(), {interrupt}.click()")
+        assert page.text(".resources li .hint") == "not heard of for 4.1 s"
         assert page.text(".resources button:not([hidden])") == "→ ON_GROUND"
         change = "document.querySelector('.resources button:not([hidden])')"
         page.run(f"{change}.click(), {change}.click()")

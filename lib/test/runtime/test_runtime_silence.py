@@ -86,6 +86,44 @@ def test_a_resource_whose_reporter_falls_silent_is_unknown_and_skills_know(watch
     assert [finding for event in watched.events if (finding := monitor.take(event)) is not None] == []
 
 
+def test_whoever_asks_hears_for_how_long_nothing_was_heard(watched):
+    watched.report("estop", "RELEASED")
+    watched.beat("estop")  # and half a second later
+    told = []
+    for _ in range(4):
+        watched.world.run_for(1.0)
+        told.append(watched.client.reasons["estop"])
+    assert told == ["", "not heard of for 2 s", "not heard of for 3 s", "not heard of for 4 s"]
+    said = "safe: estop is UNKNOWN, after estop RELEASED -> UNKNOWN (extern): not heard of for 4 s"
+    assert watched.client.why("drive").get(1.0).reason == said
+    refused = watched.client.start("drive")
+    watched.world.run_for(0.1)
+    assert (refused.outcome, refused.message) == ("NOT_READY", said)
+    transitions = [event for event in watched.events if getattr(event, "resource", "") == "estop"]
+    assert len(transitions) == 2, "that it lasts is no event"
+
+
+def test_it_is_no_more_told_when_something_is_heard_again(watched):
+    watched.report("estop", "RELEASED")
+    watched.beat("estop")
+    watched.world.run_for(3.0)
+    watched.beat("estop")
+    assert watched.client.resources["estop"] == "UNKNOWN", "it has not said anew what it is"
+    assert watched.client.reasons["estop"] == ""
+    assert watched.client.why("drive").get(1.0).reason == "safe: estop is UNKNOWN"
+    watched.world.run_for(0.7)
+    assert watched.client.reasons["estop"] == ""
+
+
+def test_what_is_told_with_the_state_is_not_taken_away_by_a_heartbeat(watched):
+    watched.report("estop", "RELEASED")
+    watched.beat("estop")
+    watched.world.run_for(3.0)
+    watched.client.transition("estop", "UNKNOWN", "its cable is torn").get(1.0)
+    watched.beat("estop")
+    assert watched.client.reasons["estop"] == "its cable is torn"
+
+
 def test_one_that_is_back_says_what_it_is_and_is_watched_again(watched):
     for _ in range(2):
         watched.report("estop", "RELEASED")

@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections import Counter
 from collections.abc import Callable, Iterable, Iterator, Sequence
 
+from alula.common.deployments import SHORTEST_SILENCE_S
 from alula.common.suggestions import nearest
 from alula.language.check.references import (
     Named,
@@ -28,9 +29,6 @@ from alula.language.syntax.resources import occurring
 from alula.model import ros_types
 from alula.model.model import Resource, Skillset
 from alula.model.span import Span
-
-SHORTEST_SILENCE_S = 1.0
-"""Two periods of a reporter's heartbeat."""
 
 
 def _skillset_names(skillset: Skillset) -> Iterator[Diagnostic]:

@@ -13,6 +13,7 @@ from alula.model.deadlines import due_ns
 from alula.model.execution_state import ExecutionState
 from alula.model.model import Skillset
 from alula.model.situation import Change, Entered, Running, Situation, Step
+from alula.model.unmet import Unmet
 from alula.runtime.core.events import EngineEvent, ExecutionEvent, TransitionEvent
 from alula.runtime.core.execution import Execution
 from alula.runtime.core.records import Records, ResourceStatus
@@ -148,6 +149,12 @@ class SkillsetContext:
         self.records.on_events(events)
         self._publish_events(events)
 
+    def note(self, resource: str, state: str, reason: str) -> None:
+        """Take another reason for the state that a resource is in."""
+        status = self.resources[resource]
+        if status.state == state:
+            self.resources[resource] = replace(status, reason=reason)
+
     def _changed(self, change: Change) -> TransitionEvent:
         self.sequence += 1
         now_ns = self._clock_ns()
@@ -157,13 +164,19 @@ class SkillsetContext:
 
     def _with_cause(self, entered: Entered) -> Entered:
         """Have a refusal say which change that was explained came last of what it asks for; an end by an invariant says it already."""
-        asked = [(name, self.resources[name]) for one in entered.unmet for name in one.states]
-        told = [(name, status) for name, status in asked if status.reason]
-        if entered.state is not ExecutionState.NOT_READY or not told:
+        if entered.state is not ExecutionState.NOT_READY:
             return entered
+        return replace(entered, message=entered.message + self.cause_of(entered.unmet))
+
+    def cause_of(self, unmet: Sequence[Unmet]) -> str:
+        """Return which change that was explained came last of what is asked for, to be put behind a sentence; "" where none was."""
+        told = [(name, self.resources[name]) for one in unmet for name in one.states if self.resources[name].reason]
+        if not told:
+            return ""
         name, last = max(told, key=lambda one: one[1].stamp_ns)
-        change = Change(name, last.previous, last.state, semantics.EXTERN, last.reason)
-        return replace(entered, message=f"{entered.message}, after {change.sentence()}")
+        if not last.previous:  # it has been so from the start
+            return f": {name}: {last.reason}"
+        return f", after {Change(name, last.previous, last.state, semantics.EXTERN, last.reason).sentence()}"
 
     def _entered(self, execution: Execution) -> ExecutionEvent:
         self.sequence += 1

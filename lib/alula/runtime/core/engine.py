@@ -250,6 +250,11 @@ class SkillsetEngine:
         self._after_step(stops)
         return reply
 
+    def note(self, resource: str, state: str, reason: str) -> None:
+        """Take another reason for the state that a resource is in; where it is in another one by now, nothing."""
+        with self._lock:
+            self._context.note(resource, state, reason)
+
     def trigger(self, event: str) -> TransitionReply:
         """Take an event of the model, or say why not: its guard is false, or its effect is no transition now."""
         self.tick()
@@ -624,7 +629,7 @@ class SkillsetEngine:
         with self._lock:
             found = unmet(self.skillset, self._context.situation, model)
             history = self._context.records.history(resources_of(model))
-            reason = sentence(found, refusal, self._refusal(skill))
+            reason = sentence(found, refusal, self._refusal(skill)) + self._context.cause_of(found)
         return Why(skill, not reason, reason, refusal, found, history)
 
 

@@ -15,12 +15,15 @@ from alula.runtime.core.sanitize import as_text
 from alula.runtime.middleware import REPORTED, RESOURCE_STATES, Middleware, Reply, ResourceStates
 from alula.runtime.staleness import StalenessWatch
 
+TELL_SILENCE_NS = 1_000_000_000
+"""How often it is told that a resource is silent still."""
+
 
 class ResourceManager:
     """Publishes ``resource_states`` once a step and at each new reason, and serves ``transition`` and ``trigger``.
 
     Resources with a ``silence`` are followed on ``reported``, the heartbeat of their reporters. One whose reporter falls silent is taken
-    back to its initial state; one whose reporter was never heard of is not.
+    back to its initial state, and its reason says for how long; one whose reporter was never heard of is not.
     """
 
     def __init__(self, middleware: Middleware, engine: SkillsetEngine, instance_id: str) -> None:
@@ -33,7 +36,9 @@ class ResourceManager:
         self._sequence = 0
         self._lock = threading.Lock()
         self._silences = {one.name: one for one in engine.skillset.resources if one.silence_s is not None}
-        self._staleness = StalenessWatch(middleware, self._on_silence)
+        self._staleness = StalenessWatch(middleware, self._tell_silence)
+        self._silence_told: dict[str, str] = {}
+        """Of each resource that is silent, the reason that was told last."""
         self._publish(middleware.now_ns())
 
     def serve(self) -> None:
@@ -75,6 +80,7 @@ class ResourceManager:
 
     def _note(self, resource: str, state: str, reason: str) -> None:
         """Publish another reason for the state that a resource is in."""
+        self._engine.note(resource, state, reason)
         with self._lock:
             latest = self._latest[resource]
             if latest.state == state and latest.reason != reason:
@@ -85,13 +91,19 @@ class ResourceManager:
         """Note the resources that a reporter says it reports."""
         now_ns = self._middleware.now_ns()
         for name in self._silences.keys() & reported.resources.keys():
-            self._staleness.heard(name, now_ns, self._silence_ns(name))
+            self._staleness.heard(name, now_ns, round((self._silences[name].silence_s or 0.0) * 1e9))
+            told = self._silence_told.pop(name, None)
+            if told is not None and self._engine.resources[name].reason == told:
+                self._note(name, self._silences[name].initial, "")
 
-    def _on_silence(self, name: str) -> None:
-        self.transition(name, self._silences[name].initial, f"not heard of for {self._silence_ns(name) / 1e9:g} s")
-
-    def _silence_ns(self, name: str) -> int:
-        return round((self._silences[name].silence_s or 0.0) * 1e9)
+    def _tell_silence(self, name: str) -> None:
+        """Take a silent resource back, and say for how long it was not heard of, again each second until it is."""
+        silent_ns = self._staleness.silent_ns(name)
+        if silent_ns is None:
+            return
+        reason = self._silence_told[name] = f"not heard of for {round(silent_ns / 1e9, 1):g} s"
+        self.transition(name, self._silences[name].initial, reason)
+        self._middleware.at(self._middleware.now_ns() + TELL_SILENCE_NS, lambda: self._tell_silence(name))
 
     def _publish(self, stamp_ns: int) -> None:
         self._publisher.publish(ResourceStates(self._instance_id, self._sequence, stamp_ns, dict(self._latest)))

@@ -93,9 +93,11 @@ def skills(clients: Clients, _: argparse.Namespace, out: Out) -> int:
         for skill, facts in known.items():
             taken = ", ".join(f"{key}: {kind}" for key, kind in facts["inputs"].items())
             lines.append(f"  {skill}({taken}){'  running' if facts['open'] else ''}")
-        lines += [f"  {resource} = {state}" for resource, state in client.resources.items()]
+        resources, reasons = client.resources, {resource: reason for resource, reason in client.reasons.items() if reason}
+        because = {resource: f" ({reason})" for resource, reason in reasons.items()}
+        lines += [f"  {resource} = {state}{because.get(resource, '')}" for resource, state in resources.items()]
         lines += [f"  data {one}" for one in named]
-        out({"skillset": name, "skills": known, "resources": dict(client.resources), "data": named}, "\n".join(lines))
+        out({"skillset": name, "skills": known, "resources": resources, "reasons": reasons, "data": named}, "\n".join(lines))
     return DONE
 
 

@@ -72,7 +72,7 @@ class Watched:
                 self.problem = f"{self.root} is there, but the interfaces of {self._name} that are built here are another robot's"
                 return
             view = SkillsetView(self.root, self.client.model)
-            view.heard_states(self.client.resources)
+            view.heard_states(self.client.resources, self.client.reasons)
             view.heard_skills(self.client.skills)
             for event in self._heard:
                 view.heard_event(event)
@@ -168,7 +168,7 @@ class Watched:
 
     def _on_change(self, states: dict[str, str]) -> None:
         if self.view is not None:
-            self.view.heard_states(states)
+            self.view.heard_states(states, self.client.reasons)
 
     def _on_skills(self, skills: dict[str, SkillRecord]) -> None:
         if self.view is not None:

@@ -137,6 +137,7 @@ class ResourceLine(Horizontal):
         focused = self.screen.focused
         self.row = row
         self._state.update(row.state)
+        self._state.tooltip = row.reason or None
         for button in self._buttons:
             button.display = button.name in row.targets
         shown = [button for button in self._buttons if button.display]

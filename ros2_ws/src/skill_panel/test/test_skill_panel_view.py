@@ -43,10 +43,16 @@ def skills(**states):
 
 def test_resources_have_the_extern_transitions_that_are_possible(view):
     assert view.resource_rows() == [ResourceRow("door", "?", (), ("OPEN",))]
-    view.heard_states({"door": "SHUT"})
+    view.heard_states({"door": "SHUT"}, {})
     assert view.resource_rows() == [ResourceRow("door", "SHUT", ("OPEN",), ("OPEN",))]
-    view.heard_states({"door": "OPEN"})
+    view.heard_states({"door": "OPEN"}, {"door": ""})
     assert view.resource_rows() == [ResourceRow("door", "OPEN", (), ("OPEN",))]  # SHUT is for skills
+
+
+def test_why_a_resource_is_so_is_shown_with_it_and_with_what_asks_for_it(view):
+    view.heard_states({"door": "SHUT"}, {"door": "not heard of for 4 s"})
+    assert view.resource_rows() == [ResourceRow("door", "SHUT", ("OPEN",), ("OPEN",), "not heard of for 4 s")]
+    assert view.skill_rows()[0].unmet[0].endswith("door is SHUT (door: not heard of for 4 s)")
 
 
 def test_data_have_an_age_on_the_mission_clock(view):
@@ -59,12 +65,12 @@ def test_data_have_an_age_on_the_mission_clock(view):
 
 def test_why_not_follows_resources_and_data(view):
     assert view.skill_rows()[0].unmet == ("nothing was heard of the resources yet",)
-    view.heard_states({"door": "SHUT"})
+    view.heard_states({"door": "SHUT"}, {})
     row = view.skill_rows()[0]
     assert (row.status, len(row.unmet)) == ("not ready", 2)
     assert "door is SHUT" in row.unmet[0]
     assert "battery" in row.unmet[1]
-    view.heard_states({"door": "OPEN"})
+    view.heard_states({"door": "OPEN"}, {"door": ""})
     battery = {"value_json": json.dumps({"percentage": 0.5}), "stamp_ns": 0}
     view.heard_data("battery", **battery, stale=False)
     assert view.skill_rows()[0] == SkillRow("go", (), "", ())
@@ -75,7 +81,7 @@ def test_why_not_follows_resources_and_data(view):
 
 
 def test_skills_show_what_runs_and_how_it_ended(view):
-    view.heard_states({"door": "OPEN"})
+    view.heard_states({"door": "OPEN"}, {"door": ""})
     view.heard_skills(skills(go=([execution("1", "RUNNING")], []), wait=([], [execution("0", "TERMINATED", "DONE")])))
     view.heard_progress("1", 0.5)
     view.heard_progress("9", 0.5)  # of no execution that is known

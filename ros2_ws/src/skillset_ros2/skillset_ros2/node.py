@@ -14,6 +14,7 @@ from alula.runtime.core.hook_calls import HookCaller
 from alula.runtime.hook_processes import HookServer, RemoteHooks
 from alula.runtime.hooks import SkillHooks
 from alula.runtime.managers import HOOKS_RETURN_S, DataBindings, Managers, generated_bindings
+from alula.runtime.staleness import with_silences
 from skillset_ros2.middleware import RclpyMiddleware
 from skillset_ros2.names import action_type
 from skillset_ros2.simulated_time import SimulatedTime
@@ -26,7 +27,8 @@ WITHOUT_PARAMETER_SERVICES = {"start_parameter_services": False}
 class SkillsetNode(Node):  # type: ignore[misc]  # rclpy has no types
     """The data manager, the resource manager and the skill managers of a skillset; the node has the skillset's name.
 
-    Parameters: ``interrupt_timeout_s``, ``hook_timeout_s``. Hooks are called on threads of their own; the executor never waits for one.
+    Parameters: ``interrupt_timeout_s``, ``hook_timeout_s``, and ``silence.RESOURCE`` in seconds for each resource that has one.
+    Hooks are called on threads of their own; the executor never waits for one.
 
     Args:
         skillset: the model.
@@ -53,7 +55,8 @@ class SkillsetNode(Node):  # type: ignore[misc]  # rclpy has no types
     ) -> None:
         super().__init__(skillset.name, **WITHOUT_PARAMETER_SERVICES | node_options)
         self._simulated_time = SimulatedTime(self)
-        self.skillset = skillset
+        given_s = lambda name, model_s: float(self.declare_parameter(f"silence.{name}", model_s).value)  # noqa: E731
+        self.skillset = skillset = with_silences(skillset, given_s)
         self.served_skills = tuple(skill.name for skill in skillset.skills)
         for name in self.served_skills:
             action_type(interfaces, name)

@@ -137,13 +137,15 @@ class ManualControlView {
         button.target = to;
         return button;
       });
-      const row = el("li", {}, el("span", {}, name), state, el("span", { class: "acts" }, ...targets));
-      [row.state, row.targets] = [state, targets];
+      const reason = el("p", { class: "hint" });
+      const row = el("li", {}, el("span", {}, name), el("div", {}, state, reason), el("span", { class: "acts" }, ...targets));
+      [row.state, row.reason, row.targets] = [state, reason, targets];
       return row;
     });
-    resources.forEach(({ state, targets }, index) => {
+    resources.forEach(({ state, reason, targets }, index) => {
       const row = this.resources.children[index];
       setText(row.state, state);
+      setText(row.reason, reason);
       for (const button of row.targets) button.hidden = !targets.includes(button.target);
     });
   }

@@ -14,6 +14,7 @@ from alula.runtime.core.engine import DEFAULT_TIMEOUT_S, HOOK_TIMEOUT_S, Skillse
 from alula.runtime.core.errors import SkillRuntimeError
 from alula.runtime.hooks import SkillHooks
 from alula.runtime.managers import DataBindings, Managers, generated_bindings
+from alula.runtime.staleness import with_silences
 from skillset_ros1.middleware import RospyMiddleware
 from skillset_ros1.names import place
 
@@ -24,7 +25,7 @@ class SkillsetManagers:
     """The data manager, the resource manager and the skill managers of a skillset, in this process's rospy node.
 
     Hooks are called on threads of their own; nothing of the node waits for one.
-    Parameters of the node: ``~interrupt_timeout_s``, ``~hook_timeout_s``.
+    Parameters of the node: ``~interrupt_timeout_s``, ``~hook_timeout_s``, and ``~silence/RESOURCE`` in seconds.
 
     Args:
         skillset: the model.
@@ -48,7 +49,7 @@ class SkillsetManagers:
         data_bindings: DataBindings | None = None,
         namespace: str = "",
     ) -> None:
-        self.skillset = skillset
+        self.skillset = skillset = with_silences(skillset, lambda name, model_s: float(rospy.get_param(f"~silence/{name}", model_s)))
         self.place = place(namespace, skillset.name)
         check_alone(self.place)
         self._middleware = RospyMiddleware(skillset.name, self.place, interfaces)
