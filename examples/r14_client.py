@@ -4,7 +4,7 @@ Run: `setup/in_ros2 python examples/r14_client.py`.
 
 It prints:
 
-    skills: lidar_mapping; resources: height_status AGREED, mapping_process IDLE, slam_status UNKNOWN
+    skills: lidar_mapping; resources: height_status AGREED, imu_status OK, mapping_process IDLE, slam_status UNKNOWN
     RUNNING
     a second one: NOT_READY idle
     INTERRUPTED

@@ -61,7 +61,10 @@ def test_a_behaviour_that_can_not_be_read_leaves_nothing_behind(tmp_path: Path) 
     behaviour.write_text("skills:\n  navigation.land: {result: CRASHED}\n", encoding="utf-8")
     for more, complaint in (
         (["--behaviour", str(behaviour)], f"{behaviour}:2: navigation.land has no result CRASHED; it has LANDED, BLOCKED, ABORTED"),
-        (["--fail", "imu@3"], "there is no fault 'imu' in the behaviour; it has zed, lidar, pilot, control, barometer, barometer:wrong"),
+        (
+            ["--fail", "camera@3"],
+            "there is no fault 'camera' in the behaviour; it has zed, lidar, pilot, control, barometer, gps, imu, barometer:wrong",
+        ),
     ):
         flight = start_flight(tmp_path / "run", "--mock", *more)
         assert flight.process.wait(120.0) == 2

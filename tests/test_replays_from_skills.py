@@ -304,7 +304,7 @@ def test_what_is_no_record_is_refused_in_a_line(tmp_path, capsys, write):
 @pytest.mark.parametrize(
     ("words", "complaint"),
     [
-        (["--fail", "imu@3"], "there is no fault 'imu'"),
+        (["--fail", "camera@3"], "there is no fault 'camera'"),
         (["--fail", "zed@x"], "camera:dark@30-40"),
         (["--set", "sped_m_s=1"], "did you mean `speed_m_s`"),
         (["--set", "speed_m_s=fast"], "is no number"),

@@ -26,7 +26,7 @@ from alula.report.ends import OPERATOR, ReportedEnd, read_end
         (["mapping", "--mock", "--rate", "2"], "--rate: a run over mocks has no such option"),
         (["mapping", "--mock", "--console"], "--console: a run over mocks has no such option"),
         (["mapping", "--mock", "--fail", "zed@x"], "write WHAT"),
-        (["mapping", "--mock", "--fail", "imu"], "there is no fault 'imu'"),
+        (["mapping", "--mock", "--fail", "camera"], "there is no fault 'camera'"),
         (["mapping", "--mock", "--world", "nowhere"], "there is no world nowhere"),
         (["mapping", "--mock", "--seed", "-1"], "--seed -1"),
         (["mapping", "--mock", "--limit", "-1"], "--limit -1: must be 0"),

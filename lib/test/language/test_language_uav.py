@@ -68,6 +68,8 @@ STATUS = [("UNKNOWN", "OK"), ("UNKNOWN", "BROKEN"), ("OK", "UNKNOWN"), ("OK", "B
         ("navigation", "heading_authority", ("AVAILABLE", "USED"), [], [("AVAILABLE", "USED"), ("USED", "AVAILABLE")]),
         ("navigation", "flight_status", ("ON_GROUND", "IN_AIR"), [("ON_GROUND", "IN_AIR"), ("IN_AIR", "ON_GROUND")], []),
         ("navigation", "homepoint_status", ("INVALID", "VALID"), [("INVALID", "VALID"), ("VALID", "INVALID")], []),
+        ("navigation", "position_status", ("KNOWN", "LOST"), [("KNOWN", "LOST"), ("LOST", "KNOWN")], []),
+        ("mapping", "imu_status", ("OK", "BROKEN"), [("OK", "BROKEN")], [("BROKEN", "OK")]),
         ("perception", "zed_status", ("UNKNOWN", "OK", "BROKEN"), STATUS, []),
         ("perception", "lidar_status", ("UNKNOWN", "OK", "BROKEN"), STATUS, []),
         ("mapping", "mapping_process", ("IDLE", "RUNNING"), [], [("IDLE", "RUNNING"), ("RUNNING", "IDLE")]),

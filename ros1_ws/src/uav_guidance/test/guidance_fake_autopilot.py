@@ -63,6 +63,10 @@ class FakeVehicle:
         self.stuck = False
         self.position_check_s: float | None = None
         """Since power-up, when its checks find a position, which GUIDED needs; they run once a second. None: at once, as the others."""
+        self.fix: int | None = 3
+        """GPS_FIX_TYPE; None: the GPS says nothing."""
+        self.estimator = 831
+        """EKF_STATUS_FLAGS: all that there is with a position."""
         self.setpoint: tuple[float, float, float, float] | None = None
         self.heartbeats_heard = 0
         self._send = send
@@ -268,6 +272,11 @@ class FakeVehicle:
         elif number == mavlink.MAVLINK_MSG_ID_SYS_STATUS:
             health = 0x10000000 if self._told_ready else 0
             self._send(mavlink.MAVLink_sys_status_message(0x10000000, 0x10000000, health, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0))
+        elif number == mavlink.MAVLINK_MSG_ID_GPS_RAW_INT and self.fix is not None:
+            boot_us = boot_ms * 1000
+            self._send(mavlink.MAVLink_gps_raw_int_message(boot_us, self.fix, *HOME, 121, 200, 65535, 65535, 12))
+        elif number == mavlink.MAVLINK_MSG_ID_EKF_STATUS_REPORT:
+            self._send(mavlink.MAVLink_ekf_status_report_message(self.estimator, 0.05, 0.05, 0.05, 0.05, 0.0))
         elif number == mavlink.MAVLINK_MSG_ID_HOME_POSITION and self.ready:
             self._send_home()
         elif number == mavlink.MAVLINK_MSG_ID_GPS_GLOBAL_ORIGIN and self.ready:

@@ -22,7 +22,12 @@ def test_guided_is_taken_once_when_the_vehicle_is_ready(flight):
     flight.until(lambda r: r.authority, 2.0)
     flight.run(5.0)
     assert flight.commands == [(MODE, 1.0, GUIDED, 0.0)]
-    assert flight.guidance.resources() == {"SDK_authority": "AVAILABLE", "flight_status": "ON_GROUND", "homepoint_status": "VALID"}
+    assert flight.guidance.resources() == {
+        "SDK_authority": "AVAILABLE",
+        "flight_status": "ON_GROUND",
+        "homepoint_status": "VALID",
+        "position_status": "KNOWN",
+    }
 
 
 def test_the_authority_is_of_use_once_there_is_a_position(flight):
@@ -81,7 +86,11 @@ def test_a_guidance_started_again_in_flight_reports_nothing_before_it_knows(flyi
         reported.append(flying.guidance.resources())
     known = [states for states in reported if states]
     assert known, "in the end it knows"
-    assert known[0] == known[-1] == {"SDK_authority": "AVAILABLE", "flight_status": "IN_AIR", "homepoint_status": "VALID"}
+    assert (
+        known[0]
+        == known[-1]
+        == {"SDK_authority": "AVAILABLE", "flight_status": "IN_AIR", "homepoint_status": "VALID", "position_status": "KNOWN"}
+    )
 
 
 def test_a_guidance_without_a_vehicle_says_so_after_a_while():

@@ -13,6 +13,8 @@ from alula.model.execution_state import ExecutionState
 
 READY = {
     "height_status": "AGREED",
+    "imu_status": "OK",
+    "position_status": "KNOWN",
     "SDK_authority": "AVAILABLE",
     "flight_status": "ON_GROUND",
     "homepoint_status": "VALID",
@@ -79,6 +81,7 @@ def test_a_skillset_that_can_not_be_called_keeps_the_mission_from_starting():
         *(f"the skillset {name} answers" for name in ("navigation", "perception", "mapping")),
         "the autopilot is ready and ours to command",
         "the home point is valid",
+        "the position is known",
         "the vehicle is on the ground",
         "the state of the ZED is known",
         "the LiDAR works",

@@ -108,6 +108,38 @@ def test_heights_that_nobody_can_believe_any_more_end_the_map_and_the_flight():
     assert landed(mission)
 
 
+def test_a_position_that_is_lost_is_landed_at_once_without_a_hover():
+    for at_s, motion in ((10, "goto_straight"), (50, "rotate_head"), (55, "goto")):
+        mission = make(f"gps@{at_s}", "zed@30")
+        end = mission.run()
+        assert end.outcome is Outcome.GIVEN_UP
+        assert "keep_position" in end.reason
+        asked = executions(mission)
+        assert (motion, "RESOURCE_INVARIANT_VIOLATED", "keep_position") in asked
+        assert asked[-2:] == [("hover", "NOT_READY", "position_known"), ("land", "TERMINATED", "LANDED")]
+        lost_ns, landing_ns = (
+            next(event.stamp_ns for event in mission.events if getattr(event, "to_state", "") == "LOST"),
+            next(event.stamp_ns for event in mission.events if getattr(event, "skill", "") == "land"),
+        )
+        assert 0.0 <= (landing_ns - lost_ns) / 1e9 <= 0.3, "s; the autopilot's failsafe comes 7 s after this"
+        assert landed(mission)
+
+
+def test_a_position_that_is_not_known_keeps_the_mission_on_the_ground():
+    mission = make("gps")
+    end = mission.run()
+    assert end.outcome is Outcome.NOT_STARTED
+    assert "the position is not known" in end.reason
+
+
+def test_an_imu_that_fails_degrades_the_map_and_is_said():
+    mission = make("imu@8")
+    end = mission.run()
+    assert (end.outcome, end.reason) == (Outcome.DEGRADED, "the IMU failed, mapped by LiDAR and autopilot alone")
+    assert [skill for skill, _, _ in executions(mission)].count("goto_straight") == len(ROUTE)
+    assert landed(mission)
+
+
 def test_both_sensors_dead_is_given_up_and_landed():
     mission = make("zed@8", "lidar@8")
     end = mission.run()
@@ -219,8 +251,8 @@ def test_a_folder_that_goes_away_in_flight_does_not_end_it(tmp_path):
 
 
 def test_a_wrong_request_writes_nothing(tmp_path):
-    with pytest.raises(AlulaError, match="there is no fault 'imu' in the behaviour; it has zed, lidar, pilot, control"):
-        MISSION.run("imu@8", out=tmp_path / "run")
+    with pytest.raises(AlulaError, match="there is no fault 'camera' in the behaviour; it has zed, lidar, pilot, control"):
+        MISSION.run("camera@8", out=tmp_path / "run")
     assert not (tmp_path / "run").exists()
 
 

@@ -90,7 +90,13 @@ class World:
     """Skills that can't go on after a pause."""
     conflicts: list[str] = field(default_factory=list)
     resources: dict[str, str] = field(
-        default_factory=lambda: {"SDK_authority": "AVAILABLE", "flight_status": "ON_GROUND", "height_status": "AGREED"}
+        default_factory=lambda: {
+            "SDK_authority": "AVAILABLE",
+            "flight_status": "ON_GROUND",
+            "position_status": "KNOWN",
+            "height_status": "AGREED",
+            "imu_status": "OK",
+        }
     )
 
     def clock_ns(self) -> int:

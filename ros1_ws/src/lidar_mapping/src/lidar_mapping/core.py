@@ -15,6 +15,7 @@ from std_msgs.msg import Header
 from tf2_msgs.msg import TFMessage
 from uav_msgs.msg import MappingState
 
+from lidar_mapping.imu_watch import ImuWatch
 from lidar_mapping.inertial import ImuReading, quaternion_xyzw
 from lidar_mapping.ply import read_ply, write_ply
 from lidar_mapping.readings import ReadingQueue
@@ -27,7 +28,7 @@ from perception_core.conversions import cloud_message
 from perception_core.vehicle import KnownVehicle
 
 if TYPE_CHECKING:
-    from collections.abc import Callable
+    from collections.abc import Callable, Sequence
 
     from numpy.typing import NDArray
 
@@ -61,6 +62,7 @@ class LidarMapping:
         self._path = Path(settings.map_path)
         self._slam = Slam(settings.slam)
         self._readings = ReadingQueue()
+        self._imu = ImuWatch()
         self._standing = StandingGyro()
         self._vehicle = KnownVehicle()
         self._stamps = SweepStamps()
@@ -99,9 +101,11 @@ class LidarMapping:
             self._publish_state(self._host.now_ns(), None)
             if enabled:
                 self._height = "AGREED"
+                self._imu = ImuWatch()
         self._host.report("mapping.slam_status", "UNKNOWN", "the mapping does not run")
         if enabled:
             self._host.report("mapping.height_status", self._height)
+            self._host.report("mapping.imu_status", "OK")
 
     def save(self) -> str:
         """Write the map; return what was written where, raise OSError."""
@@ -160,9 +164,9 @@ class LidarMapping:
         measured = (turn @ [rates.x, rates.y, rates.z], turn @ [force.x, force.y, force.z])
         reading = ImuReading(message.header.stamp.to_nsec(), *measured)
         if not self._readings.add(reading, self._host.now_ns()):
-            self._on_garbage(
-                f"a reading of {IMU} can't be one: stamp {reading.stamp_ns}, {reading.rates} rad/s, {reading.specific_force} m/s2"
-            )
+            what = f"stamp {reading.stamp_ns}, {reading.rates} rad/s, {reading.specific_force} m/s2"
+            self._imu.refuse(what)
+            self._on_garbage(f"a reading of {IMU} can't be one: {what}")
             return
         self._standing.add(reading, self._vehicle.poses)
 
@@ -186,12 +190,20 @@ class LidarMapping:
                 return
             self._begin_as_flown()
             self._slam.gyro_bias = self._standing.bias
-            registration = self._slam.add(sweep, self._readings.take_until(sweep.end_ns), poses, self._vehicle.mount(frame))
+            readings = self._usable(self._readings.take_until(sweep.end_ns), sweep.end_ns)
+            registration = self._slam.add(sweep, readings, poses, self._vehicle.mount(frame))
             self._publish_state(sweep.stamp_ns, registration)
             self._publish_pose(sweep.end_ns)
         self._report()
         if self._slam.full:
             self._host.warn("full", f"the map is full ({len(self._slam.map)} voxels): new surfaces are left out", every_s=10.0)
+
+    def _usable(self, readings: Sequence[ImuReading], end_ns: int) -> Sequence[ImuReading]:
+        """Return the readings, or none once the IMU has failed: the filter then says itself how much less it knows."""
+        if self._imu.fails(end_ns, readings):
+            self._host.warn("imu", f"the IMU is not used any more in this mapping: {self._imu.problem}")
+            self._host.report("mapping.imu_status", "BROKEN", self._imu.problem)
+        return () if self._imu.problem else readings
 
     def _begin_as_flown(self) -> None:
         """Let a mapping that has not begun take the place of `map` from the guidance, which flew on by it if this node has crashed."""

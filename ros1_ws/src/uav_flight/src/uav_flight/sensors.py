@@ -29,6 +29,7 @@ REPORTS = {
     "perception.lidar_status": ("/lidar/points",),
     "mapping.slam_status": ("/lidar/points",),
     "mapping.height_status": ("/lidar/points",),
+    "mapping.imu_status": ("/lidar/points",),
 }
 
 

@@ -18,6 +18,7 @@ from uav_guidance.follower import Course, Follower, Setpoint
 from uav_guidance.frames import wrap
 from uav_guidance.localization import Correction, Localization, Transform
 from uav_guidance.obstacles import Sighting
+from uav_guidance.positioning import Positioning
 from uav_guidance.readiness import Readiness
 from uav_guidance.references import Hold, Land, Reference, Takeoff, Travel, Turn
 from uav_guidance.requests import (
@@ -74,6 +75,7 @@ class Guidance:
         self._authority = Authority()
         self._heard_s: float | None = None
         self._readiness = Readiness()
+        self._positioning = Positioning()
         self._begun_s: float | None = None
         self._introduced = False
         self._follower = Follower(settings)
@@ -183,6 +185,9 @@ class Guidance:
         """Go on to this time; return what has to be sent now, in `odom`. To be called at 20 Hz, and whenever something has come in."""
         self._localize(now_s)
         self._check_authority(now_s)
+        lost = self._positioning.step(self.odometry, now_s, lost_s=self._settings.position_lost_s)
+        if lost and self.odometry.off_ground:
+            self._note(f"the position is lost: {self._positioning.reason}")
         self._introduce(now_s)
         self._take_authority_at_start(now_s)
         command = self._procedure.due(now_s) if self._procedure is not None else None
@@ -211,12 +216,15 @@ class Guidance:
         }
         if self.vehicle.landed is not Landed.UNDEFINED:
             states["flight_status"] = "ON_GROUND" if self.vehicle.on_ground else "IN_AIR"
+        if self._positioning.known is not None:
+            states["position_status"] = "KNOWN" if self._positioning.known else "LOST"
         return states
 
     def reasons(self, now_s: float) -> dict[str, str]:
         """Return why resources are as they are, where that is no matter of course; words that stay while nothing else changes."""
         available = self._authority.held and self._readiness.usable
-        return {} if available else {"SDK_authority": self._lost_reason(now_s)}
+        reasons = {"position_status": self._positioning.reason} if self._positioning.reason else {}
+        return reasons if available else {**reasons, "SDK_authority": self._lost_reason(now_s)}
 
     def report(self, now_s: float) -> GuidanceStatus:
         """Return what the guidance knows and does."""

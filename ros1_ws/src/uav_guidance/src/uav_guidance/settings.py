@@ -45,6 +45,8 @@ class GuidanceSettings:
     reached_rad: float = tunable(math.radians(2.0), 0.005, 0.5, "from the heading at which nothing remains to be done")
     link_lost_s: float = tunable(2.0, 0.5, 30.0, "of silence after which the link counts as lost")
 
+    position_lost_s: float = tunable(0.7, 0.3, 10.0, "without a fix of the GPS after which the position counts as lost; it tells at 5 Hz")
+
     disarm_standing: bool = field(
         default=True, metadata={KEY: Range(0, 1, "stop the motors of a vehicle that stands on the ground in a landing that does not end")}
     )

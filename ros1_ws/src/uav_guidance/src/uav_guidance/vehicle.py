@@ -124,6 +124,11 @@ class VehicleSnapshot:
     place_s: float = -math.inf
     attitude_s: float = -math.inf
     """When place and attitude were told last, seconds of the mission clock, as ``heartbeat_s``."""
+    gps_s: float = -math.inf
+    fix_s: float | None = None
+    """When the GPS was told of last, and when with a fix in three dimensions; None: never with one."""
+    estimator_flags: int | None = None
+    """EKF_STATUS_FLAGS, what the autopilot's estimator knows; None: not told."""
     position_enu_m: Vec3 | None = None
     velocity_enu_m_s: Vec3 = ZERO
     quat_xyzw: Quaternion | None = None
@@ -194,6 +199,15 @@ def _extended_sys_state(vehicle: VehicleSnapshot, message: Any, _now_s: float) -
     return replace(vehicle, landed=Landed(message.landed_state) if known else Landed.UNDEFINED)
 
 
+def _gps(vehicle: VehicleSnapshot, message: Any, now_s: float) -> VehicleSnapshot:
+    fixed = message.fix_type >= mavlink.GPS_FIX_TYPE_3D_FIX
+    return replace(vehicle, gps_s=now_s, fix_s=now_s if fixed else vehicle.fix_s)
+
+
+def _estimator(vehicle: VehicleSnapshot, message: Any, _now_s: float) -> VehicleSnapshot:
+    return replace(vehicle, estimator_flags=int(message.flags))
+
+
 def _of_this_boot(vehicle: VehicleSnapshot, message: Any) -> VehicleSnapshot:
     """Forget what was said before a restart; the attitude shows it at once, a position comes half a minute later."""
     if message.time_boot_ms + REBOOT_MS >= max(vehicle.boot_ms, vehicle.attitude_boot_ms):
@@ -246,6 +260,8 @@ _CHANGES: dict[str, Callable[[VehicleSnapshot, Any, float], VehicleSnapshot]] = 
     "EXTENDED_SYS_STATE": _extended_sys_state,
     "LOCAL_POSITION_NED": _local_position,
     "ATTITUDE": _attitude,
+    "GPS_RAW_INT": _gps,
+    "EKF_STATUS_REPORT": _estimator,
     "HOME_POSITION": _home_position,
     "GPS_GLOBAL_ORIGIN": _global_origin,
 }

@@ -122,7 +122,9 @@ class SensorBoard:
 
     def _check(self, sensor: str) -> None:
         if sensor in self._absent:
-            raise ConfigError(f"no fault of the {sensor}: it is the autopilot's, which is not simulated; set ArduPilot's {AUTOPILOTS[sensor]}")
+            raise ConfigError(
+                f"no fault of the {sensor}: it is the autopilot's, which is not simulated; set ArduPilot's {AUTOPILOTS[sensor]}"
+            )
 
     def apply_due(self, now_s: float, lift_off_s: float | None) -> bool:
         """Let the scheduled changes happen that are due; return whether one did."""

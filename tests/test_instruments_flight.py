@@ -1,0 +1,56 @@
+"""Flights whose instruments fail in the air: the GPS, before the autopilot acts by itself, and the IMU, which the map can do without."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import Any
+
+import pytest
+
+from alula_testing.flights import ALULA_ROOT, start_flight
+
+pytestmark = [pytest.mark.flight, pytest.mark.timeout(1200)]
+YARD = ALULA_ROOT / "tests/recordings/short_yard.yaml"
+FAILED_S = 6.0  # from lift-off; on the first leg
+FAILSAFE_S = 7.8  # from then on, of the simulated autopilot, as of ArduCopter's
+MIN_CLEARANCE_M = 0.8
+MAX_RMSE_M = 0.15
+
+
+def flown(folder: Path, fault: str, *, code: int) -> dict[str, Any]:
+    """Fly the first leg of the yard with a fault on it; return the summary."""
+    flight = start_flight(folder / "run", "--rate", "0", "--seed", "3", "--world", str(YARD), "--fail", f"{fault}@{FAILED_S:g}")
+    try:
+        assert flight.end() == code, flight.words()
+    finally:
+        flight.give_up()
+    summary = flight.summary
+    assert summary["landed"] is True
+    assert summary["collisions"] == 0
+    assert summary["min_clearance_m"] >= MIN_CLEARANCE_M
+    assert summary["problems"] == []
+    return summary
+
+
+def test_a_lost_gps_is_landed_by_the_mission_before_the_autopilot_gives_up(tmp_path: Path) -> None:
+    summary = flown(tmp_path, "gps", code=1)
+    assert summary["outcome"] == "given_up"
+    assert summary["reason"].startswith("navigation.goto_straight: RESOURCE_INVARIANT_VIOLATED keep_position")
+    assert summary["reason"].endswith("nothing is heard of the GPS)")
+    landing = summary["skills"][-1]
+    assert (landing["skill"], landing["outcome"], landing["result"]) == ("land", "TERMINATED", "LANDED")
+    assert landing["start_s"] - FAILED_S < 1.5
+    assert not [one for one in summary["resources"] if one["to"] == "UNAVAILABLE"], "no failsafe has taken it"
+    (answer,) = summary["answers"]
+    assert (answer["sensor"], answer["detected_by"]) == ("gps", "navigation.position_status KNOWN -> LOST")
+    down_s = next(one["t_s"] for one in summary["resources"] if one["to"] == "ON_GROUND")
+    assert down_s - FAILED_S < FAILSAFE_S + 1.0, "the failsafe alone would begin to land then"
+
+
+def test_a_dead_imu_is_told_and_the_map_goes_on_without_it(tmp_path: Path) -> None:
+    summary = flown(tmp_path, "imu", code=0)
+    assert (summary["outcome"], summary["reason"]) == ("degraded", "the IMU failed, mapped by LiDAR and autopilot alone")
+    (told,) = [one for one in summary["resources"] if one["resource"] == "imu_status"]
+    assert (told["to"], told["reason"]) == ("BROKEN", "no reading has come for a second")
+    assert told["t_s"] - FAILED_S == pytest.approx(1.0, abs=0.6)
+    assert summary["map"]["rmse_m"] <= MAX_RMSE_M
