@@ -84,11 +84,11 @@ def test_a_flight_in_which_no_skill_was_started_keeps_its_own_reason(recorded_fl
 
 
 @pytest.mark.parametrize("file", ["uav-simulator.yaml", "uav-simulator-short.yaml"])
-def test_the_campaigns_of_thirty_flights_try_everything_that_can_fail_in_the_simulator(file):
+def test_the_campaigns_of_forty_eight_flights_try_everything_that_can_fail_in_the_simulator(file):
     campaign = load_campaign(CAMPAIGNS / file)
     assert {flight.world is None for flight in campaign.runs} == {file == "uav-simulator.yaml"}
-    assert (campaign.over, campaign.at_once, len(campaign.runs)) == (SIMULATOR, 1, 30)
-    for name, sensors in (("inspection", ["zed", "lidar"]), ("mapping", ["zed", "lidar"])):
+    assert (campaign.over, campaign.at_once, len(campaign.runs)) == (SIMULATOR, 1, 48)
+    for name, sensors in (("inspection", ["zed", "lidar"]), ("mapping", ["zed", "lidar", "gps", "imu"])):
         faults = [fault for flight in campaign.runs if flight.scenario == name for fault in flight.requests]
         others = {(what, how) for what, ways in load_scenario(name).faults for how in ways}
         assert {(fault.what, fault.how) for fault in faults} >= others
@@ -104,6 +104,8 @@ def test_the_campaigns_of_thirty_flights_try_everything_that_can_fail_in_the_sim
         ("zet@3", "the scenario mapping: fault 'zet@3': there is no 'zet' to break; choose one of "),
         ("zed:frozzen@3", "the scenario mapping: fault 'zed:frozzen@3': zed can't be 'frozzen'; choose one of "),
         ("radio:out@3", "the scenario mapping: fault 'radio:out@3': there is no 'radio' to break"),
+        ("uav_guidanc:killed@3", "the scenario mapping: fault 'uav_guidanc:killed@3': there is no 'uav_guidanc' to break; choose one of "),
+        ("uav_guidance:dead@3", "the scenario mapping: fault 'uav_guidance:dead@3': uav_guidance can't be 'dead'; choose one of killed, hung"),
     ],
 )
 def test_a_fault_that_a_flight_can_not_have_is_refused_before_the_first_one(fault, words, tmp_path):
