@@ -2,9 +2,9 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Collection, Iterable, Iterator
+from collections.abc import Iterable, Iterator
 from contextlib import suppress
-from dataclasses import dataclass, field
+from dataclasses import dataclass
 from itertools import islice
 
 from alula.check import entries
@@ -13,8 +13,10 @@ from alula.check.exclusion import exclude
 from alula.check.problems import of_element
 from alula.check.reach import Reach, never_reached, several_run, unreached, waits_in_vain
 from alula.check.scripts import Scripts
-from alula.check.sites import Site, expand
+from alula.check.sites import expand
 from alula.check.traits import Traits
+from alula.check.unread import never_read
+from alula.check.whole import Rule, Whole
 from alula.trees.access import scripts_of
 from alula.trees.errors import Problem
 from alula.trees.library import Library
@@ -32,26 +34,6 @@ MOST = 100
 
 class _Enough(Exception):  # noqa: N818 - ends what goes on reporting
     """There are as many problems as are told."""
-
-
-@dataclass
-class Whole:
-    """A tree as it will stand, and what is known of it: what rules are made of."""
-
-    root: Site
-    scripts: Scripts
-    reach: Reach
-    traits: Traits
-    given: Collection[str] | None = None
-    """Entries of its blackboard that are written before it starts; None: who starts it, and with which entries, is not in the files."""
-    others: Writers = field(default_factory=dict)
-    """What the main tree writes on the blackboard of another one."""
-    begins_late: bool = False
-    """It may begin before or after the main tree has written them."""
-    foreign: bool = False
-
-
-Rule = Callable[[Whole], Iterable[Problem]]
 
 
 @dataclass(frozen=True)
@@ -89,32 +71,39 @@ def check(
         verify(files, palette, report, of_others=of_others, others=() if checked is None else checked.documents)
     is_told = checked is not None and files.is_part and files.main in files.trees and checked.has_user(files.trees[files.main])
     if files.trees and not is_told and not any(problem.code in ENDLESS for problem in found):
-        found += _wholes(files, palette, traits, (*RULES, *rules), beside, foreign=foreign)
+        wholes = list(_wholes(files, palette, traits, beside, foreign=foreign))
+        found += _problems(wholes, (*RULES, *rules))
+        if all(problem.warning for problem in found):  # else what is to be mended may be what reads it
+            found += _problems(wholes, [never_read])
     places: dict[tuple[object, ...], Problem] = {}
     for problem in found:
         places.setdefault((problem.code, problem.place, problem.message), problem)
     return sorted(places.values(), key=lambda one: (one.place.path != files.path, one.place.path, one.place.line, one.place.column))
 
 
-def _wholes(
-    files: TreeFiles, palette: Palette, traits: Traits, rules: Iterable[Rule], beside: Beside, *, foreign: bool
-) -> Iterator[Problem]:
+def _wholes(files: TreeFiles, palette: Palette, traits: Traits, beside: Beside, *, foreign: bool) -> Iterator[Whole]:
     model = files.models.get(files.main)
     programs, reach = Scripts(), Reach(traits)
     given, others = tuple(model.ports) if model else (), Writers()
     # A tree of these is ticked by itself, also where the main one has it as a subtree, over other entries then.
     started = [name for name in (*beside.before, *beside.later) if name in files.trees and name != files.main]
     mains = [files.main] if files.main in files.trees else []
-    for name in dict.fromkeys((*mains, *started, *_others(files))):
-        root = expand(files, palette, name)
-        if root is None:
-            continue
+    several = dict.fromkeys((*mains, *started, *_others(files)))
+    roots = {name: root for name in several if (root := expand(files, palette, name)) is not None}
+    for name, root in roots.items():
         known = given if name in started or (name == files.main and not files.is_part) else None
-        whole = Whole(root, programs, reach, traits, known, others, name in beside.later, foreign)
-        for rule in rules:
-            yield from islice(rule(whole), MOST)
+        around = [one for one in (*mains, *started) if one in roots and one != name] if name in {*mains, *started} else []
+        shared = tuple(roots[one] for one in around)
+        yield Whole(root, programs, reach, traits, known, others, name in beside.later, foreign, shared)
         if name == files.main:
             others = entries.written(root, entries.Uses(programs, traits))
+
+
+def _problems(wholes: Iterable[Whole], rules: Iterable[Rule]) -> Iterator[Problem]:
+    several = list(rules)
+    for whole in wholes:
+        for rule in several:
+            yield from islice(rule(whole), MOST)
 
 
 def _others(files: TreeFiles) -> list[str]:

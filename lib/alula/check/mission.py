@@ -9,6 +9,7 @@ from pathlib import Path
 
 from alula.check.checking import Beside, check
 from alula.check.names import NameRules
+from alula.check.outcomes import OutcomeRules
 from alula.check.rules import SkillRules
 from alula.check.skills import Skills, SkillTraits
 from alula.language.messages import NO_MESSAGES, Messages
@@ -53,7 +54,7 @@ def check_mission(
     skills = Skills(skillsets, messages)
     rules = SkillRules(skills)
     known = palette_for(files, skillsets, palettes, part)
-    own = (rules.units, rules.results, rules.resources, NameRules(skills).names)
+    own = (rules.units, rules.results, rules.resources, NameRules(skills).names, OutcomeRules(skills).asked)
     foreign = bool(palettes) or of_others
     found += check(files, known, SkillTraits(skills, enums), own, beside=BESIDE, foreign=foreign, of_others=of_others, checked=checked)
     if of_others:

@@ -6,9 +6,9 @@ from collections.abc import Iterator
 from contextlib import suppress
 from dataclasses import dataclass
 
-from alula.check.checking import Whole
 from alula.check.problems import in_value
 from alula.check.skills import Skills
+from alula.check.whole import Whole
 from alula.common.suggestions import nearest, quoted
 from alula.language.messages import FieldError
 from alula.missions.world import FUNCTIONS

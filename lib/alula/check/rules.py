@@ -6,12 +6,12 @@ import re
 from collections.abc import Iterator
 from dataclasses import dataclass
 
-from alula.check.checking import Whole
 from alula.check.problems import of_element, of_value
 from alula.check.reach import is_parallel
 from alula.check.resources import clash
 from alula.check.sites import Site
 from alula.check.skills import Skills, named_results
+from alula.check.whole import Whole
 from alula.common.suggestions import nearest, quoted
 from alula.missions.skill_types import OUTCOME_PORT, SUCCESS_PORT
 from alula.model.model import Skill

@@ -113,6 +113,7 @@ CODES: Mapping[str, str] = {
     "ALU621": "the ID of a tree that newer versions of BehaviorTree.CPP refuse",
     "ALU622": "a tree that several files of a folder define",
     "ALU623": "a file of BehaviorTree.CPP 3, or one that does not say its format",
+    "ALU624": "an entry that is written and never read",
     "ALU701": "a mission that can end so that a skill can't start any more",
     "ALU702": "a failure that nothing answers",
     "ALU703": "a node that no run ticks",

@@ -43,6 +43,7 @@ SOUND = """<?xml version="1.0"?>
           <AlwaysSuccess/><AlwaysSuccess/><AlwaysFailure/>
         </Switch2>
         <SetBlackboard value="1;2" output_key="queue"/>
+        <LoopInt queue="{queue}" value="{item}"><ScriptCondition code="item &gt; 0"/></LoopInt>
       </Sequence>
       <ForceFailure>
         <Sequence name="give up"><ScriptCondition code="why != 'DONE'"/><drone.hover duration="5"/></Sequence>
@@ -126,16 +127,16 @@ def test_a_finding_stands_at_its_column(text, code, shown, cure, robot):
 
 FOUND = (
     # Entries through subtrees: what is remapped is one entry, what is not is another.
-    ('<Sequence><Script code="x := 1"/><SubTree ID="in" y="{x}"/></Sequence>', '<Script code="z := y"/>', []),
+    ('<Sequence><Script code="x := 1"/><SubTree ID="in" y="{x}"/></Sequence>', '<ScriptCondition code="y == 1"/>', []),
     ('<Sequence><Script code="x := 1"/><SubTree ID="in"/></Sequence>', '<Script code="z := x"/>', ["ALU607"]),
-    ('<Sequence><Script code="x := 1"/><SubTree ID="in" _autoremap="1"/></Sequence>', '<Script code="z := x"/>', []),
+    ('<Sequence><Script code="x := 1"/><SubTree ID="in" _autoremap="1"/></Sequence>', '<ScriptCondition code="x == 1"/>', []),
     ('<Sequence><Script code="_x := 1"/><SubTree ID="in" _autoremap="1"/></Sequence>', '<Script code="z := _x"/>', ["ALU607"]),
-    ('<Sequence><Script code="x := 1"/><SubTree ID="in"/></Sequence>', '<Script code="z := @x"/>', []),
-    ('<Sequence><SubTree ID="in" y="{x}"/><Script code="z := x"/></Sequence>', '<Script code="y := 1"/>', []),
+    ('<Sequence><Script code="x := 1"/><SubTree ID="in"/></Sequence>', '<ScriptCondition code="@x == 1"/>', []),
+    ('<Sequence><SubTree ID="in" y="{x}"/><ScriptCondition code="x == 1"/></Sequence>', '<Script code="y := 1"/>', []),
     ('<Sequence><SubTree ID="in" y="{x}"/><Script code="x := 2"/></Sequence>', "<Script code=\"y := 'slow'\"/>", ["ALU608"]),
     # In the order of the file, but for nodes that tick their children at once.
     ('<Sequence><SubTree ID="in"/><Script code="a := b"/><Script code="b := 1"/></Sequence>', "<AlwaysSuccess/>", ["ALU607"]),
-    ('<Parallel><SubTree ID="in"/><Script code="a := b"/><Script code="b := 1"/></Parallel>', "<AlwaysSuccess/>", []),
+    ('<Parallel><SubTree ID="in"/><ScriptCondition code="b == 1"/><Script code="b := 1"/></Parallel>', "<AlwaysSuccess/>", []),
     # Never reached.
     ('<Sequence><Inverter><SubTree ID="in"/></Inverter><AlwaysSuccess/></Sequence>', "<AlwaysSuccess/>", ["ALU610"]),
     ('<Sequence><Inverter _skipIf="1"><SubTree ID="in"/></Inverter><AlwaysSuccess/></Sequence>', "<AlwaysSuccess/>", []),
@@ -158,7 +159,7 @@ FOUND = (
     ('<ForceSuccess><Parallel success_count="1"><SubTree ID="in"/><drone.turn angle="1"/></Parallel></ForceSuccess>', "<drone.watch/>", []),
     # Results.
     ('<Sequence><SubTree ID="in"/><AlwaysSuccess/></Sequence>', '<drone.hover duration="1"/>', ["ALU609"]),
-    ('<Sequence><SubTree ID="in"/><AlwaysSuccess/></Sequence>', '<drone.hover duration="1" outcome="{why}"/>', []),
+    ('<Sequence><SubTree ID="in"/><AlwaysSuccess/></Sequence>', '<drone.hover duration="1" outcome="{why}" _post="why == \'DONE\'"/>', []),
     ('<Fallback><SubTree ID="in"/><AlwaysSuccess/></Fallback>', '<drone.hover duration="1"/>', []),
     ('<Fallback><AlwaysFailure/><SubTree ID="in"/></Fallback>', '<drone.hover duration="1"/>', ["ALU609"]),
 )  # fmt: skip
@@ -169,6 +170,63 @@ def test_the_whole_tree_is_looked_at(outer, inner, expected, robot):
     trees = f'<BehaviorTree ID="main">{outer}</BehaviorTree><BehaviorTree ID="in">{inner}</BehaviorTree>'
     text = f'<root BTCPP_format="4" main_tree_to_execute="main">{trees}</root>'
     assert codes(findings_of("mission.xml", text.encode(), robot)) == expected
+
+
+ASKED = (
+    ("<ScriptCondition code=\"why == 'DOEN'\"/>", "DOEN", "did you mean `DONE`?"),
+    ("<ScriptCondition code=\"'DOEN' != why\"/>", "DOEN", "did you mean `DONE`?"),
+    (
+        '<Switch2 variable="{why}" case_1="DONE" case_2="FALED"><AlwaysSuccess/><AlwaysFailure/><AlwaysSuccess/></Switch2>',
+        "FALED",
+        "`FAILED`",
+    ),
+)
+
+
+@pytest.mark.parametrize(("asked", "text", "cure"), ASKED)
+def test_an_end_that_no_skill_has_is_told_where_it_is_asked(asked, text, cure, robot):
+    hover = '<ForceSuccess><drone.hover duration="1" outcome="{why}"/></ForceSuccess>'
+    (finding,) = node(f"<Sequence>{hover}{asked}</Sequence>", robot)
+    assert (finding.code, finding.severity) == ("ALU618", Severity.ERROR)
+    assert finding.source_line[finding.span.column - 1 : finding.span.end_column - 1].strip("'") == text
+    assert cure in finding.hint
+    assert "drone.hover" in finding.message
+
+
+NOT_ALONE = (
+    "<Script code=\"why := 'DOEN'\"/>",
+    "<Script code=\"why := drone.flight == IN_AIR ? 'DOEN' : ''\"/>",
+    '<SetBlackboard value="DOEN" output_key="why"/>',
+    '<SubTree ID="says" why="{why}"/>',
+)
+
+
+@pytest.mark.parametrize("more", NOT_ALONE)
+def test_a_text_that_something_else_may_write_is_no_finding(more, robot):
+    hover = '<ForceSuccess><drone.hover duration="1" outcome="{why}"/></ForceSuccess>'
+    tree = f"<Sequence>{hover}{more}<ScriptCondition code=\"why == 'DOEN'\"/></Sequence>"
+    says = '<BehaviorTree ID="says"><Script code="why := \'DOEN\'"/></BehaviorTree></root>'
+    text = whole(tree).replace("</root>", says).replace("<root ", '<root main_tree_to_execute="mission" ')
+    assert codes(findings_of("mission.xml", text.encode(), robot)) == []
+
+
+UNREAD = (
+    ('<Script code="tries := 0; tries += 1"/>', ["ALU624"]),
+    ('<ForceSuccess><drone.hover duration="1" outcome="{why}"/></ForceSuccess>', ["ALU624"]),
+    ('<Sequence><Script code="seen := 1"/><ScriptCondition code="sen == 1"/></Sequence>', ["ALU607"]),
+    ('<Script code="degraded := true"/>', []),
+    ('<Script code="flown := 1"/>', []),
+    ('<Script code="seen := 1" _description="counts what was seen"/>', []),
+    ('<Sequence><Script code="text := \'1 == 1\'"/><ScriptCondition code="{text}"/></Sequence>', []),
+)
+
+
+@pytest.mark.parametrize(("tree", "expected"), UNREAD)
+def test_what_nothing_reads_is_told_once_and_where_nothing_else_is_wrong(tree, expected, robot):
+    model = '<TreeNodesModel><SubTree ID="mission"><output_port name="flown" default="0"/></SubTree></TreeNodesModel></root>'
+    found = findings_of("mission.xml", whole(tree).replace("</root>", model).encode(), robot)
+    assert codes(found) == expected
+    assert all(one.severity is Severity.WARNING for one in found if one.code == "ALU624")
 
 
 def test_what_may_never_come_at_once_is_a_warning(robot):
@@ -316,8 +374,8 @@ BESIDE = (
     # What stops the robot may begin at any moment.
     ("<AlwaysSuccess/>", "stop_here", '<ScriptCondition code="zz == 1"/>', [("ALU607", "zz", "error")]),
     ('<Script code="zz := 1"/>', "stop_here", '<ScriptCondition code="zz == 1"/>', [("ALU607", "zz", "warning")]),
-    ('<Script code="zz := 1"/>', "stop_here", '<Script code="zz := 2; y := zz"/>', []),
-    ("<AlwaysSuccess/>", "stop_here", '<Script code="zz := time"/>', []),
+    ('<Script code="zz := 1"/>', "stop_here", '<ScriptCondition code="zz := 2; zz == 1"/>', []),
+    ("<AlwaysSuccess/>", "stop_here", '<ScriptCondition code="time == 1"/>', []),
     # One that is also a subtree of the main tree is ticked by itself all the same.
     ('<SubTree ID="stop_here" zz="1"/>', "stop_here", '<ScriptCondition code="zz == 1"/>', [("ALU607", "zz", "error")]),
     ('<SubTree ID="ready" zz="1"/>', "ready", '<Needs if="zz == 1" otherwise="\'no\'"/>', [("ALU607", "zz", "error")]),

@@ -93,13 +93,13 @@ def test_what_is_checked_with_nav2s_nodes_can_be_run(robot, tmp_path):
 
 
 def test_nav2_reads_goals_unchecked(robot):
-    goal = '<GoalUpdater input_goal="{goal}" output_goal="{g}"><AlwaysSuccess/></GoalUpdater>'
+    goal = '<GoalUpdater input_goal="{goal}" output_goal="{g}"><GoalUpdater input_goal="{g}"><AlwaysSuccess/></GoalUpdater></GoalUpdater>'
     assert found(goal, "", robot) == []
     assert found("<GoalUpdatedController><AlwaysSuccess/></GoalUpdatedController>", "", robot) == []
 
 
 def test_an_output_is_written_by_its_default(robot):
-    body = '<Sequence><Grip force="2"/>{}<Script code="x := held"/></Sequence>'
+    body = '<Sequence><Grip force="2"/>{}<ScriptCondition code="held == 1"/></Sequence>'
     assert [one.code for one in found(body.format(""), GRIP, robot)] == ["ALU620"]
     without = GRIP.replace(' default="{held}"', "")
     assert sorted(one.code for one in found(body.format(""), without, robot)) == ["ALU607", "ALU620"]

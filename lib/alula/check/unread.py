@@ -1,0 +1,108 @@
+"""Entries of the blackboard that are written and never read: nothing comes of them."""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Iterator
+
+from alula.check.problems import in_value, of_value
+from alula.check.scripts import Scripts
+from alula.check.sites import Key, Site
+from alula.check.whole import Whole
+from alula.common.suggestions import nearest
+from alula.missions.mission_file import DEGRADED, STOPPING
+from alula.trees.access import scripts_of, takes_script_from_entry
+from alula.trees.document import Attribute
+from alula.trees.errors import Problem
+from alula.trees.node import pointer
+from alula.trees.palette import Direction
+from alula.trees.script.syntax import Assignment, Name, Node, children
+
+TOLD = frozenset({DEGRADED, STOPPING})
+"""Entries that the mission itself reads."""
+_WORD = re.compile(r"@?[A-Za-z_]\w*")
+
+
+def never_read(whole: Whole) -> Iterator[Problem]:
+    """Yield the first writing of each entry that nothing in the files reads; who else reads entries of a foreign mission, nobody knows."""
+    roots = (whole.root, *whole.beside)
+    if whole.given is None or whole.foreign or any(_reads_anything(site) for root in roots for site in root.walk()):
+        return
+    board = whole.root.board
+    read = {board.key(name) for name in (*whole.given, *TOLD)}
+    for root in roots:
+        found = {key for site in root.walk() for key in _read(site, whole.scripts)}
+        read |= found if root is whole.root else {key for key in found if key[0] == board.number}
+    names = sorted({name for _, name in read})
+    told: set[Key] = set()
+    for site in whole.root.walk():
+        for name, attribute, place in _written(site, whole.scripts):
+            key = site.board.key(name)
+            if key not in read and key not in told:
+                told.add(key)
+                yield _unread(name, attribute, place, names)
+
+
+def _unread(name: str, attribute: Attribute, place: tuple[int, int] | None, names: list[str]) -> Problem:
+    message = f"`{name}` is written, and nothing reads it"
+    alike = nearest(name, names)
+    cure = (
+        alike if alike.startswith("did you mean") else "take it away, or have the mission tell it: an output port of the main tree's model"
+    )
+    if place is None:
+        return of_value("ALU624", attribute, message, cure, warning=True)
+    return in_value("ALU624", attribute, place, message, cure, warning=True)
+
+
+def _reads_anything(site: Site) -> bool:
+    """Tell whether a node may read entries that its element does not name."""
+    return site.type is None or takes_script_from_entry(site.element, site.type)
+
+
+def _read(site: Site, scripts: Scripts) -> Iterator[Key]:
+    for attribute in scripts_of(site.element, site.type):
+        program = scripts.program(attribute)
+        for statement in program.statements if program else ():
+            yield from (site.board.key(name) for name in _names(statement))
+    for word in _WORD.findall(site.element.get("_description")):
+        yield site.board.key(word)
+    for attribute in site.ports() if not site.is_subtree else ():
+        port = site.type.ports.get(attribute.name) if site.type else None
+        key = pointer(attribute.value, attribute.name)
+        if key is not None and (port is None or port.direction is not Direction.OUTPUT):
+            yield site.board.key(key)
+
+
+def _names(node: Node) -> Iterator[str]:
+    """Yield the names that a script reads; what it only counts up is not read by that."""
+    match node:
+        case Name(name=name):
+            yield name
+        case Assignment(value=value):
+            yield from _names(value)
+        case _:
+            for child in children(node):
+                yield from _names(child)
+
+
+def _written(site: Site, scripts: Scripts) -> Iterator[tuple[str, Attribute, tuple[int, int] | None]]:
+    """Yield what a node writes: the entry, and where the file says so."""
+    for attribute in scripts_of(site.element, site.type):
+        program = scripts.program(attribute)
+        for statement in program.statements if program else ():
+            for target in _targets(statement):
+                yield target.name, attribute, (target.offset, target.end)
+    for attribute in site.ports() if site.type and not site.is_subtree else ():
+        port = site.type.ports.get(attribute.name) if site.type else None
+        key = pointer(attribute.value, attribute.name)
+        if port is not None and port.written_from and key is None:
+            yield attribute.value, attribute, None
+        elif port is not None and key is not None and port.direction is Direction.OUTPUT:
+            yield key, attribute, None
+
+
+def _targets(node: Node) -> Iterator[Name]:
+    if isinstance(node, Assignment) and isinstance(node.target, Name):
+        yield node.target
+    for child in children(node):
+        yield from _targets(child)

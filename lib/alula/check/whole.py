@@ -1,0 +1,35 @@
+"""What rules are given: a tree as it will stand, and what is known of it."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Collection, Iterable
+from dataclasses import dataclass, field
+
+from alula.check.entries import Writers
+from alula.check.reach import Reach
+from alula.check.scripts import Scripts
+from alula.check.sites import Site
+from alula.check.traits import Traits
+from alula.trees.errors import Problem
+
+
+@dataclass
+class Whole:
+    """A tree as it will stand, and what is known of it: what rules are made of."""
+
+    root: Site
+    scripts: Scripts
+    reach: Reach
+    traits: Traits
+    given: Collection[str] | None = None
+    """Entries of its blackboard that are written before it starts; None: who starts it, and with which entries, is not in the files."""
+    others: Writers = field(default_factory=dict)
+    """What the main tree writes on the blackboard of another one."""
+    begins_late: bool = False
+    """It may begin before or after the main tree has written them."""
+    foreign: bool = False
+    beside: tuple[Site, ...] = ()
+    """Other trees on the same blackboard: the main one, and those that stand beside it."""
+
+
+Rule = Callable[[Whole], Iterable[Problem]]
