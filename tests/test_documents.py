@@ -33,7 +33,7 @@ PAGES = sorted(
     if path.name != "CHANGELOG.md" and ".alula" not in path.parts  # what a set-up has made in an example's folder
 )
 NAMES = [str(path.relative_to(ALULA_ROOT)) for path in PAGES]
-EXAMPLE = re.compile(r"[A-Z]{3,}|rover|patrol|my_|[<>{}$@]|\.\.\.")
+EXAMPLE = re.compile(r"[A-Z]{3,}|rover|patrol|porter|deliver\.|my_|[<>{}$@]|\.\.\.")
 """A placeholder, or what a page has its reader write."""
 
 

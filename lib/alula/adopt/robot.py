@@ -12,7 +12,7 @@ from alula.adopt.entries import GivenEntry
 from alula.adopt.expected import expected_states
 from alula.adopt.foreign import elements_of, foreign_types, known_palette, make_actions_of_missing_trees, needed
 from alula.adopt.missions import MissionOf, Missions
-from alula.adopt.skillset import mocks_text, model_text, types_text
+from alula.adopt.skillset import faults_text, mocks_text, model_text, types_text
 from alula.adopt.telling import decisions, names_of_nodes
 from alula.adopt.vocabulary import Vocabulary
 from alula.generate.scaffold.skeleton import files_of
@@ -56,10 +56,12 @@ def robot_from_trees(name: str, mains: Sequence[TreeFiles], folder: Path) -> New
     missions = Missions(mains, vocabulary, known_palette(mains), folder)
     unused = every - {tree for files in mains for tree in files.trees}
     to_decide = list(decisions(vocabulary, missions, missing=missing, unused=unused))
+    states = expected_states(trees, vocabulary)
     files = {
         f"skillsets/{name}.skill": model_text(vocabulary, missions.entries),
         "skillsets/types.yaml": types_text(vocabulary, missions.entries),
-        "skillsets/mock.yaml": mocks_text(vocabulary, expected_states(trees, vocabulary)),
+        "skillsets/mock.yaml": mocks_text(vocabulary, states),
+        "skillsets/faults.yaml": faults_text(vocabulary, states),
         f"python/{name}_trees.py": module_text(vocabulary),
         **{f"missions/{file}": text for file, text in missions.texts().items()},
         **{path: text for one in missions.all for path, text in _scenario(name, one)},

@@ -47,6 +47,15 @@ def mocks_text(vocabulary: Vocabulary, states: Mapping[str, str]) -> str:
     return "\n".join([*lines, ""])
 
 
+def faults_text(vocabulary: Vocabulary, states: Mapping[str, str]) -> str:
+    """Return the file that says what a fault brings about, for reports; ``states`` as for `mocks_text`."""
+    robot = vocabulary.robot
+    lines = ["# What a fault brings about before the mission responds; reports and campaigns credit a failure to a fault by it.", "faults:"]
+    lines += [f"  {one.name}: {{ends: {{{robot}.{one.name}: {FAILED}}}}}" for one in vocabulary.skills.values()]
+    lines += [f"  {name}: {{states: {{{robot}.{name}: {FAILS if state == HOLDS else HOLDS}}}}}" for name, state in states.items()]
+    return "\n".join([*lines, ""])
+
+
 def in_a_line(text: str) -> str:
     """Return a text without its line ends."""
     return " ".join(text.split())

@@ -40,8 +40,8 @@ def decisions(vocabulary: Vocabulary, missions: Missions, *, missing: Iterable[s
         ],
         "trees that are in no file, so they are skills: give their folder, too, if you have it": sorted(missing),
         "trees that no main tree uses, so they are left out: `--main ID` makes a robot of one": sorted(unused),
-        "worlds with what a program writes on the blackboard before a tree starts: write in `worlds/` what it does": [
-            one.name for one in missions.all if one.given
+        "stands for what a program writes on the blackboard before a tree starts: write what it does": [
+            f"worlds/{one.name}.yaml" for one in missions.all if one.given
         ],
     }
     for what, names in told.items():

@@ -71,6 +71,8 @@ def test_what_works_in_it_at_once(tmp_path, about, capsys):
     assert [one["skill"] for one in summary["skills"]] == ["open_door", "grasp", "move_to", "track"]
     assert (tmp_path / "run/report.html").is_file()
     assert run.main(["deliver", "--mock", "--fail", "move_to@2.5", "--out", str(tmp_path / "failed")]) == 1
+    recovery = json.loads((tmp_path / "failed/summary.json").read_text())["recovery"]
+    assert recovery["detected_s"] is not None
     assert odds.main(["missions/deliver.xml", "--json"]) == 0
     assert palette.main(["skillsets"]) == 0
     assert 'ID="rover.move_to"' in capsys.readouterr().out
@@ -120,7 +122,7 @@ def test_what_a_person_has_to_decide_is_told(tmp_path, capsys):
         "`Careful`, `Gone`, `Grasp` and 2 more: not declared",
         "`Careful`: nodes with children of a program's own",
         "`Gone`: trees that are in no file",
-        "`deliver`: worlds",
+        "`worlds/deliver.yaml`: stands for what a program writes",
     ):
         assert len([line for line in told if words in line]) == 1, words
         assert f"- {words}" in readme
@@ -205,6 +207,23 @@ def test_a_tree_of_format_3_is_converted(tmp_path, about):
     assert '<SubTree ID="Go" to="{x}"/>' in mission
     assert "<SequenceWithMemory>" in mission
     assert Mission.load("main", robot).run().outcome is Outcome.ACCOMPLISHED
+
+
+def test_a_subtree_gets_what_its_model_has_by_default(tmp_path):
+    model = '<SubTree ID="Go"><input_port name="to" default="home"/><input_port name="by" default="{way}"/></SubTree>'
+    inner = f'<BehaviorTree ID="Go"><MoveTo goal="{{to}}" by="{{by}}"/></BehaviorTree><TreeNodesModel>{model}</TreeNodesModel>'
+    root = ' BTCPP_format="4" main_tree_to_execute="Main"'
+    robot = made(tmp_path, main=tree('<SubTree ID="Go"/>', '<SubTree ID="Go" to="yard"/>', rest=inner, root=root))
+    goals = [(one.inputs.goal, one.inputs.by) for one in Mission.load("main", robot).run().executions]
+    assert goals == [("home", ""), ("yard", "")]
+    assert yaml.safe_load((robot / "worlds/main.yaml").read_text()) == {"way": ""}
+
+
+def test_trees_that_no_main_tree_uses_are_told(tmp_path, capsys):
+    rest = '<BehaviorTree ID="Spare"><Sit/></BehaviorTree>'
+    robot = made(tmp_path, main=tree("<Go/>", rest=rest, root=' BTCPP_format="4" main_tree_to_execute="Main"'))
+    assert "to decide: `Spare`: trees that no main tree uses" in capsys.readouterr().out
+    assert [one.name for one in skillset_of(robot).skills] == ["go"]
 
 
 def test_trees_of_names_that_mean_something_in_missions_are_renamed(tmp_path):
