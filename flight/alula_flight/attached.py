@@ -1,7 +1,7 @@
 """The supervisor of a run on what runs already: ``python -m alula_flight.attached RUN_SPEC``.
 
-It starts the mission and the recorder of its bag, and nothing else, watches the deployment's parts, and ends when the mission does. Exit
-code: the mission's, or 1.
+It starts the mission and the recorder of its bag, and nothing else, watches the deployment's parts, and ends when the mission does and the
+robot is at rest. Exit code: the mission's, or 1.
 """
 
 from __future__ import annotations
@@ -13,19 +13,24 @@ import shutil
 import signal
 import subprocess
 import sys
+import threading
 import time
 from pathlib import Path
 
+from alula.common.scenarios import load_scenario
 from alula.common.signals import on_end_signal
 from alula.report.deaths import Death, describe_exit, note_again, note_death
 from alula.report.ends import SIGNAL, SUPERVISOR, ReportedEnd, note_end
+from alula.runtime.live.part import RunPart, part_of_robot
 from alula.runtime.live.spec import RunSpec
 from alula_flight.mission_clock import MissionClock
 from alula_flight.outcome import GIVEN_UP, finish
+from alula_flight.rest import Rest
 from alula_flight.station import state as states
 from alula_flight.station.parts import recording
 from alula_flight.station.state import StationState
 from alula_flight.station.station import Station
+from alula_flight.waits import Held
 
 LOOK_S = 0.2
 ABORT_TIMEOUT_S = 150.0  # wall clock, for the mission to bring the robot to rest
@@ -59,21 +64,29 @@ class PartsWatch:
 class AttachedSupervisor:
     """One mission, from its start to its end."""
 
-    def __init__(self, spec: RunSpec) -> None:
+    def __init__(self, spec: RunSpec, part: RunPart) -> None:
         self._spec = spec
+        self._part = part
         self._out = Path(spec.out_dir)
         self._station = Station(spec.deployment)
         self._parts = PartsWatch(self._out, self._station.folder)
         self._front = os.getppid()
         self._asked: signal.Signals | None = None
+        self._changed = threading.Event()
         self._clock = MissionClock()
         self._clock.begin(simulated=False)
         self._began_s = self._clock.now_s or 0.0
+        self._serves = not load_scenario(spec.scenario).mission
+        self._held = Held(spec, part, self._clock)
+        self._rest = Rest(
+            part, self._clock, self._held, look=self._look, told_to_end=lambda: self._told_to_end, note_abort=self._note_abort
+        )
         self.front_died = False
 
     def run(self) -> int:
         """Run; return the exit code."""
         on_end_signal(self._end_asked)
+        self._listen()
         recorder = self._start("recorder", self._recording()) if self._station.deployment.topics else None
         mission = self._start("mission", self._mission())
         try:
@@ -101,24 +114,45 @@ class AttachedSupervisor:
         with (self._out / "logs" / f"{name}.log").open("wb") as said:
             return subprocess.Popen(words, stdin=subprocess.DEVNULL, stdout=said, stderr=said, start_new_session=True)
 
+    def _listen(self) -> None:
+        """Have the robot's part hear its topics, as a node beside what runs already."""
+        import rospy
+
+        try:
+            rospy.init_node("alula_supervisor", anonymous=True, disable_signals=True)
+            self._part.listen(self._spec, lambda _: None)
+        except (rospy.ROSException, OSError) as error:  # the master has gone just now: the mission may do without it
+            log.error("the robot is not watched: %s", error)
+
     def _until_over(self, mission: subprocess.Popen[bytes]) -> int:
         told_s: float | None = None
         while mission.poll() is None:
-            with contextlib.suppress(subprocess.TimeoutExpired):
-                mission.wait(LOOK_S)
-            self._parts.look(self._clock.now_s or 0.0)
-            self._look_for_the_front()
-            if told_s is None and (self._asked is not None or self.front_died or self._over_time):
+            self._look()
+            if told_s is None and self._told_to_end:
                 told_s = time.monotonic()
                 self._note_abort()
                 mission.send_signal(signal.SIGINT)
             if told_s is not None and time.monotonic() - told_s > ABORT_TIMEOUT_S:
                 log.error("the mission did not end within %.0f s after it was told to", ABORT_TIMEOUT_S)
                 return GIVEN_UP
-        if mission.returncode >= 0:
-            return mission.returncode
-        note_death(self._out, Death("mission", describe_exit(mission.returncode), self._clock.now_s))
-        return GIVEN_UP
+        if mission.returncode < 0:
+            note_death(self._out, Death("mission", describe_exit(mission.returncode), self._clock.now_s))
+        if mission.returncode != 0 or self._serves or self._held.look():
+            self._rest.bring()  # what the mission could not, or there was none
+        return mission.returncode if mission.returncode >= 0 else GIVEN_UP
+
+    def _look(self) -> None:
+        """Wait a moment, and look what is new."""
+        self._changed.wait(LOOK_S)
+        self._changed.clear()
+        self._parts.look(self._clock.now_s or 0.0)
+        self._look_for_the_front()
+        self._held.look()
+
+    @property
+    def _told_to_end(self) -> bool:
+        """Tell whether somebody, or the run's limit, wants the run to end."""
+        return self._asked is not None or self.front_died or self._over_time
 
     @property
     def _over_time(self) -> bool:
@@ -140,6 +174,7 @@ class AttachedSupervisor:
 
     def _end_asked(self, number: signal.Signals) -> None:
         self._asked = number
+        self._changed.set()
 
     def _end_recorder(self, recorder: subprocess.Popen[bytes]) -> None:
         """Have it write its bag's index."""
@@ -154,7 +189,7 @@ def main(arguments: list[str]) -> int:
     """Run what the specification file says."""
     logging.basicConfig(level=logging.INFO)
     spec = RunSpec.load(Path(arguments[0]))
-    supervisor = AttachedSupervisor(spec)
+    supervisor = AttachedSupervisor(spec, part_of_robot())
     code = supervisor.run()
     if supervisor.front_died:
         finish(spec, code)

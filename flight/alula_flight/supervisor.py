@@ -30,6 +30,7 @@ from alula_flight.launch import launch_arguments, launch_file
 from alula_flight.mission_clock import MissionClock
 from alula_flight.outcome import GIVEN_UP, finish
 from alula_flight.process_faults import ProcessFaults, Started, process_faults_of
+from alula_flight.rest import Rest
 from alula_flight.waits import Beginning, Held
 
 OF_EVERY_ROBOT = {"mission": Consequence.REST, "master": Consequence.ABORT}
@@ -119,6 +120,15 @@ class Supervisor:
         self._began_s: float | None = None  # mission clock
         self._beginning = Beginning(spec, part, self._clock)
         self._held = Held(spec, part, self._clock)
+        self._rest = Rest(
+            part,
+            self._clock,
+            self._held,
+            look=self._look,
+            told_to_end=lambda: self._told_to_end,
+            note_abort=self._note_abort,
+            lost=lambda: self._watch.worst is Consequence.END,
+        )
         self._departure = Departure(self._out)
         self._front = os.getppid()
         self._front_died = False
@@ -205,7 +215,7 @@ class Supervisor:
             held = self._held.look()
             if self._watch.mission_exit is not None:
                 if self._watch.mission_exit != 0 or self._serves or held:
-                    self._bring_to_rest()  # what the mission could not, or there was none
+                    self._rest.bring()  # what the mission could not, or there was none
                 return self._watch.mission_exit if self._watch.worst is Consequence.GO_ON else GIVEN_UP
             if self._clock.stands_still:
                 self._ends(f"{self._clock.standstill}: nothing came from {self._part.clock_source(self._spec)}")
@@ -216,7 +226,7 @@ class Supervisor:
             if self._watch.worst is Consequence.REST:
                 if process_of(launch.pm, "mission") is not None:
                     self._ends(self._watch.worst_death)
-                self._bring_to_rest()
+                self._rest.bring()
                 return GIVEN_UP
             if (self._told_to_end or self._watch.worst is Consequence.ABORT) and abort_since is None:
                 abort_since = time.monotonic()
@@ -238,23 +248,6 @@ class Supervisor:
         self._look_for_the_front()
         self._apply_faults()
         self._watch.look()
-
-    def _bring_to_rest(self) -> None:
-        """Have the part bring the robot to rest; where somebody else has it, go on until it is at rest, or it can be brought there.
-
-        No run that was told to end before does so, and being told ends it: then somebody knows how it is.
-        """
-        told_before = self._told_to_end
-        while True:
-            held = self._held.look()
-            self._part.bring_to_rest(self._clock)
-            # Looked at before and after: it may have been given back just after the part had found that it was not ours.
-            if not (held or self._held.look()) or told_before or self._clock.stands_still or self._watch.worst is Consequence.END:
-                return
-            if self._told_to_end:
-                self._note_abort()
-                return
-            self._look()
 
     def _apply_faults(self) -> None:
         """Have faults of processes begin and end, as far as the ticks of the mission clock don't."""

@@ -24,9 +24,11 @@ from alula.common.network import free_port
 from alula.common.robots import VARIABLE as ROBOT
 from alula.generate.scaffold.skeleton import files_of
 from alula.report.deaths import read_deaths
+from alula.report.ends import read_end
 from alula.runtime.live.part import RunPart
-from alula.runtime.live.spec import RequestError
-from alula_flight.attached import PartsWatch
+from alula.runtime.live.spec import RequestError, RunSpec
+from alula_flight import attached as attachments
+from alula_flight.attached import AttachedSupervisor, PartsWatch
 from alula_flight.command_line import parse
 from alula_flight.run import CANNOT_START, main
 from alula_flight.station import keeper as keepers
@@ -383,6 +385,63 @@ def test_the_status_of_what_is_down(robot, capsys):
     assert commands(["up", "robot", "--restart", "brige"]) == CANNOT_START
     assert "did you mean `bridge`" in capsys.readouterr().err
     assert commands(["down"]) == 0
+
+
+class Watched(RunPart):
+    """Somebody else has the robot for some looks."""
+
+    def __init__(self, looks=0):
+        self.looks, self.rested = looks, 0
+
+    def held(self, clock):
+        self.looks -= 1
+        return "the pilot has it, at 3.0 m" if self.looks >= 0 else ""
+
+    def bring_to_rest(self, clock):
+        self.rested += 1
+
+
+def attached(robot, part, code, *, limit_s=0.0):
+    """Return the supervisor of a mission on the robot's deployment that ends at once with this code."""
+    out = robot / "runs/patrol"
+    (out / "logs").mkdir(parents=True, exist_ok=True)
+    supervisor = AttachedSupervisor(RunSpec("patrol", str(out), "id", deployment="robot", limit_s=limit_s, robot=str(robot)), part)
+    supervisor._mission = lambda: (sys.executable, "-c", f"import os, signal; {code}")
+    supervisor._recording = lambda: ("sleep", "100")
+    supervisor._listen = lambda: None
+    return supervisor
+
+
+@pytest.mark.parametrize(
+    ("code", "looks", "ended", "rested"),
+    [("exit(0)", 0, 0, 0), ("exit(1)", 0, 1, 1), ("os.kill(os.getpid(), signal.SIGKILL)", 0, 1, 1), ("exit(0)", 9, 0, 3)],
+    ids=["accomplished", "given up", "killed", "accomplished, and somebody else has it"],
+)
+def test_a_mission_on_what_runs_leaves_a_robot_at_rest(robot, monkeypatch, code, looks, ended, rested):
+    monkeypatch.setattr(attachments, "LOOK_S", 0.01)
+    part = Watched()
+    supervisor = attached(robot, part, code)
+    mission_of = supervisor._start
+
+    def start(name, words):
+        mission = mission_of(name, words)
+        if name == "mission":
+            mission.wait()
+            part.looks = looks
+        return mission
+
+    monkeypatch.setattr(supervisor, "_start", start)
+    assert supervisor.run() == ended
+    assert part.rested >= rested if rested else part.rested == 0
+
+
+def test_a_limit_ends_a_mission_on_what_runs_and_a_run_that_watches_on(robot, monkeypatch):
+    monkeypatch.setattr(attachments, "LOOK_S", 0.01)
+    supervisor = attached(robot, Watched(looks=10**9), "exit(1)", limit_s=0.3)
+    assert supervisor.run() == 1
+    end = read_end(robot / "runs/patrol")
+    assert end is not None
+    assert end.why == "its limit of 0.3 s is over"
 
 
 def test_a_part_that_ends_under_a_mission_is_in_its_record_and_earlier_ends_are_not(tmp_path):

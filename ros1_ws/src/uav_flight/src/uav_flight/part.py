@@ -75,6 +75,8 @@ class DronePart(RunPart):
         self._linked = False
         self._guidance: Any = None
         """The last state of the guidance."""
+        self._seen: tuple[Any, float] = (None, 0.0)
+        """The state that was looked at last, and when that was first done, mission clock: its stamp is of another computer."""
         self._landing: Any = None
         self._subscribers: list[Any] = []
 
@@ -181,7 +183,11 @@ class DronePart(RunPart):
     def held(self, clock: Clock) -> str:
         """Return that the pilot or a failsafe has the vehicle in the air, its mode and height."""
         state = self._guidance
-        if state is None or clock.now_s is None or clock.now_s - state.header.stamp.to_sec() > SILENT_S:
+        if state is None or clock.now_s is None:
+            return ""
+        if state is not self._seen[0]:
+            self._seen = state, clock.now_s
+        if clock.now_s - self._seen[1] > SILENT_S:
             return ""
         if not state.link or state.authority or not state.armed or state.landed_state not in OFF_GROUND:
             return ""
