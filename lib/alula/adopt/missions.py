@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import re
 from collections import Counter
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 
@@ -13,7 +13,7 @@ from alula.adopt.entries import Entries, GivenEntry
 from alula.adopt.foreign import elements_of
 from alula.adopt.naming import Names, snake
 from alula.adopt.vocabulary import Vocabulary
-from alula.trees.document import Element, quoted
+from alula.trees.document import Element, quoted, read_document
 from alula.trees.format3 import DECLARED, FORMAT
 from alula.trees.palette import Category, NodeType, Palette, Port
 from alula.trees.reading import LIBRARY, TreeFiles
@@ -42,7 +42,7 @@ class Missions:
     """All missions of a robot, and their files."""
 
     def __init__(self, mains: Sequence[TreeFiles], vocabulary: Vocabulary, known: Palette, folder: Path) -> None:
-        self._comments = {id(tree): text for files in mains for tree, text in _comments(files)}
+        self._comments = _comments(elements_of(mains))
         names = _names(mains)
         new = {id(tree): converted(tree, name, vocabulary) for files in mains for name, tree in files.trees.items()}
         self._old = {id(new[id(tree)]): tree for tree in elements_of(mains)}
@@ -137,18 +137,23 @@ def _told(files: TreeFiles, folder: Path) -> str:
     return path.relative_to(folder).as_posix() if path.is_relative_to(folder) else path.name
 
 
-def _comments(files: TreeFiles) -> list[tuple[Element, list[str]]]:
-    """Return the trees with the comments that stand before them in their files."""
-    found: list[tuple[Element, list[str]]] = []
-    trees = {id(tree) for tree in files.trees.values()}
-    roots = {id(document.root): document.root for document in files.documents}
-    for root in roots.values():
-        said: list[str] = []
-        for part in root.content:
-            if isinstance(part, str):
-                said += COMMENTS.findall(part)
-            else:
-                found += [(part, said)] if id(part) in trees else []
-                said = []
-    told = {id(tree) for tree, _ in found}
-    return found + [(tree, []) for tree in files.trees.values() if id(tree) not in told]
+def _comments(trees: Iterable[Element]) -> dict[int, list[str]]:
+    """Return by the identity of each tree the comments that stand before it in its file."""
+    documents: dict[str, dict[int, list[str]]] = {}
+    for tree in trees:
+        if tree.place.path not in documents:
+            documents[tree.place.path] = _comments_of(Path(tree.place.path))
+    return {id(tree): documents[tree.place.path].get(tree.place.line, []) for tree in trees}
+
+
+def _comments_of(path: Path) -> dict[int, list[str]]:
+    """Return the comments that stand before trees of a file, by the lines of those."""
+    found: dict[int, list[str]] = {}
+    said: list[str] = []
+    for part in read_document(path).root.content:
+        if isinstance(part, str):
+            said += COMMENTS.findall(part)
+        else:
+            found[part.place.line] = said
+            said = []
+    return found

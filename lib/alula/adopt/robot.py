@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import json
-from collections.abc import Iterable, Iterator, Sequence
+from collections.abc import Callable, Iterable, Iterator, Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
 
@@ -15,10 +15,12 @@ from alula.adopt.missions import MissionOf, Missions
 from alula.adopt.skillset import faults_text, mocks_text, model_text, types_text
 from alula.adopt.telling import decisions, names_of_nodes
 from alula.adopt.vocabulary import Vocabulary
+from alula.check.checking import ENDLESS
 from alula.generate.scaffold.skeleton import files_of
-from alula.trees.errors import TreeError
+from alula.trees.errors import FileError, Problem, TreeError
 from alula.trees.palette import Category
 from alula.trees.reading import TreeFiles
+from alula.trees.structure import verify
 
 TEMPLATES = Path(__file__).parent / "robot"
 
@@ -33,17 +35,21 @@ class NewRobot:
     decisions: Sequence[str]
 
 
-def robot_from_trees(name: str, mains: Sequence[TreeFiles], folder: Path) -> NewRobot:
+def robot_from_trees(name: str, mains: Sequence[TreeFiles], folder: Path, wrong: Callable[[TreeError], object]) -> NewRobot:
     """Return the robot whose skills are the actions of main trees.
 
     Args:
         name: the robot's, which is its skillset's, too.
         mains: each main tree with all that it uses; a use of a tree that is in no file becomes an action in place.
         folder: what they were read from; their files are told from there on.
+        wrong: takes what keeps a main tree from being put together: it is left out.
 
     Raises:
-        TreeError: the trees have no action that needs a robot.
+        TreeError: there is no main tree, or the trees have no action that needs a robot.
     """
+    mains = [files for files in mains if _is_sound(files, wrong)]
+    if not mains:
+        raise TreeError(f"{folder}: there is no main tree that could be a mission")
     every = {tree for files in mains for tree in files.trees}
     mains = [needed(files) for files in mains]
     missing = {tree for files in mains for tree in make_actions_of_missing_trees(files)}
@@ -78,6 +84,16 @@ def robot_from_trees(name: str, mains: Sequence[TreeFiles], folder: Path) -> New
     counts = {"skill": len(vocabulary.skills), "resource": len(vocabulary.resources), "mission": len(missions.all)}
     about = ", ".join(f"{count} {what}{'' if count == 1 else 's'}" for what, count in counts.items())
     return NewRobot(dict(sorted(files.items())), about, [one.name for one in missions.all], to_decide)
+
+
+def _is_sound(files: TreeFiles, wrong: Callable[[TreeError], object]) -> bool:
+    """Tell whether a main tree can be put together with its subtrees: none of them contains itself, and it is no giant."""
+    found: list[Problem] = []
+    verify(files, known_palette([files]), found.append, of_others=True)
+    endless = [FileError(one) for one in found if one.code in ENDLESS]
+    for error in endless[:1]:
+        wrong(error)
+    return not endless
 
 
 def _filled(text: str, told: Iterable[tuple[str, str]]) -> str:

@@ -57,9 +57,9 @@ def _from_trees(options: argparse.Namespace, name: str) -> NewRobot | None:
     place, warn = place.expanduser(), warner(COMMAND)
     wrong: list[TreeError] = []
     found = list(mains([place], options.main, options.package, wrong.append))
-    if not found:
-        raise wrong[0] if wrong else TreeError(f"{place}: there is no main tree in this folder; choose one with --main ID")
-    made = robot_from_trees(name, found, place if place.is_dir() else place.parent)
+    if wrong and not found:
+        raise wrong[0]
+    made = robot_from_trees(name, found, place if place.is_dir() else place.parent, wrong.append)
     for one in wrong:  # a file of a folder keeps no other from being used
         warn(f"left out: {one}")
     return made

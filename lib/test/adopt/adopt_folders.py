@@ -31,6 +31,7 @@ MAIN = """<root BTCPP_format="4" main_tree_to_execute="Deliver">
 </root>
 """
 DOOR = """<root BTCPP_format="4">
+  <!-- Whoever is in the hall. -->
   <BehaviorTree ID="Enter">
     <Fallback>
       <IsDoorOpen/>

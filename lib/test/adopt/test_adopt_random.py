@@ -77,7 +77,9 @@ def test_a_robot_of_random_trees_checks_clean_generates_and_runs(text):
         folder, robot = Path(place) / "trees", Path(place) / "rover"
         folder.mkdir()
         (folder / "main.xml").write_text(text, encoding="utf-8")
-        write_files(robot_from_trees("rover", mains_of(folder), folder).files, robot)
+        wrong = []
+        write_files(robot_from_trees("rover", mains_of(folder), folder, wrong.append).files, robot)
+        assert not wrong
         mission = next((robot / "missions").iterdir())
         findings = check_files(robot / "skillsets/rover.skill", mission, robot=robot, proofs=False)
         assert [str(one) for one in findings if one.severity is Severity.ERROR] == []

@@ -105,6 +105,7 @@ def test_the_mission_ticks_as_the_tree_does(tmp_path):
 def test_comments_and_names_are_kept(tmp_path):
     mission = (made(tmp_path, main=MAIN, door=DOOR) / "missions/deliver.xml").read_text()
     assert "<!-- Brings a cup. -->" in mission
+    assert "<!-- Whoever is in the hall. -->" in mission
     assert '<rover.move_to name="MoveTo" goal="{pose}" at="{at}" speed="0.5"/>' in mission
     assert '<Condition ID="rover.is_at_hall" name="in the hall" state="HOLDS"/>' in mission
 
@@ -299,5 +300,23 @@ def test_a_broken_file_keeps_no_other_from_being_used(tmp_path, capsys):
 
 def test_the_same_trees_give_the_same_robot(tmp_path):
     folder = folder_of(tmp_path, main=MAIN, door=DOOR)
-    first, second = (robot_from_trees("rover", mains_of(folder), folder) for _ in range(2))
+    wrong = []
+    first, second = (robot_from_trees("rover", mains_of(folder), folder, wrong.append) for _ in range(2))
     assert first == second
+    assert not wrong
+
+
+def test_a_tree_that_contains_itself_is_left_out(tmp_path, capsys):
+    inner = '<BehaviorTree ID="Loop"><SubTree ID="Loop"/></BehaviorTree>'
+    endless = tree("<Go/>", '<SubTree ID="Loop"/>', name="Endless", rest=inner, root=' BTCPP_format="4" main_tree_to_execute="Endless"')
+    robot = made(tmp_path, endless=endless, main=tree("<Stop/>"))
+    error = capsys.readouterr().err
+    assert error.startswith("alula new: left out: ")
+    assert "a tree contains itself: 'Loop' in 'Loop'" in error
+    assert [path.stem for path in (robot / "scenarios").iterdir()] == ["main"]
+
+
+def test_a_robot_of_one_file(tmp_path):
+    folder = folder_of(tmp_path, main=tree("<Go/>"), other=tree("<Stop/>", name="Other"))
+    assert new.main(["robot", str(tmp_path / "rover"), "--from-trees", str(folder / "main.xml")]) == 0
+    assert [one.name for one in skillset_of(tmp_path / "rover").skills] == ["go"]
