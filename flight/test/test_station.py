@@ -19,9 +19,11 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from alula.common.deployments import Deployment, DeploymentError, Discovery, Page, PageUsers
+from alula.common.deployments import Deployment, DeploymentError, Discovery, Page, PageUsers, load_deployment
+from alula.common.errors import AlulaError
 from alula.common.network import free_port
 from alula.common.robots import VARIABLE as ROBOT
+from alula.common.robots import find_robot
 from alula.generate.scaffold.skeleton import files_of
 from alula.report.deaths import read_deaths
 from alula.report.ends import read_end
@@ -35,9 +37,10 @@ from alula_flight.station import keeper as keepers
 from alula_flight.station import service as services
 from alula_flight.station import state as states
 from alula_flight.station.__main__ import main as commands
+from alula_flight.station.contents import changes, with_contents
 from alula_flight.station.disk import GB, Kept, beyond, tidy
 from alula_flight.station.keeper import Kept as KeptPart
-from alula_flight.station.keeper import end_all
+from alula_flight.station.keeper import differences, end_all
 from alula_flight.station.master import why_no_master
 from alula_flight.station.notify import VARIABLE, notify
 from alula_flight.station.parts import Part, Places, bridge_file, environment_of, network_profile, parts_of
@@ -156,6 +159,87 @@ def test_dds_binds_to_the_address_of_the_deployment_besides_loopback(deployment,
     profile = network_profile(replace(deployment, address=address), ours)
     assert re.findall(r"<address>(.*?)</address>", profile) == bound
     assert "<segment_size>67108864</segment_size>" in profile
+
+
+# --- what a part was started with -------------------------------------------------------------------------------------
+
+BRIDGE_YAML = ".alula/generated/rover_bridge.yaml"
+CONTENTS = st.dictionaries(st.sampled_from("abcde"), st.sampled_from("xyz"))
+
+
+@given(before=CONTENTS, now=CONTENTS)
+def test_each_piece_that_differs_is_named_once_and_no_other(before, now):
+    told = [name for line in changes(before, now) for name in line.partition(": ")[2].split(", ")]
+    assert sorted(told) == sorted(name for name in {*before, *now} if before.get(name) != now.get(name))
+
+
+def edited(path, old, new):
+    text = path.read_text(encoding="utf-8")
+    assert old in text
+    path.write_text(text.replace(old, new), encoding="utf-8")
+
+
+def pieces(robot):
+    """Return the contents of a new robot's parts by their names."""
+    deployment = load_deployment("robot", find_robot(robot))
+    places = Places(ROOT, robot / ".alula", robot / ".alula/up/robot")
+    generated = robot / BRIDGE_YAML
+    if not generated.exists():
+        generated.parent.mkdir(parents=True)
+        generated.write_text("topics:\n- {name: /rover/odom, depth: 5}\n- {name: /rover/cmd_vel, depth: 5}\n", encoding="utf-8")
+    parts = with_contents(parts_of(deployment, places, "id", {}), deployment, places, find_robot(robot))
+    return {part.name: part.contents for part in parts}
+
+
+@pytest.mark.parametrize(
+    ("path", "old", "new", "part", "told"),
+    [
+        ("skillsets/rover.skill", "silence = 2.0", "silence = 3.0", "rover", ["changed: resource link"]),
+        ("skillsets/rover.skill", "STUCK: apply", "JAMMED: apply", "rover", ["changed: skill drive, skill back_off"]),
+        ("skillsets/rover.skill", "resource bumper", "resource bumper2", "rover", None),
+        ("skillsets/bindings.yaml", "/rover/odom", "/rover/odometry", "rover", ["changed: binding of odometry"]),
+        (
+            "ros2_ws/src/rover_robot/rover_robot/hooks.py",
+            "SILENT_AFTER_S = ",
+            "SILENT_AFTER_S = 1 + ",
+            "rover",
+            ["changed: ros2_ws/src/rover_robot/rover_robot/hooks.py"],
+        ),
+        ("skillsets/rover.skill", "// Drives straight on.", "// Drives on.", "rover", []),
+        (BRIDGE_YAML, "cmd_vel, depth: 5", "cmd_vel, depth: 9", "bridge", ["changed: topic /rover/cmd_vel"]),
+        (
+            ".alula/generated/rover_bridge.yaml",
+            "name: /rover/cmd_vel",
+            "name: /x",
+            "bridge",
+            ["new: topic /x", "gone: topic /rover/cmd_vel"],
+        ),
+    ],
+)
+def test_a_change_of_a_model_a_binding_or_a_hook_is_named_by_what_it_is(robot, path, old, new, part, told):
+    before = pieces(robot)
+    assert changes(before[part], pieces(robot)[part]) == []
+    edited(robot / path, old, new)
+    if told is None:
+        with pytest.raises(AlulaError, match="bumper"):
+            pieces(robot)
+        return
+    now = pieces(robot)
+    assert changes(before[part], now[part]) == told
+    assert [name for name in now if name != part and now[name] != before[name]] == []
+
+
+def test_a_part_is_started_again_that_was_started_with_something_else(kept):
+    one = kept(replace(sleeper(), contents={"skill drive": "1"}))
+    turned(one, lambda: one.state.state == states.STARTING, "it is started")
+    first = one.state.pid
+    assert not one.differs
+    one.part = replace(one.part, contents={"skill drive": "2", "skill park": "1"})
+    assert one.differs
+    assert differences(one.state, one.part) == ["new: skill park", "changed: skill drive"]
+    one.end()
+    turned(one, lambda: one.state.pid not in {0, first}, "it is started again")
+    assert not one.differs
 
 
 # --- processes and their state ----------------------------------------------------------------------------------------

@@ -41,10 +41,12 @@ def up(given: Any) -> int:
     why = why_no_master(station.deployment.master)
     if why:
         say(f"no ROS master at {station.deployment.master}: {why}; the bridge waits for it")
-    was_up = station.is_up
+    was_up, differing = station.is_up, station.differences()
+    for name, how in differing.items():
+        say(f"{name} is started again, {'; '.join(how)}")
     if not was_up:
         station.begin()
-    if was_up or given.restart:
+    if was_up or differing or given.restart:
         station.ask(given.restart)
     state = station.settle()
     sys.stdout.write("".join(f"{line}\n" for line in lines_of(station, state)))

@@ -34,6 +34,7 @@ from alula.common.robots import RobotFolder, find_robot
 from alula.common.signals import StopEvent
 from alula.report.deaths import describe_exit
 from alula_flight.station import state as states
+from alula_flight.station.contents import changes, with_contents
 from alula_flight.station.disk import tidy
 from alula_flight.station.master import MasterWatch
 from alula_flight.station.notify import notify
@@ -95,8 +96,8 @@ class Kept:
 
     @property
     def differs(self) -> bool:
-        """Tell whether what runs is not what the deployment says by now."""
-        return self.state.process is not None and (self.state.words, dict(self.state.graph)) != (self.part.words, graph_of(self.part))
+        """Tell whether what runs is not what the deployment, its models and its code say by now."""
+        return self.state.process is not None and bool(differences(self.state, self.part))
 
     @property
     def log(self) -> Path:
@@ -147,7 +148,7 @@ class Kept:
                 start_new_session=True,
             )
         self.state.pid, self.state.state = self._child.pid, states.STARTING
-        self.state.words, self.state.graph = self.part.words, graph_of(self.part)
+        self.state.words, self.state.graph, self.state.contents = self.part.words, graph_of(self.part), self.part.contents
         self._begun_s = time.monotonic()
         self.state.start = states.start_of(self._child.pid)
         log.info("%s is started, process %d", self.part.name, self._child.pid)
@@ -177,6 +178,12 @@ class Kept:
 def graph_of(part: Part) -> dict[str, str]:
     """Return what a part's environment says of the graph."""
     return {name: part.environment[name] for name in GRAPH if name in part.environment}
+
+
+def differences(state: PartState, part: Part) -> list[str]:
+    """Say in what a part that runs differs from what it would be now."""
+    graph = changes(state.graph, graph_of(part))
+    return [*(["another command"] if state.words != part.words else []), *graph, *changes(state.contents, part.contents)]
 
 
 class Keeper:
@@ -242,7 +249,8 @@ class Keeper:
         profile = (self._places.root / "bridge" / PROFILE).read_text(encoding="utf-8")
         write_text(folder / PROFILE, network_profile(deployment, profile))
         write_json(folder / RUN, self._as_a_run())
-        parts = {part.name: part for part in parts_of(deployment, self._places, self._state.run_id, os.environ)}
+        plain = parts_of(deployment, self._places, self._state.run_id, os.environ)
+        parts = {part.name: part for part in with_contents(plain, deployment, self._places, self._robot)}
         for name in [name for name in self._state.parts if name not in parts]:
             process = self._state.parts.pop(name).process
             self._kept.pop(name, None)

@@ -5,7 +5,7 @@ from __future__ import annotations
 import os
 import re
 from collections.abc import Iterable, Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from ipaddress import ip_address
 from pathlib import Path
 
@@ -29,11 +29,12 @@ BAG_MB, WHITELIST = 64, re.compile(r"<interfaceWhiteList>.*?</interfaceWhiteList
 
 @dataclass(frozen=True)
 class Part:
-    """A process of a deployment: its name, its command, and the environment that it has."""
+    """A process of a deployment: its name, its command, the environment that it has, and digests of its models, bindings and hooks."""
 
     name: str
     words: tuple[str, ...]
     environment: Mapping[str, str]
+    contents: Mapping[str, str] = field(default_factory=dict)
 
 
 @dataclass(frozen=True)

@@ -32,6 +32,7 @@ class PartState:
         state: one of the words above.
         words: its command.
         graph: what its environment says of the graph.
+        contents: digests of its models, bindings and hooks, by their names.
         deaths: how often it has ended without being told to.
         why: how it ended last, or why it can't run.
     """
@@ -41,6 +42,7 @@ class PartState:
     state: str = STARTING
     words: tuple[str, ...] = ()
     graph: Mapping[str, str] = field(default_factory=dict)
+    contents: Mapping[str, str] = field(default_factory=dict)
     deaths: int = 0
     why: str = ""
 

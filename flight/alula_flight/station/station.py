@@ -16,8 +16,9 @@ from alula.common.files import write_json
 from alula.common.robots import find_robot
 from alula.language.fleet import load_models
 from alula_flight.station import state as states
-from alula_flight.station.keeper import end_all, read_wanted
-from alula_flight.station.parts import Places, check_silences, places_of
+from alula_flight.station.contents import with_contents
+from alula_flight.station.keeper import differences, end_all, read_wanted
+from alula_flight.station.parts import Places, check_silences, parts_of, places_of
 from alula_flight.station.state import StationState, living
 
 UP_S, DOWN_S = 60.0, 120.0  # wall clock, until all parts have lived for a moment, and until all have ended
@@ -92,6 +93,15 @@ class Station:
     def _check(self) -> None:
         if self.deployment.silences:
             check_silences(self.deployment, load_models(self._robot).skillsets)
+
+    def differences(self) -> dict[str, list[str]]:
+        """Say of each part that runs in what it differs from what it would be now; raises AlulaError where a model is wrong."""
+        state = self.state()
+        if not any(part.pid for part in state.parts.values()):
+            return {}
+        now = with_contents(parts_of(self.deployment, self.places, state.run_id, os.environ), self.deployment, self.places, self._robot)
+        found = {part.name: differences(state.parts[part.name], part) for part in now if part.name in state.parts}
+        return {name: how for name, how in found.items() if how and state.parts[name].pid}
 
     def settle(self) -> StationState:
         """Wait until each part has lived for a moment, or will not; return how they are."""
