@@ -14,7 +14,7 @@ from alula.common.scenarios import Scenario, ScenarioError, load_scenario
 from alula.missions.director import End
 from alula.missions.mocked import MockedMission
 from alula.missions.plan import InputError, Inputs, MissionPlan
-from alula.missions.scenario import inputs_of, plan_of
+from alula.missions.scenario import check_names, inputs_of, plan_of
 from alula.mock import Behaviour
 from alula.model.model import Skillset
 from alula.records.errors import AnalysisError
@@ -92,6 +92,7 @@ def load_mocked_scenario(name: str, behaviour: Sequence[Path] = (), *, world: st
         scenario, robot = load_scenario(name), find_robot()
         if not scenario.mission:
             raise AnalysisError(f"the scenario {name} has no mission to be run over mocks; `alula mock` serves its skills")
+        check_names(scenario, robot_skillsets())
         given = inputs_of(scenario, world) if inputs is None else inputs
         known = behaviour_of(robot, behaviour).of(frozenset(scenario.skillsets))
     except (ScenarioError, RobotError, InputError, SkillRuntimeError) as error:

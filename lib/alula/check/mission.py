@@ -8,6 +8,7 @@ from dataclasses import replace
 from pathlib import Path
 
 from alula.check.checking import Beside, check
+from alula.check.defaults import wrong_defaults
 from alula.check.names import NameRules
 from alula.check.outcomes import OutcomeRules
 from alula.check.rules import SkillRules
@@ -57,6 +58,7 @@ def check_mission(
     own = (rules.units, rules.results, rules.resources, NameRules(skills).names, OutcomeRules(skills).asked)
     foreign = bool(palettes) or of_others
     found += check(files, known, SkillTraits(skills, enums), own, beside=BESIDE, foreign=foreign, of_others=of_others, checked=checked)
+    found += wrong_defaults(files, foreign=foreign)
     if of_others:
         found = _told_once([replace(one, warning=one.warning or one.code == "ALU607") for one in found])
     if not palettes and not of_others and (problem := no_class(files, known)) is not None:

@@ -160,7 +160,9 @@ def _number(port: Port) -> float:
     try:
         return float(port.default or 0)
     except ValueError:
-        raise InputError(f"the default of the mission's port '{port.name}' is '{port.default}', no number") from None
+        place = f"{port.place}: " if port.place else ""
+        message = f"{place}the default of the mission's port '{port.name}' is '{port.default}', no number; write the number alone"
+        raise InputError(message) from None
 
 
 def _inputs(model: NodeType, inputs: Inputs, path: Path) -> dict[str, object]:

@@ -2,11 +2,12 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable
+from collections.abc import Collection, Iterable
 from pathlib import Path
 
 from alula.common.robots import find_robot, wrong_world
-from alula.common.scenarios import Scenario, load_scenario, scenario_names
+from alula.common.scenarios import Scenario, load_scenario, scenario_names, scenarios_folder
+from alula.common.suggestions import nearest, quoted
 from alula.missions.mission_file import plan_of_file
 from alula.missions.part import NO_PART
 from alula.missions.plan import InputError, Inputs, MissionPlan
@@ -27,6 +28,36 @@ def plan_of(scenario: Scenario, inputs: Inputs, models: Iterable[Skillset]) -> M
     if not scenario.mission.endswith(".xml"):
         raise InputError(f"the mission {scenario.mission} is no file of a tree; name one: missions/NAME.xml")
     return plan_of_mission_file(find_robot().root / scenario.mission, scenario, inputs, models)
+
+
+def check_names(scenario: Scenario, models: Iterable[Skillset]) -> None:
+    """Refuse a departure of the robot, and skills of the scenario, that its models do not have; ``models`` are all of the robot's.
+
+    Raises:
+        InputError: one is not there; the message names the file, the key and what is meant.
+    """
+    several = list(models)
+    skills = [(one.name, skill.name) for one in several for skill in one.skills]
+    known = {*(skill for _, skill in skills), *(f"{skillset}.{skill}" for skillset, skill in skills)}
+    for key, names in (("fallback", [scenario.fallback] if scenario.fallback else []), ("motion", scenario.motion)):
+        for name in names:
+            if name not in known:
+                file = scenarios_folder() / f"{scenario.name}.yaml"
+                raise InputError(f"{file}: `{key}`: the robot has no skill `{name}`; {_meant(name, known)}")
+    robot = find_robot()
+    if robot.departure is not None:
+        resource, state = robot.departure
+        states = {other for one in several for known in one.resources if known.name == resource for other in known.states}
+        place = f"{robot.root / 'robot.yaml'}: `departure`: "
+        if not states:
+            resources = {known.name for one in several for known in one.resources}
+            raise InputError(f"{place}the robot has no resource `{resource}`; {_meant(resource, resources)}")
+        if state not in states:
+            raise InputError(f"{place}the resource `{resource}` has no state `{state}`; {_meant(state, states)}")
+
+
+def _meant(name: str, known: Collection[str]) -> str:
+    return nearest(name, known) or f"name one of {quoted(sorted(known))}"
 
 
 def flown(path: Path, scenario: Scenario) -> TreeSource:

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Sequence
+from collections.abc import Collection, Sequence
 from dataclasses import dataclass
 
 from alula.common.faults import DIED
@@ -52,7 +52,7 @@ def find_recovery(
         return _recovery(one, fallback_s, _moving(scenario, history, observed, fallback_s))
     noticed_s = _unexplained(history, responses, alarms)
     if noticed_s is not None:
-        fallback_s = _first([e.started_s for e in history.executions if e.skill == scenario.fallback], noticed_s)
+        fallback_s = _first([e.started_s for e in history.executions if _is_one(e, [scenario.fallback])], noticed_s)
         return Recovery(None, noticed_s, fallback_s, _moving(scenario, history, observed, fallback_s))
     broken = [one for one in flown if one.mode != DIED]  # the death of a process that nothing hung on interrupts no flight
     unfollowed = [one for one in broken if one.traced.detected_s is not None] or broken
@@ -79,7 +79,7 @@ def _fallback(skill: str, history: History, one: FaultResponse) -> float | None:
         in_branch = one.response.branch in history.places.started.get(execution.id, ())
         return execution.started_s is not None and (in_branch or execution.started_s < other_s)
 
-    runs = [execution.started_s for execution in history.executions if execution.skill == skill and responds(execution)]
+    runs = [execution.started_s for execution in history.executions if _is_one(execution, [skill]) and responds(execution)]
     return _first(runs, first.end.stamp_s - EARLY_S)
 
 
@@ -101,8 +101,13 @@ def _moving(scenario: Scenario, history: History, observed: Observed, fallback_s
     """Return when the robot moves on: when it is first seen to move since a skill of motion runs again."""
     if fallback_s is None or observed.moving_again is None:
         return None
-    motion_s = _first([e.started_s for e in history.executions if e.skill in scenario.motion], fallback_s)
+    motion_s = _first([e.started_s for e in history.executions if _is_one(e, scenario.motion)], fallback_s)
     return None if motion_s is None else observed.moving_again(motion_s)
+
+
+def _is_one(execution: ExecutionRecord, skills: Collection[str]) -> bool:
+    """Tell whether an execution is of one of some skills, which a scenario names with their skillset or without."""
+    return execution.skill in skills or f"{execution.skillset}.{execution.skill}" in skills
 
 
 def _first(stamps: Sequence[float | None], since_s: float) -> float | None:

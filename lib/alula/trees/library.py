@@ -180,4 +180,5 @@ def models_of(element: Element, report: Report) -> Iterator[NodeType]:
 def _port(element: Element) -> Port:
     default = element.get("default") if "default" in element.attributes else None
     doc = element.get("description") or "".join(part for part in element.content if isinstance(part, str)).strip()
-    return Port(element.get("name"), TYPES.get(element.get("type"), ANY), DIRECTIONS[element.tag], default, doc)
+    place = None if default is None else element.place_of("default")
+    return Port(element.get("name"), TYPES.get(element.get("type"), ANY), DIRECTIONS[element.tag], default, doc, place=place)

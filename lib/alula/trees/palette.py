@@ -9,6 +9,7 @@ from functools import cached_property
 from typing import TYPE_CHECKING, TypeGuard
 
 from alula.common.public import public
+from alula.trees.errors import Place
 from alula.trees.values import ANY, STRING, PortType
 
 if TYPE_CHECKING:
@@ -57,6 +58,8 @@ class Port:
     """A script that is empty does nothing; another node's is wrong then."""
     written_from: str = ""
     """A plain text names an entry, too, which gets what this other port says; empty: a plain text is a value."""
+    place: Place | None = field(default=None, compare=False, repr=False)
+    """Where a file says its default."""
 
 
 @public("alula.trees")

@@ -229,6 +229,22 @@ def test_what_nothing_reads_is_told_once_and_where_nothing_else_is_wrong(tree, e
     assert all(one.severity is Severity.WARNING for one in found if one.code == "ALU624")
 
 
+DEFAULTS = (
+    ('<SubTree ID="mission"><input_port name="far" default="0.6 km"/></SubTree>', "0.6 km", Severity.ERROR, "the number alone"),
+    ('<SubTree ID="mission"><output_port name="far" default="none"/></SubTree>', "none", Severity.ERROR, "of the type double"),
+    ('<SubTree ID="leg"><input_port name="times" type="int" default="2.5"/></SubTree>', "2.5", Severity.WARNING, "of the type int"),
+)
+
+
+@pytest.mark.parametrize(("model", "text", "severity", "cure"), DEFAULTS)
+def test_a_default_that_is_no_value_of_its_port_is_told_with_its_place(model, text, severity, cure, robot):
+    file = whole("<AlwaysSuccess/>").replace("</root>", f"<TreeNodesModel>{model}</TreeNodesModel></root>")
+    (finding,) = findings_of("mission.xml", file.encode(), robot)
+    assert (finding.code, finding.severity) == ("ALU605", severity)
+    assert finding.source_line[finding.span.column - 1 :].strip('"').startswith((text, "default"))
+    assert cure in finding.hint
+
+
 def test_what_may_never_come_at_once_is_a_warning(robot):
     late = '<Sequence><Sleep msec="9"/><drone.turn angle="1"/></Sequence>'
     text = '<ForceSuccess><Parallel><drone.hover duration="1"/>{}</Parallel></ForceSuccess>'

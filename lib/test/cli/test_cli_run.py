@@ -11,7 +11,7 @@ from pathlib import Path
 
 import pytest
 
-from alula.cli import run
+from alula.cli import new, run
 from alula.common import run_log
 from alula.common.record import FILE, read_record
 from alula.missions.mocked import STOP_S
@@ -39,6 +39,35 @@ def test_what_can_not_be_is_one_line_and_leaves_nothing(words: list[str], compla
     said = capsys.readouterr().err
     assert said.count("\n") == 1
     assert said.startswith("alula run: ")
+    assert complaint in said
+    assert not (tmp_path / "run").exists()
+
+
+WRONG = (
+    ("robot.yaml", "departure: bot.whels FREE", "robot.yaml: `departure`: the robot has no resource `whels`; did you mean `wheels`?"),
+    ("robot.yaml", "departure: bot.wheels FRE", "robot.yaml: `departure`: the resource `wheels` has no state `FRE`; did you mean `FREE`?"),
+    ("scenarios/patrol.yaml", "fallback: drivee", "patrol.yaml: `fallback`: the robot has no skill `drivee`; did you mean `drive`?"),
+    ("scenarios/patrol.yaml", "motion: [bot.drive, dirve]", "patrol.yaml: `motion`: the robot has no skill `dirve`; did you mean `drive`?"),
+    ("missions/patrol.xml", "", "missions/patrol.xml:39:"),
+)
+
+
+@pytest.mark.parametrize(("file", "line", "complaint"), WRONG)
+def test_a_wrong_name_in_a_side_file_is_refused_with_its_place(
+    file: str, line: str, complaint: str, tmp_path: Path, capsys, monkeypatch
+) -> None:
+    bot = tmp_path / "bot"
+    assert new.main(["robot", str(bot)]) == 0
+    monkeypatch.chdir(bot)
+    monkeypatch.delenv("ALULA_ROBOT", raising=False)
+    text = (bot / file).read_text()
+    (bot / file).write_text(
+        f"{text}{line}\n" if line else text.replace('name="speed_m_s" default="0.5"', 'name="speed_m_s" default="0.6 km"')
+    )
+    capsys.readouterr()
+    assert run.main(["patrol", "--mock", "--out", str(tmp_path / "run")]) == run.CANNOT_START
+    said = capsys.readouterr().err
+    assert said.count("\n") == 1
     assert complaint in said
     assert not (tmp_path / "run").exists()
 

@@ -21,7 +21,7 @@ from alula.language.errors import LanguageError
 from alula.language.fleet import load_models, places_of
 from alula.missions.director import EXIT_CODES, Outcome
 from alula.missions.plan import InputError
-from alula.missions.scenario import inputs_of, plan_of
+from alula.missions.scenario import check_names, inputs_of, plan_of
 from skillset_ros2.mission_node import run_mission
 
 
@@ -41,7 +41,9 @@ def main(arguments: Sequence[str] | None = None) -> int:
     try:
         scenario = load_scenario(options.scenario)
         inputs, robot = inputs_of(scenario, options.world), find_robot()
-        plan = replace(plan_of(scenario, inputs, load_models(robot).skillsets), places=places_of(robot))
+        models = load_models(robot).skillsets
+        check_names(scenario, models)
+        plan = replace(plan_of(scenario, inputs, models), places=places_of(robot))
         options.out.mkdir(parents=True, exist_ok=True)
     except (ScenarioError, RobotError, LanguageError, InputError, OSError) as error:
         sys.stderr.write(f"mission: {error}\n")
