@@ -13,6 +13,7 @@ distribution = setup(
     package_data={
         "alula": ["py.typed"],
         "alula.adopt": ["robot/*.in"],
+        "alula.language": ["standard_messages.yaml"],
         "alula.report.page": ["program/*"],
         "alula.generate.scaffold": ["robot/**/*.in"],
     },

@@ -22,6 +22,7 @@ from alula.language.check.fields import check_fields
 from alula.language.errors import Diagnostic, Severity, has_errors
 from alula.language.messages import NO_MESSAGES, Messages, messages_of
 from alula.language.models import ModelFile, models_in
+from alula.language.side_files import load_types
 from alula.model.model import Skillset
 from alula.model.span import Span
 from alula.trees.document import read_source
@@ -122,6 +123,8 @@ def checked_files(
     read = models.check_files(list(paths), standard_input)
     for model in read:
         check_fields(model)
+    for folder, first in {Path(one.path).parent: one for one in reversed(read) if Path(one.path).is_file()}.items():
+        first.findings += load_types(folder / "types.yaml")[1]  # once for all models beside it
     checked = _checked_missions(list(missions), list(map(Path, palettes)), library, main, enums, tell)
     for file in checked:
         file.named = file.path in {str(Path(place)) for place in places}

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import os
 from collections.abc import Callable, Mapping
 from dataclasses import MISSING, fields
 from pathlib import Path
@@ -13,6 +14,7 @@ from alula.common.suggestions import nearest, quoted
 from alula.language.errors import Diagnostic
 from alula.language.lexer import MAX_CHARACTERS
 from alula.language.robot import Bindings, BridgedAction, BridgedService, BridgedTopic, DataSource
+from alula.language.standard_messages import standard_messages
 from alula.model.ros_types import PRIMITIVES, RosType, parse_type
 from alula.model.span import Span
 
@@ -27,9 +29,20 @@ def load_types(path: Path) -> tuple[dict[str, RosType], list[Diagnostic]]:
         ros = parse_type(text) if isinstance(text, str) else None
         if ros is None:
             findings.append(_wrong(path, f"type `{name}` is {text!r}; it should be a ROS type such as float64 or geometry_msgs/Point"))
-        else:
-            types[str(name)] = ros
+            continue
+        types[str(name)] = ros
+        if not _may_be(ros):
+            hint = nearest(ros.name, standard_messages()[ros.package])
+            findings.append(_wrong(path, f"type `{name}` is {text}, and {ros.package} has no message `{ros.name}`", hint))
     return types, findings
+
+
+def _may_be(ros: RosType) -> bool:
+    """Tell whether there may be such a message: of the packages that each ROS brings along it is known, or sourced there."""
+    if ros.name in standard_messages().get(ros.package, {ros.name}):
+        return True
+    prefixes = filter(None, os.environ.get("AMENT_PREFIX_PATH", "").split(os.pathsep))
+    return any((Path(prefix) / "share" / ros.package / "msg" / f"{ros.name}.msg").is_file() for prefix in prefixes)
 
 
 def load_bindings(path: Path) -> tuple[Bindings, list[Diagnostic]]:

@@ -7,6 +7,8 @@ import pytest
 from alula.language.errors import LanguageError
 from alula.language.load import check_file, load_robot, load_skillset
 from alula.language.models import read_text
+from alula.language.side_files import load_types
+from alula.language.standard_messages import standard_messages
 
 LINK = "resource link { initial DOWN extern DOWN -> UP extern UP -> DOWN }\n"
 
@@ -118,3 +120,28 @@ def test_side_files(tmp_path, types, bindings, message):
         load_robot(tmp_path)
     assert "ALU005" in codes(caught)
     assert message in str(caught.value)
+
+
+def test_a_message_that_a_package_of_each_ros_does_not_have_is_told_without_ros(tmp_path, monkeypatch):
+    path = tmp_path / "types.yaml"
+    path.write_text("Seen: sensor_msgs/LaserScn\nGoal: geometry_msgs/PoseStamped\nRoute: uav_msgs/Route\nNew: nav_msgs/Later\n")
+    shared = tmp_path / "ros" / "share" / "nav_msgs" / "msg"
+    shared.mkdir(parents=True)
+    (shared / "Later.msg").write_text("int32 x\n")
+    monkeypatch.setenv("AMENT_PREFIX_PATH", str(tmp_path / "ros"))
+    types, (finding,) = load_types(path)
+    assert (finding.code, finding.message) == ("ALU005", "type `Seen` is sensor_msgs/LaserScn, and sensor_msgs has no message `LaserScn`")
+    assert finding.hint == "did you mean `LaserScan`?"
+    assert {"Goal", "Route", "New"} <= set(types)
+
+
+def test_the_names_of_standard_messages_are_those_of_ros():
+    """By the definitions of another project: of ROS 1 and of each ROS 2 that it knows."""
+    typesys = pytest.importorskip("rosbags.typesys")
+    found: dict[str, set[str]] = {}
+    for store in typesys.Stores:
+        for name in typesys.get_typestore(store).types:
+            package, kind, *rest = name.split("/")
+            if package in standard_messages() and kind == "msg":
+                found.setdefault(package, set()).update(rest)
+    assert {package: set(names) for package, names in standard_messages().items()} == found
