@@ -2,7 +2,8 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Mapping, Sequence
+import json
+from collections.abc import Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
 
 from alula.adopt.vocabulary import SkillOf, Vocabulary
@@ -13,25 +14,20 @@ from alula.check.traits import PlainTraits
 from alula.missions.skill_types import PORT_TYPES, STATE_PORT
 from alula.trees.node import pointer
 from alula.trees.palette import Category, Direction, NodeType, Palette, Port, node_type
-from alula.trees.reading import TreeFiles
+from alula.trees.reading import TreeFiles, type_name
 from alula.trees.values import ANY, DOUBLE, NUMBERS, STRING, TYPES, PortType, literal
 
 Slot = tuple[str, str]
 """A skill's input or output: the names of both."""
 MODEL_TYPES = {kind: name for name, kind in PORT_TYPES.items() if name != "float32"}
 """Types of the models for types of ports."""
-ZEROS = {"bool": "false", "string": "", "float64": "0.0"}
-"""How a value that nobody gives is written, by type of the models; of whole numbers 0."""
+ZEROS: Mapping[str, object] = {"bool": False, "string": "", "float64": 0.0}
+"""What stands for a value that nobody gives, by type of the models; of whole numbers 0."""
 
 
 def model_type(kind: PortType) -> str:
     """Return the type of the models for one of ports: a text for all that BehaviorTree.CPP reads from text in a program's own way."""
     return MODEL_TYPES.get(kind, "string")
-
-
-def zero(kind: str) -> str:
-    """Return the value that stands for one that nobody gives, as text."""
-    return ZEROS.get(kind, "0")
 
 
 @dataclass(frozen=True)
@@ -40,8 +36,50 @@ class GivenEntry:
 
     name: str
     value: object
-    line: int
-    """Where it is read first."""
+
+
+@dataclass(frozen=True)
+class _MainTree:
+    """A main tree with all uses of entries in it; ``optional``: entries of its board that nodes do without."""
+
+    files: TreeFiles
+    uses: Sequence[tuple[Site, Use]]
+    optional: frozenset[str]
+
+    @classmethod
+    def of(cls, files: TreeFiles, palette: Palette) -> _MainTree:
+        root = expand(files, palette, files.main)
+        if root is None:
+            return cls(files, (), frozenset())
+        uses = Uses(Scripts(), PlainTraits())
+        sites = {id(use): site for site in root.walk() for use in (*uses.before(site), *uses.after(site))}
+        return cls(files, [(sites[id(use)], use) for use in uses.of(root)], frozenset(_optional(root)))
+
+    def read_first(self) -> dict[str, Use]:
+        """Return the entries of its board that are read before they are written, each with where."""
+        first: dict[Key, Use] = {}
+        for _, use in self.uses:
+            first.setdefault(use.key, use)
+        return {name: use for (board, name), use in first.items() if board == 0 and not use.write}
+
+    def told(self) -> dict[str, str | None]:
+        """Return the inputs that its model tells of, with their defaults."""
+        model = self.files.models.get(self.files.main)
+        ports = model.ports.values() if model is not None else ()
+        return {port.name: port.default for port in ports if port.direction is not Direction.OUTPUT}
+
+    def unwritten(self) -> set[str]:
+        """Return the entries that nodes do without, and that nothing writes."""
+        return set(self.optional) - {use.key[1] for _, use in self.uses if use.write and use.key[0] == 0}
+
+
+def _optional(root: Site) -> Iterator[str]:
+    for site in root.walk():
+        for attribute in site.ports() if site.type is not None and not site.is_subtree else ():
+            port, key = site.type.ports.get(attribute.name) if site.type else None, pointer(attribute.value, attribute.name)
+            board, name = site.board.key(key) if key is not None else (-1, "")
+            if port is not None and port.optional and board == 0:
+                yield name
 
 
 class Entries:
@@ -50,8 +88,8 @@ class Entries:
     def __init__(self, mains: Sequence[TreeFiles], vocabulary: Vocabulary, known: Palette) -> None:
         self._skills = {f"{vocabulary.robot}.{one.name}": one for one in vocabulary.skills.values()}
         self._types: dict[Slot, PortType] = dict(_declared(vocabulary))
-        self._palette = known | Palette(_types(vocabulary))
-        self._uses: list[tuple[TreeFiles, list[tuple[Site, Use]]]] = [(files, self._of(files)) for files in mains]
+        palette = known | Palette(_types(vocabulary))
+        self._mains = {id(files): _MainTree.of(files, palette) for files in mains}
         self._refuse_literals()
         self._spread()
 
@@ -60,42 +98,25 @@ class Entries:
         return model_type(self._types[skill, name])
 
     def zeros(self) -> Mapping[Slot, str]:
-        """Return what stands for inputs that a use leaves out."""
-        return {slot: zero(self.type(*slot)) for slot in self._types}
+        """Return what stands for inputs that a use leaves out, as text."""
+        return {slot: "" if kind == "string" else json.dumps(ZEROS.get(kind, 0)) for slot in self._types for kind in [self.type(*slot)]}
 
     def given(self, files: TreeFiles) -> list[GivenEntry]:
         """Return the entries that a program writes before it starts a main tree."""
-        uses = next(uses for one, uses in self._uses if one is files)
-        model = files.models.get(files.main)
-        ports = model.ports if model is not None else {}
-        told = {name: port.default for name, port in ports.items() if port.direction is not Direction.OUTPUT}
-        first: dict[Key, Use] = {}
-        for _, use in uses:
-            first.setdefault(use.key, use)
-        read = {name: use for (board, name), use in first.items() if board == 0 and not use.write}
-        enums = 0
+        main = self._mains[id(files)]
+        read, told = main.read_first(), main.told()
+        enumerators = [name for name, use in sorted(read.items()) if name.isupper() and use.offsets is not None]
         found = []
-        for name in sorted({*read, *told}):
+        for name in sorted({*read, *told, *main.unwritten()}):
             default = told.get(name)
-            kind = self._kind([pair for pair in uses if pair[1].key == (0, name)])
             if default is not None and pointer(default, name) is None:
                 value = literal(default)
-            elif name.isupper() and name in read and read[name].offsets is not None:  # an enumerator of the program's
-                enums += 1
-                value = enums
+            elif name in enumerators:  # each of a program's has a number of its own
+                value = enumerators.index(name) + 1
             else:
-                value = {"bool": False, "string": "", "float64": 0.0}.get(kind, 0)
-            line = read[name].attribute.place.line if name in read else files.trees[files.main].place.line
-            found.append(GivenEntry(name, value, line))
+                value = ZEROS.get(self._kind([pair for pair in main.uses if pair[1].key == (0, name)]), 0)
+            found.append(GivenEntry(name, value))
         return found
-
-    def _of(self, files: TreeFiles) -> list[tuple[Site, Use]]:
-        root = expand(files, self._palette, files.main)
-        if root is None:
-            return []
-        uses = Uses(Scripts(), PlainTraits())
-        sites = {id(use): site for site in root.walk() for use in (*uses.before(site), *uses.after(site))}
-        return [(sites[id(use)], use) for use in uses.of(root)]
 
     def _slot(self, site: Site, port: str) -> Slot | None:
         skill = self._skills.get(site.kind)
@@ -103,22 +124,17 @@ class Entries:
 
     def _refuse_literals(self) -> None:
         """Have a port take texts where a use gives it one that its type can't be read from, such as an enumerator of a program's."""
-        for files, _ in self._uses:
-            for tree in files.trees.values():
-                for node in tree.iterate():
-                    skill = self._skills.get(node.get("ID") or node.tag) or self._skills.get(node.tag)
-                    for attribute in node.attributes.values() if skill else ():
-                        slot = (skill.name if skill else "", attribute.name)
-                        if (
-                            slot in self._types
-                            and pointer(attribute.value, attribute.name) is None
-                            and not _reads(self._types[slot], attribute.value)
-                        ):
-                            self._types[slot] = STRING
+        nodes = [node for main in self._mains.values() for tree in main.files.trees.values() for node in tree.iterate()]
+        for node in nodes:
+            skill = self._skills.get(type_name(node))
+            for attribute in node.attributes.values() if skill else ():
+                kind = self._types.get((skill.name if skill else "", attribute.name))
+                if kind is not None and pointer(attribute.value, attribute.name) is None and not _reads(kind, attribute.value):
+                    self._types[skill.name if skill else "", attribute.name] = STRING
 
     def _spread(self) -> None:
         """Give what has no type yet that of the entries which it names, until nothing changes."""
-        groups = [list(_by_key(uses).values()) for _, uses in self._uses]
+        groups = [list(_by_key(main.uses).values()) for main in self._mains.values()]
         changed = True
         while changed:
             changed = False

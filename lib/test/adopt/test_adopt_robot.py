@@ -177,6 +177,13 @@ def test_entries_that_a_program_writes_stand_in_a_world(tmp_path):
     assert run_.outcome is Outcome.ACCOMPLISHED
 
 
+def test_an_entry_that_a_node_does_without_and_nothing_writes_stands_in_the_world(tmp_path):
+    text = tree('<GoalUpdater input_goal="{goal}" output_goal="{newest}"><Go goal="{newest}"/></GoalUpdater>')
+    robot = made(tmp_path, main=text)
+    assert yaml.safe_load((robot / "worlds/main.yaml").read_text()) == {"goal": ""}
+    assert Mission.load("main", robot).run().outcome is Outcome.ACCOMPLISHED
+
+
 def test_trees_that_several_missions_use_stand_in_one_file(tmp_path, about, capsys):
     use = '<SubTree ID="Enter"/>'
     robot = about(made(tmp_path, a=tree("<Go/>", use, name="A"), b=tree("<Stop/>", use, name="B"), door=DOOR))
