@@ -105,6 +105,10 @@ class Region:
         return next(origin for sets, origin in self.origins if all(one in known for one, known in zip(roots, sets, strict=True)))
 
 
+LOOK_AT_CLOCK = 512
+"""After how many situations of one skillset the time is looked at again: with many free resources one region has millions."""
+
+
 class Regions:
     """The regions that can be reached; ``complete`` when there are no more."""
 
@@ -296,8 +300,12 @@ class Regions:
             before: dict[int, tuple[int, Event] | None] = dict.fromkeys(sorted(roots))
             depth = dict.fromkeys(before, 0)
             todo = deque(before)
+            looked_at = 0
             while todo:
                 number = todo.popleft()
+                looked_at += 1
+                if looked_at % LOOK_AT_CLOCK == 0:
+                    self.deadline.check()
                 for event, after in self.system.moves_of(place, number):
                     if after not in before and not self.system.leaves_out(event, memory):
                         before[after], depth[after] = (number, event), depth[number] + 1

@@ -20,6 +20,7 @@ pytest.importorskip("py_trees")
 from alula.check.robot import models_of, part_of
 from alula.common.robots import find_robot
 from alula.language.codes import RUN_CODES
+from alula.language.load import parse_skillset
 from alula.language.models import ModelFile, check_texts
 from alula.missions.driver import MissionDriver
 from alula.missions.mission_file import plan_of_file
@@ -189,6 +190,17 @@ def test_a_bound_is_never_silent(tmp_path: Path) -> None:
     path = tmp_path / "mission.xml"
     path.write_text(whole(EXAMPLES["ALU703"].mended))
     proved = prove_mission(path, robots(), NO_PART, timeout_s=0.0)
+    assert not proved.complete
+    assert [finding.code for finding in proved.findings] == ["ALU710"]
+
+
+def test_a_skillset_with_many_free_resources_is_bounded_too(tmp_path: Path) -> None:
+    """Before the first group of situations is known: 2^40 of them come of power-up without a tick."""
+    free = "".join(f" resource r{number} {{ initial A extern A -> B extern B -> A }}" for number in range(40))
+    models = [parse_skillset(f"skillset s {{{free} skill go {{ result {{ success DONE }} }} }}")]
+    path = tmp_path / "mission.xml"
+    path.write_text('<root BTCPP_format="4"><BehaviorTree ID="m"><s.go/></BehaviorTree></root>')
+    proved = prove_mission(path, models, NO_PART, timeout_s=0.0)
     assert not proved.complete
     assert [finding.code for finding in proved.findings] == ["ALU710"]
 
