@@ -15,6 +15,7 @@ distribution = setup(
         "alula.adopt": ["robot/*.in"],
         "alula.language": ["standard_messages.yaml"],
         "alula.report.page": ["program/*"],
+        "alula.trees.nav2": ["nodes.xml"],
         "alula.generate.scaffold": ["robot/**/*.in"],
     },
     data_files=[("share/ament_index/resource_index/packages", ["resource/alula"]), ("share/alula", ["package.xml"])],

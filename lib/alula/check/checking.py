@@ -17,6 +17,7 @@ from alula.check.sites import expand
 from alula.check.traits import Traits
 from alula.check.unread import never_read
 from alula.check.whole import Rule, Whole
+from alula.trees import nav2
 from alula.trees.access import scripts_of
 from alula.trees.errors import Problem
 from alula.trees.library import Library
@@ -145,7 +146,9 @@ def _several_run(whole: Whole) -> Iterator[Problem]:
 def _entries(whole: Whole) -> Iterator[Problem]:
     uses = entries.Uses(whole.scripts, whole.traits)
     if whole.given is not None:
-        yield from entries.read_too_early(whole.root, uses, whole.given, whole.others, late=whole.begins_late, foreign=whole.foreign)
+        of_nav2 = whole.foreign and any(site.kind in nav2.declared() for site in whole.root.walk())
+        given = (*whole.given, *(nav2.WRITTEN if of_nav2 else ()))
+        yield from entries.read_too_early(whole.root, uses, given, whole.others, late=whole.begins_late, foreign=whole.foreign)
     yield from entries.mismatched(whole.root, uses)
 
 

@@ -37,6 +37,8 @@ class Use:
     offsets: tuple[int, int] | None = None
     type: str = UNKNOWN
     unit: str = ""
+    unchecked: str = ""
+    """The type of the node that goes on where the entry has no value; empty: what reads it fails then."""
 
     def problem(self, code: str, message: str, cure: str) -> Problem:
         """Return a problem of this use."""
@@ -100,7 +102,8 @@ class Uses:
                 yield Use(site.board.key(attribute.value), attribute.value, True, attribute, None, _set_type(site, port.written_from))
             if key is None or not self._uses(site, port, write=write) or (port.written_from and write):
                 continue
-            yield Use(site.board.key(key), key, write, attribute, None, _type_name(port), port.unit)
+            unchecked = site.kind if port.unchecked and not write else ""
+            yield Use(site.board.key(key), key, write, attribute, None, _type_name(port), port.unit, unchecked)
 
     def _uses(self, site: Site, port: Port, *, write: bool) -> bool:
         """Tell whether a port writes, or else needs what it reads: of one that does both, only a class is known to need it."""
@@ -235,7 +238,7 @@ def read_too_early(root: Site, uses: Uses, given: Collection[str], others: Write
                     yield replace(_perhaps_unwritten(use, others[use.key]), warning=True)
                 else:
                     outside = foreign and use.key not in later and use.key[0] == root.board.number
-                    yield replace(_unwritten(use, later.get(use.key), names), warning=outside)
+                    yield replace(_unwritten(use, later.get(use.key), names), warning=outside or bool(use.unchecked))
 
     yield from visit(root)
 
@@ -273,6 +276,8 @@ def _unwritten(use: Use, writer: Use | None, names: list[str]) -> Problem:
         message = f"`{use.name}` is read here before anything can have written it: line {writer.attribute.place.line} does later"
         return use.problem("ALU607", message, "write it before, or ask for it later")
     message = f"`{use.name}` is read, and nothing before writes it"
+    if use.unchecked:
+        message = f"`{use.name}` is read, nothing before writes it, and '{use.unchecked}' goes on with an empty one"
     alike = nearest(use.name, names)
     cure = alike if alike.startswith("did you mean") else f'write it before: <Script code="{use.name} := ..."/>'
     return use.problem("ALU607", message, cure)

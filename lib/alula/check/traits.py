@@ -43,7 +43,7 @@ class PlainTraits:
         """Tell what the type does; a condition answers at once."""
         if site.type is not None and site.type.category is Category.CONDITION:
             return False
-        return site.described.may_run if site.described else None
+        return site.described.may_run if site.described else site.type.runs if site.type else None
 
     def endless(self, site: Site) -> bool:  # noqa: ARG002
         """Know none."""

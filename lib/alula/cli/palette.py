@@ -1,6 +1,7 @@
 """``alula palette FOLDER``: the skills, resources and own nodes of a robot as a TreeNodesModel, which Groot2 imports.
 
-Of a folder of trees: what their models declare, or with ``--guess`` what they use and nobody declares.
+Of a folder of trees: what their models declare, or with ``--guess`` what they use and nobody declares. With ``--nav2`` what a release of
+Nav2 declares.
 
 Ends with 0, and with 2 when a model is wrong or can't be read.
 """
@@ -38,7 +39,7 @@ def main(words: Sequence[str] | None = None) -> int:
     """Write the palette to the standard output; return the exit code."""
     given = parse("palette", words)
     try:
-        types = list(tree_types(given.places, guess=given.guess))
+        types = list(asked_types(given.places, given.nav2, guess=given.guess))
     except LanguageError as error:
         sys.stderr.write(f"{error}\n")
         return WRONG
@@ -47,6 +48,13 @@ def main(words: Sequence[str] | None = None) -> int:
         return WRONG
     sys.stdout.write(model_xml(types))
     return 0
+
+
+def asked_types(places: Sequence[str], release: str | None, *, guess: bool) -> Iterator[NodeType]:
+    """Yield what is asked for: Nav2's nodes, as a release declares them, or those of folders; raises LanguageError, TreeError."""
+    if (release is None) != bool(places) or (release is not None and guess):
+        raise TreeError("takes a FOLDER of a robot's models or of trees, or --nav2 RELEASE by itself")
+    return tree_types(places, guess=guess) if release is None else iter(nav2.palette(release))
 
 
 def tree_types(places: Sequence[str], *, guess: bool) -> Iterator[NodeType]:
@@ -71,8 +79,9 @@ def tree_types(places: Sequence[str], *, guess: bool) -> Iterator[NodeType]:
     if not guess:
         yield from declared
         return
-    known = Palette({one.name: one for one in (*declared, *nav2.palette(), *mission_palette((), NO_PART))}.values())
-    found = [one for one in guessed_types(library.elements(), known) if one.name not in library.trees]
+    trees = list(library.elements())
+    known = Palette({one.name: one for one in (*declared, *nav2.palette_for(trees), *mission_palette((), NO_PART))}.values())
+    found = [one for one in guessed_types(trees, known) if one.name not in library.trees]
     warner(COMMAND)(f"nodes that are guessed from their uses: {len(found)}; look at categories, directions and types first")
     yield from found
 

@@ -28,11 +28,16 @@ def palette_of(
 ) -> Palette:
     """Return the types that the trees of files may have: those of `mission_palette`, Nav2's, and what the files, or ``more``, declare.
 
-    A declaration gives way to a class of that name; but where it tells of another node than one of Alula's or Nav2's, it is the file's own.
+    A declaration gives way to a class of that name, and one of the files to what Nav2 declares; but where it tells of another node than one
+    of Alula's or Nav2's, it is the file's own.
     """
-    types = {**{one.name: one for one in more}, **{one.name: one for one in files.declared()}}
+    given = {one.name: one for one in more}
+    types = {**given, **{one.name: one for one in files.declared()}}
     own = {name_in_files(node) for node in part.nodes}
-    types.update({one.name: one for one in nav2.palette() if one.name not in own and not _is_another(types.get(one.name), one)})
+    known = [
+        one for one in nav2.palette_for(files.trees.values()) if one.name not in own and (one.make is not None or one.name not in given)
+    ]
+    types.update({one.name: one for one in known if not _is_another(types.get(one.name), one)})
     types.update({one.name: one for one in mission_nodes(_memory(crew)) if not _is_another(types.get(one.name), one)})
     types.update({one.name: one for one in standard_palette()})
     return _with_robot(Palette(types.values()), skillsets, part, crew)
@@ -58,13 +63,13 @@ def _is_another(declared: NodeType | None, known: NodeType) -> bool:
 
 
 def without_class(files: TreeFiles, palette: Palette) -> dict[str, Element]:
-    """Return the nodes that the files declare and no class makes, by their names, each where it is used first."""
+    """Return the nodes that the files, or Nav2, declare and no class makes, by their names, each where it is used first."""
     found: dict[str, Element] = {}
     for tree in files.trees.values():
         for top in tree.children:
             for element in top.iterate():
                 known = palette.get(type_name(element))
-                if element.tag != Category.SUBTREE.value and known is not None and known is files.models.get(known.name):
+                if element.tag != Category.SUBTREE.value and known is not None and (known.assumed or known is files.models.get(known.name)):
                     found.setdefault(known.name, element)
     return found
 
@@ -75,10 +80,11 @@ def no_class(files: TreeFiles, palette: Palette) -> Problem | None:
     if not found:
         return None
     first, *others = found
-    library = {one.name for one in (*nav2.palette(), *mission_nodes(_memory(None)))}
+    library = {one.name for one in (*nav2.palette(), *mission_nodes(_memory(None))) if one.make is not None}
     shadowed = [name for name in found if name in library]
     which = f"'{first}'" + (f" and {len(others)} more" if others else "")
-    message = f"{which} {'are' if others else 'is'} declared in the file, and no class makes {'them' if others else 'it'}"
+    where = "by Nav2" if first not in files.models else "in the file"
+    message = f"{which} {'are' if others else 'is'} declared {where}, and no class makes {'them' if others else 'it'}"
     if shadowed:
         message += f" ('{shadowed[0]}' is declared otherwise than the node of that name here, so it is taken for another)"
     return Problem(found[first].place, message, f"write a class for {', '.join(found)} in the robot's part `missions`", "ALU620")

@@ -173,11 +173,12 @@ def models_of(element: Element, report: Report) -> Iterator[NodeType]:
         if not one.get("ID"):
             report(Problem(one.place, f"<{one.tag}> without an ID is the model of no node", f'write <{one.tag} ID="...">'))
         else:
-            ports = [_port(port) for port in one.children if port.tag in DIRECTIONS]
+            ports = [port_of(port) for port in one.children if port.tag in DIRECTIONS]
             yield node_type(one.get("ID"), category, ports)
 
 
-def _port(element: Element) -> Port:
+def port_of(element: Element) -> Port:
+    """Return a port of such a type."""
     default = element.get("default") if "default" in element.attributes else None
     doc = element.get("description") or "".join(part for part in element.content if isinstance(part, str)).strip()
     place = None if default is None else element.place_of("default")

@@ -52,6 +52,8 @@ class Port:
     """A file has to give it; else a node does without it, or says so when it is ticked."""
     optional: bool = False
     """The node does without it, and without a value of the entry that it names."""
+    unchecked: bool = False
+    """The node reads it without looking whether there is a value: it goes on with an empty one."""
     script: bool = False
     """Its text is a script, unless it names an entry that has one."""
     may_be_empty: bool = False
@@ -99,6 +101,12 @@ class NodeType:
     make: Callable[[Wiring], Node] | None = None
     children: tuple[int, int | None] = (0, 0)
     """How many it may have, from and to; None: any number."""
+    runs: bool | None = None
+    """Whether it may take several ticks, where no class tells it; None: nobody knows."""
+    tells: type[Node] | None = None
+    """The class that tells of its nodes what `described` ones do, though it makes none."""
+    assumed: bool = False
+    """Nobody has declared it: it is taken for a node that many programs have."""
 
     @cached_property
     def scripts(self) -> tuple[str, ...]:
@@ -108,7 +116,8 @@ class NodeType:
     @cached_property
     def described(self) -> type[Node] | None:
         """The class of its nodes where that tells how they end (`Node.is_described`), else None: they may do anything."""
-        return self.make if _is_class(self.make) and self.make.is_described() else None
+        known = self.tells or self.make
+        return known if _is_class(known) and known.is_described() else None
 
     def wired(self, wiring: Wiring) -> Node:
         """Make a node, ready to be ticked; raises FileError."""

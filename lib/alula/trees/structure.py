@@ -33,7 +33,7 @@ def verify(files: TreeFiles, palette: Palette, report: Report = refuse, *, of_ot
     _verify_uses(files, trees, report)
     declared: set[str] = set()
     if of_others:
-        declared = {one.name for one in files.models.values() if palette.get(one.name) is one}
+        declared = {one.name for one in palette if one.assumed or files.models.get(one.name) is one}
         palette = Palette([*palette, *_undeclared(files, trees, palette, report)])
     for name, tree in trees.items():
         if palette.get(name) is not None:

@@ -94,7 +94,9 @@ def test_what_is_checked_with_nav2s_nodes_can_be_run(robot, tmp_path):
 
 def test_nav2_reads_goals_unchecked(robot):
     goal = '<GoalUpdater input_goal="{goal}" output_goal="{g}"><GoalUpdater input_goal="{g}"><AlwaysSuccess/></GoalUpdater></GoalUpdater>'
-    assert found(goal, "", robot) == []
+    (read, unmade) = found(goal, "", robot)
+    assert (read.code, read.severity, unmade.code) == ("ALU607", Severity.WARNING, "ALU620")
+    assert read.message == "`goal` is read, nothing before writes it, and 'GoalUpdater' goes on with an empty one"
     assert found("<GoalUpdatedController><AlwaysSuccess/></GoalUpdatedController>", "", robot) == []
 
 

@@ -1,4 +1,4 @@
-"""Nav2's own nodes do what Nav2's documentation says of them."""
+"""Nav2's own nodes: what is ticked does what Nav2's documentation says, all others are declarations."""
 
 from __future__ import annotations
 
@@ -6,11 +6,16 @@ import pytest
 
 pytest.importorskip("py_trees")
 
+from alula.check.findings import findings_of
+from alula.check.sites import Board, Site
+from alula.check.traits import PlainTraits
+from alula.cli.options.models import NAV2_RELEASES
+from alula.cli.palette import main
 from alula.trees import nav2
 from alula.trees.answers import WORDS, Answers, StepClock, scripted_tree, ticks
 from alula.trees.errors import TreeError
-from alula.trees.nav2.decorators import DistanceController, PathLongerOnApproach, SpeedController
-from alula.trees.palette import Palette
+from alula.trees.nav2.plugin import TICKED, TOLD
+from alula.trees.palette import Category
 from alula.trees.reading import read_text
 from alula.trees.standard import standard_palette
 
@@ -20,11 +25,12 @@ SHORT = {"R": "RUNNING", "S": "SUCCESS", "F": "FAILURE", "K": "SKIPPED"}
 class Rig:
     """A tree; ``script``: the answers of a leaf as letters."""
 
-    def __init__(self, body: str, palette: Palette | None = None, **script: str) -> None:
-        self.answers = Answers({name: [WORDS[SHORT[letter]] for letter in letters] for name, letters in script.items()})
+    def __init__(self, body: str, stand_ins: dict[str, str] | None = None, **script: str) -> None:
+        answers = {name: [WORDS[SHORT[letter]] for letter in letters] for name, letters in script.items()}
+        self.answers = Answers(answers, stand_ins=stand_ins or {})
         self.clock = StepClock()
         files = read_text(f'<root BTCPP_format="4"><BehaviorTree ID="Main">{body}</BehaviorTree></root>')
-        self.tree = scripted_tree(files, standard_palette() | (palette or nav2.palette()), self.answers, self.clock)
+        self.tree = scripted_tree(files, standard_palette() | nav2.palette(), self.answers, self.clock)
 
     def tick(self, count: int = 1) -> list[str]:
         """Return a line a tick: the root's answer, and what the leaves were asked (s, t, h and the name)."""
@@ -109,10 +115,6 @@ def test_a_persistent_sequence_keeps_its_place_on_the_blackboard():
     assert rig.tick() == ["S sb"]
 
 
-def test_a_pause_that_nobody_asks_for_changes_nothing():
-    assert told("<PauseResumeController><a/><b/></PauseResumeController>", 2, a="RS", b="S") == ["R sa", "S ta"]
-
-
 def test_a_rate_limits_how_often_the_child_is_begun():
     body = '<ReactiveSequence><RateController hz="{}"><a/></RateController><b/></ReactiveSequence>'
     rig = Rig('<PipelineSequence><RateController hz="2.5"><a/></RateController><b/></PipelineSequence>', a="S", b="R")
@@ -135,65 +137,6 @@ def test_a_goal_that_changes_opens():
     assert rig.tick(2) == ["R sa tb", "R tb"]
 
 
-def test_the_goal_is_handed_on():
-    rig = Rig('<GoalUpdater input_goal="{goal}" output_goal="{new}"><a/></GoalUpdater>', a="S")
-    rig.tree.blackboard.set("goal", (1.0, 2.0))
-    assert rig.tick() == ["S sa"]
-    assert rig.tree.blackboard.get("new") == (1.0, 2.0)
-
-
-def own(node: type) -> Palette:
-    """Return Nav2's nodes with one of one's own in the place of its base."""
-    palette = Palette([one for one in nav2.palette() if one.name != node.__base__.__name__])
-    palette.register(node, node.__base__.__name__)
-    return palette
-
-
-def test_a_distance_opens_when_the_robot_has_gone_so_far():
-    place = [0.0, 0.0, 0.0]
-
-    class Here(DistanceController):
-        def where(self):
-            return tuple(place)
-
-    body = '<PipelineSequence><DistanceController distance="2.0"><a/></DistanceController><b/></PipelineSequence>'
-    rig = Rig(body, own(Here), a="S", b="R")
-    found = []
-    for place[0] in (0.0, 1.9, 2.0, 3.9, 4.1):
-        found += rig.tick()
-    assert found == ["R sa sb", "R tb", "R sa tb", "R tb", "R sa tb"]
-    assert Rig(body, a="S", b="R").tick(3) == ["R sa sb", "R tb", "R tb"]
-
-
-def test_a_speed_sets_the_rate():
-    speed = [1.0]
-
-    class Moving(SpeedController):
-        def speed(self):
-            return speed[0]
-
-    body = '<PipelineSequence><SpeedController min_rate="1.0" max_rate="5.0"><a/></SpeedController><b/></PipelineSequence>'
-    rig = Rig(body, own(Moving), a="S", b="R")
-    begun = [index for index, line in enumerate(rig.tick(5)) if "sa" in line]
-    assert begun == [0, 2, 4]  # each 0.2 s
-    speed[0] = 0.0
-    begun = [index for index, line in enumerate(rig.tick(22), start=5) if "sa" in line]
-    assert begun == [6, 16, 26]  # after the period that had begun, each second
-    with pytest.raises(TreeError, match="can't have a rate of 0"):
-        Rig('<SpeedController min_rate="0.0"><a/></SpeedController>', a="S").tick()
-
-
-def test_a_path_that_grows_near_the_goal_is_told():
-    body = '<PathLongerOnApproach path="{path}" prox_len="3.0" length_factor="2.0"><a/></PathLongerOnApproach>'
-    rig = Rig(body, a="RS")
-    assert rig.tick() == ["S"]  # without a path
-    near, far, detour = [(0.0, 0.0), (2.0, 0.0)], [(0.0, 0.0), (9.0, 0.0)], [(0.0, 0.0), (2.0, 5.0), (2.0, 0.0)]
-    for path, answer in ((near, "S"), (detour, "R sa"), (detour, "S ta"), (far, "S"), (near, "S"), (near, "S")):
-        rig.tree.blackboard.set("path", path)
-        assert rig.tick() == [answer]
-    assert issubclass(PathLongerOnApproach, object)
-
-
 @pytest.mark.parametrize(
     "body",
     [
@@ -208,3 +151,102 @@ def test_a_count_below_zero_is_refused_with_its_place(body):
 
 def test_no_retries_is_one_try():
     assert told('<RecoveryNode number_of_retries="0"><a/><b/></RecoveryNode>', 1, a="F", b="S") == ["F sa"]
+
+
+# --- declarations -------------------------------------------------------------------------------------------------------
+
+FILE = '<root BTCPP_format="4" main_tree_to_execute="Main"><BehaviorTree ID="Main">{}</BehaviorTree></root>'
+
+
+def told_of(body: str) -> list[tuple[str, str, str]]:
+    """Return what is found in a tree of others: code, severity, message."""
+    found = findings_of("m.xml", FILE.format(body).encode(), (), of_others=True)
+    return [(one.code, one.severity.value, one.message) for one in found]
+
+
+@pytest.mark.parametrize("node", [*TICKED, *TOLD])
+def test_a_class_has_the_ports_and_the_category_that_nav2_declares(node):
+    known = nav2.palette("lyrical").get(node.__name__)
+    assert known.category is node.category
+    if node in TICKED:
+        mine = {port.name: (port.direction, port.type, port.default) for port in node.ports}
+        assert mine == {port.name: (port.direction, port.type, port.default) for port in known.ports.values()}
+
+
+def test_releases_declare_what_they_have():
+    assert nav2.RELEASES == NAV2_RELEASES
+    by_release = {release: nav2.palette(release) for release in nav2.RELEASES}
+    assert [len(one.names()) for one in by_release.values()] == [53, 65, 70, 81]
+    spins = [list(known.get("Spin").ports) for known in by_release.values()]
+    assert ["disable_collision_checks" in ports for ports in spins] == [False, False, True, True]
+    assert ["error_code_id" in ports for ports in spins] == [False, True, True, True]
+    waits = [known.get("Wait").ports["wait_duration"].type.name for known in by_release.values()]
+    assert waits == ["int", "double", "double", "double"]
+    assert nav2.palette().get("Wait").ports["wait_duration"].type.name == "double"
+    assert [known.get("IsStopped") is not None for known in by_release.values()] == [False, False, True, False]
+
+
+def test_nothing_ticks_what_asks_a_robot():
+    kinds: dict[bool, set[str]] = {True: set(), False: set()}
+    for one in nav2.palette():
+        kinds[one.make is not None].add(one.name)
+    assert kinds[True] == {node.__name__ for node in TICKED}
+    body = '<Sequence><DistanceController distance="1"><Spin spin_dist="1"/></DistanceController></Sequence>'
+    with pytest.raises(TreeError, match="nothing here ticks a 'DistanceController'; say in the answers what stands in"):
+        told(body, 1, Spin="S")
+    rig = Rig(body, {"DistanceController": "pass-through"}, Spin="RS")
+    assert rig.tick(2) == ["R sSpin", "S tSpin"]
+
+
+def test_conditions_and_quick_actions_never_run_and_actions_of_servers_may():
+    runs = {one.name: PlainTraits().runs(Site(None, one, Board(0))) for one in nav2.palette()}
+    assert not any(runs[one.name] for one in nav2.palette() if one.category is Category.CONDITION)
+    assert [runs[name] for name in ("Spin", "ClearEntireCostmap", "TruncatePath", "PlannerSelector")] == [True, True, False, False]
+    body = "<ReactiveSequence><{}/><{}/></ReactiveSequence>"
+    assert told_of(body.format('GoalReached goal="{goal}"', 'TruncatePath input_path="{path}" output_path="{path}"')) == []
+    found = told_of(body.format("Spin", "BackUp"))
+    assert found == [
+        ("ALU611", "warning", "'BackUp' in a ReactiveSequence takes several ticks, as 'Spin' before it: each may have the other halted")
+    ]
+
+
+def test_a_navigator_writes_the_goal_and_what_else_is_read_unchecked_is_told():
+    plan = '<ComputePathToPose goal="{goal}" path="{path}" planner_id="{planner}"/>'
+    expected = "`planner` is read, nothing before writes it, and 'ComputePathToPose' goes on with an empty one"
+    assert told_of(plan) == [("ALU607", "warning", expected)]
+    assert told_of(f'<Sequence><PlannerSelector topic_name="p" selected_planner="{{planner}}"/>{plan}</Sequence>') == []
+
+
+def test_a_node_of_ones_own_by_the_name_of_one_of_nav2s_is_not_taken_for_it():
+    assert told_of('<Sequence><Wait msec="3"/><GoalUpdated/></Sequence>') == [("ALU601", "warning", "the node 'Wait' is not declared")]
+    ((code, severity, message),) = told_of('<Sequence><Spin spin_dist="1" spin_dis="2"/><GoalUpdated/></Sequence>')
+    assert (code, severity) == ("ALU603", "warning")
+    assert message == "'Spin' is used otherwise than it is declared; here 'Spin' has no port 'spin_dis'"
+    model = '<TreeNodesModel><Action ID="Spin"><input_port name="turns"/></Action></TreeNodesModel>'
+    assert told_of(f'<GoalUpdated/></BehaviorTree>{model}<BehaviorTree ID="X"><Spin turns="2"/>') == []
+
+
+def test_a_declaration_that_has_less_gives_way_to_what_nav2_declares():
+    model = '<TreeNodesModel><Action ID="Spin"><input_port name="spin_dist"/></Action></TreeNodesModel>'
+    assert told_of(f'<Spin spin_dist="1" is_recovery="true"/></BehaviorTree>{model}<BehaviorTree ID="X"><GoalUpdated/>') == []
+
+
+def test_a_mission_of_ones_own_needs_a_class_for_them():
+    text = FILE.format('<Sequence><Spin spin_dist="1"/><DistanceController><Wait/></DistanceController></Sequence>')
+    (finding,) = findings_of("m.xml", text.encode(), ())
+    assert finding.code == "ALU620"
+    assert finding.message == "'Spin' and 2 more are declared by Nav2, and no class makes them"
+    assert finding.hint == "write a class for Spin, DistanceController, Wait in the robot's part `missions`"
+
+
+def test_a_palette_of_a_release_refuses_what_it_has_not(tmp_path, capsys):
+    assert main(["--nav2", "humble"]) == 0
+    humble = tmp_path / "humble.model"
+    humble.write_text(capsys.readouterr().out)
+    text = FILE.format('<Spin spin_dist="1" disable_collision_checks="true"/>').encode()
+    (finding,) = findings_of("m.xml", text, (), [humble], of_others=True)
+    assert (finding.code, finding.message) == ("ALU603", "'Spin' has no port 'disable_collision_checks'")
+    assert findings_of("m.xml", text, (), of_others=True) == []
+    for words in ([], ["--nav2", "humble", "trees"], ["--nav2", "humble", "--guess"]):
+        assert main(words) == 2
+        assert "takes a FOLDER of a robot's models or of trees, or --nav2 RELEASE by itself" in capsys.readouterr().err

@@ -12,6 +12,7 @@ FORMAT = "4"
 SHELLS = ("bash", "zsh", "fish")
 PROOFS_S = 30.0
 REPAIR_S = 60.0
+NAV2_RELEASES = ("humble", "jazzy", "kilted", "lyrical")
 TICKS = 10
 MOST_SITUATIONS = 200_000
 UNLIKELY = 1e-3
@@ -138,7 +139,8 @@ def tree(parser: ArgumentParser) -> None:
 def palette(parser: ArgumentParser) -> None:
     """Add what ``alula palette`` takes."""
     of_trees = "or trees of others: what they declare"
-    parser.add_argument("places", nargs="+", metavar="FOLDER", help=f"the robot's models, as skillsets/uav; {of_trees}")
+    parser.add_argument("places", nargs="*", metavar="FOLDER", help=f"the robot's models, as skillsets/uav; {of_trees}")
+    parser.add_argument("--nav2", choices=NAV2_RELEASES, help="without a FOLDER: Nav2's nodes as this release declares them")
     parser.add_argument("--guess", action="store_true", help="of trees of others, what they use and nobody declares, as its uses show")
 
 

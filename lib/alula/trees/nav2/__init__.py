@@ -1,11 +1,12 @@
-"""Nav2's own control nodes and decorators, as a plug-in: with ``palette`` Nav2's trees can be ticked.
+"""Nav2's own nodes: as its headers declare them, and classes for those that need no robot.
 
-They do what Nav2's documentation says (https://docs.nav2.org, Behavior Tree XML Nodes). Where a node asks the robot, a method of its class
-does (`DistanceController.where`, `SpeedController.speed`): here the robot stands still, a class of one's own overrides it. Nobody sends a
-new goal to `GoalUpdater`, nobody asks `PauseResumeController` for a pause. Nav2's actions and conditions are skills of its robot: their
-types are in its palette ``nav2_tree_nodes.xml``, their answers are scripted or a robot's own.
+``palette`` has all of them. Its control nodes and those decorators that look at nothing but their children, the clock and the blackboard
+do what Nav2's documentation says (https://docs.nav2.org, Behavior Tree XML Nodes). All others, its actions and conditions among them, are
+declarations: ports, what may take several ticks, what is read unchecked. They are drawn and checked; to tick them is scripted, or a
+robot's own.
 """
 
-from alula.trees.nav2.plugin import palette
+from alula.trees.nav2.declared import RELEASES, WRITTEN, declared
+from alula.trees.nav2.plugin import palette, palette_for
 
-__all__ = ["palette"]
+__all__ = ["RELEASES", "WRITTEN", "declared", "palette", "palette_for"]

@@ -10,7 +10,7 @@ from alula.trees.node import Control, Count, Wiring
 from alula.trees.palette import inout_port, input_port
 from alula.trees.status import FAILURE, RUNNING, SKIPPED, SUCCESS, Answer
 from alula.trees.ticking import Order, Ticking
-from alula.trees.values import BOOL, INT, STRING
+from alula.trees.values import BOOL, INT
 
 
 class PipelineSequence(Control):
@@ -220,21 +220,11 @@ class PersistentSequence(Control):
 
 
 class PauseResumeController(Control):
-    """Ticks its first child; the others are for a pause (while it lasts, when it begins, when it ends), which nobody asks for here."""
+    """Ticks its first child until services ask for a pause; the others are for the pause (while it lasts, when it begins, when it ends)."""
 
-    ports = (
-        input_port("pause_service_name", STRING, None, "service that asks for a pause", optional=True),
-        input_port("resume_service_name", STRING, None, "service that ends it", optional=True),
-    )
     child_count = (1, 4)
 
     @classmethod
     def may_end(cls, given: Given, children: Sequence[Ends]) -> Ends:  # noqa: ARG003
         """End as the first child; where that is skipped it succeeds."""
         return (children[0] & ENDS) | (SUCCEEDS if children[0] & SKIPS else NO_END)
-
-    def update(self) -> Answer:
-        """Tick the first child."""
-        self.become(RUNNING)
-        answer = self.children[0].execute()
-        return SUCCESS if answer is SKIPPED else answer

@@ -2,21 +2,16 @@
 
 from __future__ import annotations
 
-import itertools
 import math
 from collections.abc import Sequence
-from typing import ClassVar, TypeAlias
 
 from alula.trees.ends import FAILS, SUCCEEDS, Ends, Given
-from alula.trees.errors import TickError
 from alula.trees.node import Decorator, Node, Wiring
-from alula.trees.palette import Port, input_port, output_port
+from alula.trees.palette import input_port
 from alula.trees.status import FAILURE, IDLE, RUNNING, SUCCESS, Answer
-from alula.trees.values import DOUBLE, STRING
+from alula.trees.values import DOUBLE
 
 NANOSECONDS = 1e9
-Point: TypeAlias = Sequence[float]
-"""Metres, in the frame of the map."""
 
 
 class _Gate(Decorator):
@@ -76,47 +71,15 @@ class RateController(_Gate):
         self._since_ns = self.now_ns
 
 
-class DistanceController(_Gate):
-    """Ticks its child whenever the robot has gone so far."""
+class GoalUpdatedController(_Gate):
+    """Ticks its child whenever the goal is another."""
 
     ports = (
-        input_port("distance", DOUBLE, "1.0", "how far the robot goes before the child is begun again", unit="m"),
-        input_port("global_frame", STRING, None, "reference frame", optional=True),
-        input_port("robot_base_frame", STRING, None, "the robot's own frame", optional=True),
-    )
-
-    remembers = ("_from",)
-
-    def __init__(self, wiring: Wiring) -> None:
-        super().__init__(wiring)
-        self._from: Point = ()
-
-    def where(self) -> Point:
-        """Return where the robot is."""
-        return (0.0, 0.0, 0.0)
-
-    def begin(self) -> None:
-        """Take the place."""
-        self._from = self.where()
-
-    def opens(self) -> bool:
-        """Tell whether the robot has gone far enough."""
-        return math.dist(self._from, self.where()) >= number(self, "distance")
-
-    def passed(self) -> None:
-        """Take the place."""
-        self._from = self.where()
-
-
-class _GoalGate(_Gate):
-    """Opens when the goal is another."""
-
-    ports: ClassVar[tuple[Port, ...]] = (
         input_port("goal", doc="the goal (default: the entry 'goal')", optional=True),
         input_port("goals", doc="the goals (default: the entry 'goals')", optional=True),
     )
 
-    remembers: ClassVar[tuple[str, ...]] = ("_goals",)
+    remembers = ("_goals",)
 
     def __init__(self, wiring: Wiring) -> None:
         super().__init__(wiring)
@@ -133,57 +96,6 @@ class _GoalGate(_Gate):
 
     def _asked(self) -> tuple[object, object]:
         return read(self, "goal", "goal"), read(self, "goals", "goals")
-
-
-class GoalUpdatedController(_GoalGate):
-    """Ticks its child whenever the goal is another."""
-
-
-class SpeedController(_GoalGate):
-    """Ticks its child the more often the faster the robot is, and at once when the goal is another."""
-
-    ports = (
-        input_port("min_rate", DOUBLE, "0.1", "how often the child is begun at the lowest speed", unit="Hz"),
-        input_port("max_rate", DOUBLE, "1.0", "how often the child is begun at the highest speed", unit="Hz"),
-        input_port("min_speed", DOUBLE, "0.0", "lowest speed", unit="m/s"),
-        input_port("max_speed", DOUBLE, "0.5", "highest speed", unit="m/s"),
-        *_GoalGate.ports,
-    )
-
-    remembers = ("_goals", "_since_ns", "_period_s")
-
-    def __init__(self, wiring: Wiring) -> None:
-        super().__init__(wiring)
-        self._since_ns = 0
-        self._period_s = 0.0
-
-    def speed(self) -> float:
-        """Return the robot's speed, m/s."""
-        return 0.0
-
-    def begin(self) -> None:
-        """Take the goal and the time; the first period is that of the highest speed."""
-        super().begin()
-        least, most = number(self, "min_rate"), number(self, "max_rate")
-        if least <= 0.0 or most <= 0.0:
-            raise TickError(f"{self.place()}: a SpeedController can't have a rate of 0 or less")
-        self._since_ns, self._period_s = self.now_ns, 1.0 / most
-
-    def opens(self) -> bool:
-        """Tell whether a period is over, or the goal is another."""
-        if super().opens():
-            self.begin()
-            return True
-        if (self.now_ns - self._since_ns) / NANOSECONDS < self._period_s:
-            return False
-        self._since_ns, self._period_s = self.now_ns, 1.0 / self._rate()
-        return True
-
-    def _rate(self) -> float:
-        least, most = number(self, "min_rate"), number(self, "max_rate")
-        slowest, fastest = number(self, "min_speed"), number(self, "max_speed")
-        share = (self.speed() - slowest) / (fastest - slowest) if fastest != slowest else 1.0
-        return max(min(share * (most - least) + least, most), least)
 
 
 class SingleTrigger(Decorator):
@@ -212,77 +124,40 @@ class SingleTrigger(Decorator):
         return answer
 
 
-class GoalUpdater(Decorator):
-    """Ticks its child with the newest goal, here always the one that it was given."""
-
-    ports = (
-        input_port("input_goal", doc="the goal so far", optional=True),
-        input_port("input_goals", doc="the goals so far", optional=True),
-        output_port("output_goal", doc="the newest goal"),
-        output_port("output_goals", doc="the newest goals"),
-    )
+class DistanceController(Decorator):
+    """Ticks its child whenever the robot has gone so far."""
 
     @classmethod
     def may_end(cls, given: Given, children: Sequence[Ends]) -> Ends:  # noqa: ARG003
         """End as the child."""
         return children[0]
 
-    def update(self) -> Answer:
-        """Hand the goal on, and tick the child."""
-        for which in ("goal", "goals"):
-            goal = read(self, f"input_{which}")
-            if goal is not None:
-                self.put(f"output_{which}", goal)
-        return self.child.execute()
+
+class SpeedController(Decorator):
+    """Ticks its child the more often the faster the robot is, and at once when the goal is another."""
+
+    @classmethod
+    def may_end(cls, given: Given, children: Sequence[Ends]) -> Ends:  # noqa: ARG003
+        """End as the child."""
+        return children[0]
+
+
+class GoalUpdater(Decorator):
+    """Ticks its child with the newest goal that a topic has."""
+
+    @classmethod
+    def may_end(cls, given: Given, children: Sequence[Ends]) -> Ends:  # noqa: ARG003
+        """End as the child."""
+        return children[0]
 
 
 class PathLongerOnApproach(Decorator):
-    """Ticks its child when a new path to the same goal is much longer and the goal is near; else it succeeds.
-
-    A path is a sequence of points on the blackboard.
-    """
-
-    ports = (
-        input_port("path", doc="the path", optional=True),
-        input_port("prox_len", DOUBLE, "3.0", "the goal is near when the path to it is shorter", unit="m"),
-        input_port("length_factor", DOUBLE, "2.0", "a path is much longer when it is so many times as long"),
-    )
-
-    remembers = ("_before",)
+    """Ticks its child when a new path to the same goal is much longer and the goal is near; else it succeeds."""
 
     @classmethod
     def may_end(cls, given: Given, children: Sequence[Ends]) -> Ends:  # noqa: ARG003
         """End as the child, or succeed."""
         return children[0] | SUCCEEDS
-
-    def __init__(self, wiring: Wiring) -> None:
-        super().__init__(wiring)
-        self._before: Sequence[Point] = ()
-
-    def update(self) -> Answer:
-        """Compare the paths, and tick."""
-        self.become(RUNNING)
-        before, path = self._before, self._path()
-        if not (before and path and path != before and path[-1] == before[-1] and self._longer(path, before)):
-            self._before = path
-            return SUCCESS
-        answer = self.child.execute()
-        if answer is SUCCESS or answer is FAILURE:
-            self._before = path
-            self.reset_children()
-        return answer
-
-    def _path(self) -> Sequence[Point]:
-        path = read(self, "path")
-        return path if isinstance(path, Sequence) and not isinstance(path, str) else ()
-
-    def _longer(self, path: Sequence[Point], before: Sequence[Point]) -> bool:
-        return length_m(before) < number(self, "prox_len") and length_m(path) > number(self, "length_factor") * length_m(before)
-
-
-def length_m(path: Sequence[Point]) -> float:
-    """Return the length of a path."""
-    return sum(math.dist(one, other) for one, other in itertools.pairwise(path))
 
 
 def number(node: Node, port: str) -> float:
