@@ -82,6 +82,8 @@ def _verify_node(element: Element, files: TreeFiles, palette: Palette, report: R
         known = palette.get(name)
         if known is None:
             cure = did_you_mean(name, [*palette.names()]) or "see `alula palette`"
+            if name in files.trees:
+                cure = f'it is a tree: write <SubTree ID="{name}"/>'
             place = element.place_of("ID") if element.tag in CATEGORIES else element.place
             report(Problem(place, f"unknown node '{name}'", cure, code="ALU601"))
         else:
@@ -144,7 +146,8 @@ def _undeclared(files: TreeFiles, trees: Mapping[str, Element], palette: Palette
     for tree in trees.values():
         for element in tree.iterate():
             first.setdefault(type_name(element), element)
-    guessed = [one for one in guessed if one.name not in files.trees and not is_slip(one.name, palette.names())]
+    declared = [one.name for one in palette if not one.assumed]
+    guessed = [one for one in guessed if one.name not in files.trees and not is_slip(one.name, declared)]
     told = sorted((one for one in guessed if first[one.name].place.path in own), key=lambda one: first[one.name].place.line)
     if told:
         names = _first([one.name for one in told])

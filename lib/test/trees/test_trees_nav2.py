@@ -6,11 +6,13 @@ import pytest
 
 pytest.importorskip("py_trees")
 
+from alula.api.checking import checked_files, prove_files
 from alula.check.findings import findings_of
 from alula.check.sites import Board, Site
 from alula.check.traits import PlainTraits
 from alula.cli.options.models import NAV2_RELEASES
 from alula.cli.palette import main
+from alula.common.robots import meaning
 from alula.trees import nav2
 from alula.trees.answers import WORDS, Answers, StepClock, scripted_tree, ticks
 from alula.trees.errors import TreeError
@@ -222,6 +224,8 @@ def test_a_node_of_ones_own_by_the_name_of_one_of_nav2s_is_not_taken_for_it():
     ((code, severity, message),) = told_of('<Sequence><Spin spin_dist="1" spin_dis="2"/><GoalUpdated/></Sequence>')
     assert (code, severity) == ("ALU603", "warning")
     assert message == "'Spin' is used otherwise than it is declared; here 'Spin' has no port 'spin_dis'"
+    alike = told_of("<Sequence><NavigateToPoses/><GoalUpdated/></Sequence>")
+    assert alike == [("ALU601", "warning", "the node 'NavigateToPoses' is not declared")]
     model = '<TreeNodesModel><Action ID="Spin"><input_port name="turns"/></Action></TreeNodesModel>'
     assert told_of(f'<GoalUpdated/></BehaviorTree>{model}<BehaviorTree ID="X"><Spin turns="2"/>') == []
 
@@ -237,6 +241,23 @@ def test_a_mission_of_ones_own_needs_a_class_for_them():
     assert finding.code == "ALU620"
     assert finding.message == "'Spin' and 2 more are declared by Nav2, and no class makes them"
     assert finding.hint == "write a class for Spin, DistanceController, Wait in the robot's part `missions`"
+
+
+def test_the_runs_of_a_tree_of_nav2s_are_looked_at(tmp_path):
+    tree = tmp_path / "tree.xml"
+    tree.write_text(
+        FILE.format('<ReactiveSequence><GoalUpdated/><DistanceController><Spin spin_dist="1"/></DistanceController></ReactiveSequence>')
+    )
+    with meaning(None):
+        files = checked_files([str(tree)])
+        prove_files(files, 20.0)
+    told = [(one.code, one.message) for file in files for one in file.findings]
+    anything = "answer and write anything: Nav2 declares it, and no class is known"
+    assert told == [
+        ("ALU715", f"'GoalUpdated' may {anything}"),
+        ("ALU715", f"'DistanceController' may tick and halt its children in any order, and {anything}"),
+        ("ALU715", f"'Spin' may {anything}"),
+    ]
 
 
 def test_a_palette_of_a_release_refuses_what_it_has_not(tmp_path, capsys):

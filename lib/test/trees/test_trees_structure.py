@@ -25,6 +25,7 @@ WRONG = {
     "<RunOnce then_skip='yes'><AlwaysSuccess/></RunOnce>": "21: the port 'then_skip': 'yes' is no bool",
     "<LoopInt queue='1' value='x'><AlwaysSuccess/></LoopInt>": "20: the port 'value' is written; it names an entry: value=\"{...}\"",
     "<Sleep ID='x' msec='3'/>": '8: <Sleep> takes no ID; the tag is its type; call it by name="..."',
+    "<main/>": "1: unknown node 'main'; it is a tree: write <SubTree ID=\"main\"/>",
     "<SubTree ID='man'/>": "10: there is no tree 'man'; did you mean main?",
     "<SubTree ID='main'/>": "1: a tree contains itself: 'main' in 'main'; a loop is what Repeat and its like are for",
     "<ReactiveSequence><AsyncSequence><AlwaysSuccess/></AsyncSequence><AsyncSequence><AlwaysSuccess/></AsyncSequence></ReactiveSequence>": (

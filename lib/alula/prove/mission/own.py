@@ -20,6 +20,7 @@ from alula.trees.palette import CHILDREN, Category, Direction, NodeType, Port, n
 from alula.trees.status import FAILURE, IDLE, RUNNING, SKIPPED, SUCCESS, Answer, Skipped
 
 DECLARED = "the file declares it, and no class is known"
+OF_NAV2 = "Nav2 declares it, and no class is known"
 MOST = 20
 """Whole numbers that a node with children remembers are kept up to here; one that counts further may do anything."""
 
@@ -81,8 +82,8 @@ def own_nodes(robot: Robot, part: MissionPart, declared: Sequence[NodeType], why
         content = {"ports": tuple(one.ports.values()), "category": one.category, "child_count": one.children, "__doc__": one.doc}
         children = has_children(one.category, one.children)
         made: type[Node] = type(one.name, (Control if children else Node,), content)
-        nodes.append((one.name, _any_order(robot, made) if children else _leaf(robot, made, answers=ANSWERED)))
-        taken.append(Taken(one.name, DECLARED, children))
+        nodes.append((one.name, _any_order(robot, made) if children else _leaf(robot, made, answers=_declared_answers(one))))
+        taken.append(Taken(one.name, OF_NAV2 if one.assumed else DECLARED, children))
     run = {one.name for one in taken if not one.why_not}
     free = tuple(leaves) if known else ()
     unread = tuple(name for name, _ in nodes if name not in run and name not in free)
@@ -102,6 +103,13 @@ class Own(Node):
 
 
 ANSWERED = (SUCCESS.value, FAILURE.value, RUNNING.value, SKIPPED.value)
+
+
+def _declared_answers(known: NodeType) -> tuple[str, ...]:
+    """Return what a leaf without a class may answer: anything, unless it is told whether it runs; such a one is never skipped by itself."""
+    if known.runs is None:
+        return ANSWERED
+    return (SUCCESS.value, FAILURE.value, RUNNING.value) if known.runs else (SUCCESS.value, FAILURE.value)
 
 
 def _answers(real: type[Node]) -> tuple[str, ...]:

@@ -328,8 +328,9 @@ def look_at(read: Callable[[str], System], look: Callable[[System], T]) -> T:
 
 
 def nowhere_made(files: TreeFiles, skillsets: Sequence[Skillset], part: MissionPart) -> list[NodeType]:
-    """Return the types of node that a mission's trees use and its files only declare."""
-    return [files.models[name] for name in without_class(files, palette_of(files, skillsets, part))]
+    """Return the types of node that a mission's trees use and that are only declared, by its files or by Nav2."""
+    palette = palette_of(files, skillsets, part)
+    return [known for name in without_class(files, palette) if (known := palette.get(name)) is not None]
 
 
 def uses_of(source: TreeSource, models: Sequence[Skillset], part: MissionPart) -> Uses:
