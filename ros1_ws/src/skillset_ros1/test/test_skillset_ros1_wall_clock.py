@@ -14,6 +14,7 @@ import rospy
 from skillset_interfaces.msg import Heartbeat, ResourceState, ResourceStates
 from skillset_ros1_bench import SOON_S
 
+from alula.common.steady_clock import STEADY_CLOCK
 from alula.model.execution_state import ExecutionState
 from alula.runtime.codecs import stamp_ns_of
 from alula_testing.waits import until
@@ -110,6 +111,8 @@ def test_a_wall_clock_that_is_set_by_an_hour_ends_nothing_and_delays_nothing(ste
     # What has to end by itself does: an interruption that the hook never confirms, and the belief in a reporter that is silent.
     handle.interrupt()
     assert handle.wait(LONG_S)
+    # To this client they are on another computer by now: their stamps are corrected by what their heartbeats have told.
+    assert abs(stepped.events[-1].stamp_ns - STEADY_CLOCK.now_ns()) < LONG_S * 1e9
     stepped.fall_silent()
     until(lambda: stepped.client.resources["SDK_authority"] == "UNAVAILABLE", "it is unknown", LONG_S)
     assert stepped.client.reasons["SDK_authority"].startswith("not heard of for ")

@@ -185,6 +185,7 @@ class RclpyMiddleware(RclpyBase):
 
         def hear(heartbeat: Any) -> None:
             last[:] = [heartbeat.instance_id]
+            self._clock.hear(stamp_ns_of(heartbeat.header.stamp))
             on_heartbeat(heartbeat.instance_id, self._clock.moment_ns(stamp_ns_of(heartbeat.header.stamp)))
 
         def changed(info: Any) -> None:

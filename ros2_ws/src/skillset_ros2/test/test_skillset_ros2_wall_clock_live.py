@@ -18,6 +18,7 @@ from rclpy.node import Node  # noqa: E402
 from skillset_interfaces.msg import Heartbeat  # noqa: E402
 from skillset_ros2_rig import READY_S, until  # noqa: E402
 
+from alula.common.steady_clock import STEADY_CLOCK  # noqa: E402
 from alula.model.execution_state import ExecutionState  # noqa: E402
 from alula.runtime.codecs import stamp_ns_of  # noqa: E402
 from alula_testing.wall_clock import WallClock, needs_faketime  # noqa: E402
@@ -102,6 +103,8 @@ def test_a_wall_clock_that_is_set_by_an_hour_ends_nothing_and_delays_nothing(ste
     # What has to end by itself does: an interruption that the hook never confirms, and the belief in a reporter that is silent.
     handle.interrupt()
     assert handle.wait(LONG_S)
+    # To this client they are on another computer by now: their stamps are corrected by what their heartbeats have told.
+    assert abs(stepped.events[-1].stamp_ns - STEADY_CLOCK.now_ns()) < LONG_S * 1e9
     stepped.process.send_signal(signal.SIGUSR1)
     until(lambda: stepped.client.resources["SDK_authority"] == "UNAVAILABLE", "it is unknown", LONG_S)
     assert stepped.client.reasons["SDK_authority"].startswith("not heard of for ")

@@ -14,7 +14,7 @@ from alula.runtime.timers import Job, Timer
 from alula.runtime.waiting import Waiter
 from alula.runtime.workers import Workers
 from skillset_ros1.loop import Loop
-from skillset_ros1.names import MISSION_CLOCK
+from skillset_ros1.names import mission_clock
 
 LOOK_S = 0.02
 """How often (wall clock) connections are looked at while they are being made."""
@@ -31,6 +31,7 @@ class RospyBase:
     """
 
     def __init__(self, skillset: str, place: str, what: str) -> None:
+        self._clock = mission_clock()
         self.loop = Loop(what, self._raised)
         self.waiter: Waiter = self.loop
         self.server = ""
@@ -43,7 +44,7 @@ class RospyBase:
 
     def now_ns(self) -> int:
         """Return the mission clock, nanoseconds."""
-        return MISSION_CLOCK.now_ns()
+        return self._clock.now_ns()
 
     def at(self, when_ns: int, job: Job) -> Timer:
         """Run a job at a moment of the mission clock."""

@@ -12,7 +12,7 @@ from rospy.rostime import get_rostime_cond
 
 from alula.runtime.timers import Job, Timer, TimerQueue
 from alula.runtime.waiting import CannotWaitError
-from skillset_ros1.names import MISSION_CLOCK
+from skillset_ros1.names import mission_clock
 
 LONGEST_WAIT_S = 0.25
 """So soon a loop sees that the node was shut down."""
@@ -31,6 +31,7 @@ class Loop:
         self._name = name
         self._on_error = on_error
         self._jobs: deque[Job] = deque()
+        self._clock = mission_clock()
         self._timers = TimerQueue()
         self._delays = TimerQueue()
         # rospy notifies this one whenever simulated time goes on.
@@ -104,7 +105,7 @@ class Loop:
                     return self._jobs.popleft()
                 if self._over:
                     return None
-                due = self._delays.pop_due(time.monotonic_ns()) or self._timers.pop_due(MISSION_CLOCK.now_ns())
+                due = self._delays.pop_due(time.monotonic_ns()) or self._timers.pop_due(self._clock.now_ns())
                 if due is not None:
                     return due[1]
                 self._changed.wait(self._pause_s())
@@ -116,8 +117,8 @@ class Loop:
         pauses = [LONGEST_WAIT_S]
         if self._delays.due_ns is not None:
             pauses.append((self._delays.due_ns - time.monotonic_ns()) * 1e-9)
-        if self._timers.due_ns is not None and not MISSION_CLOCK.simulated:
-            pauses.append((self._timers.due_ns - MISSION_CLOCK.now_ns()) * 1e-9)
+        if self._timers.due_ns is not None and not self._clock.simulated:
+            pauses.append((self._timers.due_ns - self._clock.now_ns()) * 1e-9)
         return max(0.0, min(pauses))
 
 

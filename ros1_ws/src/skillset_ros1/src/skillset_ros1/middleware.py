@@ -38,7 +38,7 @@ from skillset_ros1.actions import RospyLink, RospyServer, is_connected
 from skillset_ros1.base import RospyBase
 from skillset_ros1.calls import call
 from skillset_ros1.convert import message_class
-from skillset_ros1.names import MISSION_CLOCK, QUEUE, action_types
+from skillset_ros1.names import QUEUE, action_types
 
 LEASE_S = 2.0
 """Without a heartbeat for so long (wall clock), managers are doubted, as in the ROS 2 world."""
@@ -64,7 +64,7 @@ class RospyMiddleware(RospyBase):
     def __init__(self, skillset: str, place: str, interfaces: ModuleType | None = None) -> None:
         super().__init__(skillset, place, f"the client of {skillset}" if interfaces is None else f"the managers of {skillset}")
         self._interfaces = interfaces
-        self._codecs = Codecs(skillset_interfaces.msg, skillset_interfaces.srv, message_class, MISSION_CLOCK)
+        self._codecs = Codecs(skillset_interfaces.msg, skillset_interfaces.srv, message_class, self._clock)
 
     # --- topics ------------------------------------------------------------------------------------------------------
 
@@ -164,7 +164,7 @@ class RospyMiddleware(RospyBase):
         def beat() -> None:
             while not self._over.is_set() and not rospy.is_shutdown():
                 heartbeat = Heartbeat(instance_id=instance_id, begun_ns=STEADY_CLOCK.stamp_ns(begun_ns))
-                set_stamp(heartbeat.header.stamp, MISSION_CLOCK.stamp_ns(MISSION_CLOCK.now_ns()))
+                set_stamp(heartbeat.header.stamp, self._clock.stamp_ns(self._clock.now_ns()))
                 publisher.publish(heartbeat)
                 self._over.wait(ALIVE_PERIOD_S)
 
@@ -177,7 +177,8 @@ class RospyMiddleware(RospyBase):
         def hear(heartbeat: Any) -> None:
             self.server = heartbeat._connection_header["callerid"]  # noqa: SLF001 - rospy's way to tell the sender
             heard_s[:] = [time.monotonic()]
-            on_heartbeat(heartbeat.instance_id, MISSION_CLOCK.moment_ns(stamp_ns_of(heartbeat.header.stamp)))
+            self._clock.hear(stamp_ns_of(heartbeat.header.stamp))
+            on_heartbeat(heartbeat.instance_id, self._clock.moment_ns(stamp_ns_of(heartbeat.header.stamp)))
 
         heartbeats = self.listen(self.name("alive"), Heartbeat, hear)
 

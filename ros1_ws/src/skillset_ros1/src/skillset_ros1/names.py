@@ -54,5 +54,6 @@ def place(namespace: str, skillset: str) -> str:
     return name
 
 
-MISSION_CLOCK = MissionClock(lambda: not rospy.rostime.is_wallclock(), lambda: int(rospy.get_rostime().to_nsec()))
-"""Of the one node that a process of ROS 1 has."""
+def mission_clock() -> MissionClock:
+    """Make a mission clock of this process's node."""
+    return MissionClock(lambda: not rospy.rostime.is_wallclock(), lambda: int(rospy.get_rostime().to_nsec()))
