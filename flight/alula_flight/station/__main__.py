@@ -5,7 +5,6 @@ from __future__ import annotations
 import json
 import sys
 from collections.abc import Callable, Mapping, Sequence
-from dataclasses import asdict
 from pathlib import Path
 from typing import Any
 
@@ -22,6 +21,7 @@ from alula_flight.station.state import StationState
 from alula_flight.station.station import Station, StationError
 
 DONE, DOWN, WRONG = 0, 1, 2
+OF_A_PART = ("pid", "state", "deaths", "why")
 
 
 def say(line: str) -> None:
@@ -88,7 +88,7 @@ def the_only_one() -> str:
 def told(station: Station, state: StationState) -> dict[str, object]:
     """Return how a deployment is, as JSON has it."""
     parts: Mapping[str, Any] = {
-        name: {key: value for key, value in asdict(part).items() if key not in {"words", "graph", "start"}}
+        name: {"lasting_s": states.lasting_s(part.start) if part.pid else None, **{key: getattr(part, key) for key in OF_A_PART}}
         for name, part in state.parts.items()
     }
     return {

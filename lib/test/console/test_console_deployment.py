@@ -31,7 +31,7 @@ class Up:
 
     def tell(self, problem: str = "", ahead_s: float = -0.25) -> None:
         parts = {
-            name: {"pid": 7, "started_s": 1.7e9, "state": state, "words": [], "graph": {}, "deaths": 0, "why": why}
+            name: {"pid": 7, "start": "boot 1", "state": state, "words": [], "graph": {}, "deaths": 0, "why": why}
             for name, (state, why) in PARTS.items()
         }
         master = {"uri": "http://192.168.1.10:11311", "problem": problem, "ahead_s": ahead_s, "within_s": 0.002}

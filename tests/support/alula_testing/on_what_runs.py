@@ -82,6 +82,11 @@ def _two_missions(robot: Path, run: Run) -> None:
     assert max(stamps[0]) < min(stamps[1])
     run("alula up robot")
     assert processes(run) == begun
+    hooks = "ros2_ws/src/rover_robot/rover_robot/hooks.py"
+    (robot / hooks).write_text(f"{(robot / hooks).read_text(encoding='utf-8')}\n# Tuned on the robot.\n", encoding="utf-8")
+    assert f"rover is started again, changed: {hooks}\n" in run("alula up robot 2>&1")
+    assert [name for name, pid in processes(run).items() if pid != begun[name]] == ["rover"]
+    until(lambda: json.loads(run("alula skills --json"))["resources"] == known, "the new managers know the resources")
 
 
 def _deaths(robot: Path, run: Run) -> None:

@@ -36,7 +36,7 @@ WORLD = "/world"
 """Edges of the true surfaces: ``[[x, y, z, x, y, z], ...]``, frame map, metres."""
 PARTS = "/parts"
 """Of a deployment that is up, which is shown as a run without a scenario: ``{parts, master: {uri, problem, ahead_s, within_s}, disk}``.
-A part is ``{name, state, started_s, deaths, why}``, with seconds since 1970."""
+A part is ``{name, state, deaths, why}``."""
 SUMMARY = "/summary"
 """The values of ``summary.json``."""
 PATH = "/path"

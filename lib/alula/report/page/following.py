@@ -17,7 +17,7 @@ from alula.report.page.embedded import REPORT, read_report
 from alula.report.page.entries import AREAS, CAUSES, MAP, OF_RECORDINGS, PARTS, PICTURE, RUN, SUMMARY, Converter, Wire
 from alula.report.page.lines import LinesFollower
 
-OF_A_PART = ("state", "started_s", "deaths", "why")
+OF_A_PART = ("state", "deaths", "why")
 OF_THE_MACHINE = ("out_dir", "run_id")
 """Of ``run.json``, what a reader of the page can't use."""
 
