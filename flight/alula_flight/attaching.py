@@ -24,10 +24,11 @@ STILL_RUNNING = "running"
 
 
 @contextmanager
-def attached_to(spec: RunSpec) -> Iterator[Mapping[str, str]]:
+def attached_to(spec: RunSpec, say: Callable[[str], None]) -> Iterator[Mapping[str, str]]:
     """Have the deployment's parts run while the context lasts; yield the environment of the run.
 
-    Those that ran before are left running; the others end with the run, also where this process is killed.
+    Those that ran before are left running, and it is said what of their models and code has changed since; the others end with the run,
+    also where this process is killed.
 
     Raises:
         RequestError: the master does not answer, another mission runs, or a part can't run.
@@ -45,6 +46,8 @@ def attached_to(spec: RunSpec) -> Iterator[Mapping[str, str]]:
     try:
         states.note_holder(lock, f"the mission {spec.scenario} in {spec.out_dir}")
         begun = not station.is_up
+        for name, how in station.differences().items():
+            say(f"{name} runs as it was started, and is another by now, {'; '.join(how)}: `alula up {spec.deployment}` takes that")
         if begun:
             station.begin(until=os.getpid())
         try:

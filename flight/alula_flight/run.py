@@ -158,7 +158,7 @@ def main(arguments: list[str]) -> int:
         part = part_of_robot()
         request = parse(arguments, part)
         if request.deployment:
-            with attached_to(request) as graph:
+            with attached_to(request, tell) as graph:
                 return fly(request, (), functools.partial(start_supervisor, request, graph, None))
         check_no_master(os.environ)
         claim = claim_domain([request.domain] if request.domain else DOMAINS, request.namespace)
@@ -167,6 +167,11 @@ def main(arguments: list[str]) -> int:
     except (AlulaError, NoFreeDomainError, NoFreePortError) as error:
         sys.stderr.write(f"alula run: {error}\n")
         return CANNOT_START
+
+
+def tell(line: str) -> None:
+    """Say a line before the run has begun, on standard error."""
+    sys.stderr.write(f"{line}\n")
 
 
 def fly(spec: RunSpec, words: Sequence[str], start: Callable[[], subprocess.Popen[bytes]]) -> int:

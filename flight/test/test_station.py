@@ -40,7 +40,7 @@ from alula_flight.station.__main__ import main as commands
 from alula_flight.station.contents import changes, with_contents
 from alula_flight.station.disk import GB, Kept, beyond, tidy
 from alula_flight.station.keeper import Kept as KeptPart
-from alula_flight.station.keeper import differences, end_all
+from alula_flight.station.keeper import differences, end_all, graph_of
 from alula_flight.station.master import why_no_master
 from alula_flight.station.notify import VARIABLE, notify
 from alula_flight.station.parts import Part, Places, bridge_file, environment_of, network_profile, parts_of
@@ -227,6 +227,20 @@ def test_a_change_of_a_model_a_binding_or_a_hook_is_named_by_what_it_is(robot, p
     now = pieces(robot)
     assert changes(before[part], now[part]) == told
     assert [name for name in now if name != part and now[name] != before[name]] == []
+
+
+def test_what_runs_is_compared_with_what_is_here_now(robot):
+    before = pieces(robot)["rover"]
+    station = Station("robot")
+    assert station.differences() == {}, "nothing runs"
+    words = {part.name: part for part in parts_of(station.deployment, station.places, "id", os.environ)}
+    me = {"pid": os.getpid(), "start": start_of(os.getpid())}
+    runs = PartState(**me, words=words["rover"].words, graph=graph_of(words["rover"]), contents=before)
+    station.folder.mkdir(parents=True)
+    StationState("id", parts={"rover": runs}).save(station.folder)
+    assert station.differences() == {}
+    edited(robot / "skillsets/rover.skill", "silence = 2.0", "silence = 3.0")
+    assert station.differences() == {"rover": ["changed: resource link"]}
 
 
 def test_a_part_is_started_again_that_was_started_with_something_else(kept):
