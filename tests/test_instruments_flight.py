@@ -1,4 +1,4 @@
-"""Flights whose instruments fail in the air: the GPS, before the autopilot acts by itself, and the IMU, which the map can do without."""
+"""Flights that the air or their instruments make hard: the GPS is lost, the IMU dies, a strong wind blows."""
 
 from __future__ import annotations
 
@@ -17,9 +17,9 @@ MIN_CLEARANCE_M = 0.8
 MAX_RMSE_M = 0.15
 
 
-def flown(folder: Path, fault: str, *, code: int) -> dict[str, Any]:
-    """Fly the first leg of the yard with a fault on it; return the summary."""
-    flight = start_flight(folder / "run", "--rate", "0", "--seed", "3", "--world", str(YARD), "--fail", f"{fault}@{FAILED_S:g}")
+def flown(folder: Path, *options: str, code: int) -> dict[str, Any]:
+    """Fly the first leg of the yard; return the summary."""
+    flight = start_flight(folder / "run", "--rate", "0", "--seed", "3", "--world", str(YARD), *options)
     try:
         assert flight.end() == code, flight.words()
     finally:
@@ -33,7 +33,7 @@ def flown(folder: Path, fault: str, *, code: int) -> dict[str, Any]:
 
 
 def test_a_lost_gps_is_landed_by_the_mission_before_the_autopilot_gives_up(tmp_path: Path) -> None:
-    summary = flown(tmp_path, "gps", code=1)
+    summary = flown(tmp_path, "--fail", f"gps@{FAILED_S:g}", code=1)
     assert summary["outcome"] == "given_up"
     assert summary["reason"].startswith("navigation.goto_straight: RESOURCE_INVARIANT_VIOLATED keep_position")
     assert summary["reason"].endswith("nothing is heard of the GPS)")
@@ -48,9 +48,17 @@ def test_a_lost_gps_is_landed_by_the_mission_before_the_autopilot_gives_up(tmp_p
 
 
 def test_a_dead_imu_is_told_and_the_map_goes_on_without_it(tmp_path: Path) -> None:
-    summary = flown(tmp_path, "imu", code=0)
+    summary = flown(tmp_path, "--fail", f"imu@{FAILED_S:g}", code=0)
     assert (summary["outcome"], summary["reason"]) == ("degraded", "the IMU failed, mapped by LiDAR and autopilot alone")
     (told,) = [one for one in summary["resources"] if one["resource"] == "imu_status"]
     assert (told["to"], told["reason"]) == ("BROKEN", "no reading has come for a second")
     assert told["t_s"] - FAILED_S == pytest.approx(1.0, abs=0.6)
+    assert summary["map"]["rmse_m"] <= MAX_RMSE_M
+
+
+def test_a_wind_of_8_m_s_with_gusts_is_flown_as_planned(tmp_path: Path) -> None:
+    """What is blown aside slowly looks where it goes, and what leans loses no returns: no leg is held back for seconds."""
+    summary = flown(tmp_path, "--imperfections", "wind_m_s=8,gust_m_s=1.5", code=0)
+    assert (summary["outcome"], summary["reason"]) == ("accomplished", None)
+    assert {one["result"] for one in summary["skills"] if one["skill"] == "goto_straight"} == {"ARRIVED"}
     assert summary["map"]["rmse_m"] <= MAX_RMSE_M

@@ -105,7 +105,10 @@ def test_the_campaigns_of_forty_eight_flights_try_everything_that_can_fail_in_th
         ("zed:frozzen@3", "the scenario mapping: fault 'zed:frozzen@3': zed can't be 'frozzen'; choose one of "),
         ("radio:out@3", "the scenario mapping: fault 'radio:out@3': there is no 'radio' to break"),
         ("uav_guidanc:killed@3", "the scenario mapping: fault 'uav_guidanc:killed@3': there is no 'uav_guidanc' to break; choose one of "),
-        ("uav_guidance:dead@3", "the scenario mapping: fault 'uav_guidance:dead@3': uav_guidance can't be 'dead'; choose one of killed, hung"),
+        (
+            "uav_guidance:dead@3",
+            "the scenario mapping: fault 'uav_guidance:dead@3': uav_guidance can't be 'dead'; choose one of killed, hung",
+        ),
     ],
 )
 def test_a_fault_that_a_flight_can_not_have_is_refused_before_the_first_one(fault, words, tmp_path):

@@ -197,6 +197,43 @@ def test_a_narrow_loss_is_no_fault_but_told_until_the_returns_are_back() -> None
     assert gone_after([room(21)], 21) == []
 
 
+def leaning(deg_a_sweep, count, *, told) -> tuple[list[Verdict], list[int]]:
+    """Lean to and fro by 24 degrees about the sensor's z axis, with no returns from beyond 100 degrees of where it looked at first.
+
+    Return the verdicts, and how many sectors were gone after each sweep; ``told``: the judge is told of the turns.
+    """
+    judge, verdicts, gone, before_deg = CloudJudge(LidarSettings().cloud), [], [], 0.0
+    for k in range(count):
+        turn_deg = 24.0 * np.sin(k * deg_a_sweep / 24.0)
+        points = blind(room(k, yaw=np.radians(turn_deg)), 100.0 - turn_deg, 360.0)
+        points = blind(points, -360.0, -100.0 - turn_deg)
+        turned_rad = float(np.radians(turn_deg - before_deg)) if told else 0.0
+        before_deg = turn_deg
+        sweep = Sweep(NS + k * NS // 10, points, np.zeros(len(points), np.float32))
+        verdicts.append(judge.finding(sweep, self_m=1.0, turned_rad=turned_rad).verdict)
+        gone.append(int(judge.gone.sum()))
+    return verdicts, gone
+
+
+@pytest.mark.parametrize("deg_a_sweep", [3.0, 6.0, 9.0])
+def test_a_vehicle_that_leans_in_gusts_loses_no_returns(deg_a_sweep) -> None:
+    verdicts, gone = leaning(deg_a_sweep, 40, told=True)
+    assert (set(verdicts), set(gone)) == ({Verdict.OK}, {0})
+    verdicts, gone = leaning(deg_a_sweep, 40, told=False)
+    assert max(gone) > 0, "without the turns the edge of what is seen goes through the sectors"
+
+
+@pytest.mark.parametrize("turned_deg", [-6.0, 6.0])
+def test_what_a_turning_sensor_loses_is_missed(turned_deg) -> None:
+    judge = CloudJudge(LidarSettings().cloud)
+    for k in range(12):
+        points = room(k, yaw=np.radians(turned_deg * k))
+        points = points if k < 6 else blind(points, -20.0, 20.0)
+        sweep = Sweep(NS + k * NS // 10, points, np.zeros(len(points), np.float32))
+        finding = judge.finding(sweep, self_m=1.0, turned_rad=float(np.radians(turned_deg)) if k else 0.0)
+        assert finding.fault is (FaultKind.NONE if k < 6 else FaultKind.SECTOR), k
+
+
 @pytest.mark.parametrize("climb_m_s", [-3.0, 3.0])
 def test_a_climb_over_open_ground_at_full_speed_is_no_error_of_the_ranges(climb_m_s) -> None:
     heights = 9.0 + climb_m_s * np.arange(10) / 10.0

@@ -101,10 +101,22 @@ def test_points_without_depth_are_left_out() -> None:
 
 def test_direction_is_of_the_velocity_then_of_the_target_then_of_the_nose() -> None:
     nose = np.array([0.0, 1.0, 0.1])
-    sideways = VehicleMotion(velocity_enu_m_s=(-1.0, 0.0, 0.3), target_enu_m=(9.0, 0.0, 3.0))
+    sideways = VehicleMotion(velocity_enu_m_s=(-1.1, 0.0, 0.3), target_enu_m=(9.0, 0.0, 3.0))
     assert direction_of_motion(ORIGIN, nose, sideways) == pytest.approx([-1.0, 0.0, 0.0])
     slow = VehicleMotion(velocity_enu_m_s=(-0.1, 0.0, 2.0), target_enu_m=(9.0, 0.0, 5.0))
     assert direction_of_motion(ORIGIN, nose, slow) == pytest.approx([1.0, 0.0, 0.0])
     there = VehicleMotion(target_enu_m=(0.1, 0.0, 9.0))
     assert direction_of_motion(ORIGIN, nose, there) == pytest.approx([0.0, 1.0, 0.0])
     assert direction_of_motion(ORIGIN, nose, VehicleMotion()) == pytest.approx([0.0, 1.0, 0.0])
+
+
+@given(st.floats(-3.0, 3.0), st.floats(-3.0, 3.0), st.floats(0.5, 30.0))
+def test_a_push_by_the_wind_is_no_way(towards_m_s, aside_m_s, to_go_m) -> None:
+    """Slowly aside or back: the way is to the target. By more than 1 m/s: it is where the vehicle goes."""
+    target = (to_go_m, 0.0, 3.0)
+    found = direction_of_motion(ORIGIN, EAST, VehicleMotion((towards_m_s, aside_m_s, 0.0), target))
+    pushed_m_s = math.hypot(min(towards_m_s, 0.0), aside_m_s)
+    speed_m_s = math.hypot(towards_m_s, aside_m_s)
+    if abs(pushed_m_s - 1.0) > 1e-6:
+        own = [towards_m_s / speed_m_s, aside_m_s / speed_m_s, 0.0] if pushed_m_s > 1.0 else [1.0, 0.0, 0.0]
+        assert found == pytest.approx(own, abs=1e-6)

@@ -1,11 +1,13 @@
 """Physics and control of the hexacopter."""
 
 import math
+import statistics
 import time
 
 import pytest
 
 from uav_simulator.frames import Quat
+from uav_simulator.imperfections import Imperfections
 from uav_simulator.vehicle.airframe import GRAVITY_M_S2, ROTORS, Airframe
 from uav_simulator.vehicle.controller import OFF, AttitudeTarget, Gains, PositionLoop, Reference
 from uav_simulator.vehicle.hexacopter import STEP_S, Hexacopter
@@ -141,3 +143,18 @@ def test_a_simulated_second_costs_less_than_15_percent_of_a_core():
     start = time.process_time()
     fly(vehicle, (1.0, 0.0, 3.0), 4.0)
     assert (time.process_time() - start) / 4.0 < 0.15
+
+
+def test_a_stronger_wind_blows_from_the_same_side_and_a_weaker_one_is_the_usual():
+    def mean(**imperfections):
+        wind = Wind.of(Imperfections(**imperfections), 4)
+        values = [wind.step(0.02) for _ in range(30_000)]
+        return [sum(value[axis] for value in values) / len(values) for axis in range(2)], values
+
+    (east, north), values = mean(wind_m_s=8.0, gust_m_s=1.5)
+    assert math.hypot(east, north) == pytest.approx(8.0, abs=0.4)
+    assert statistics.stdev(value[0] for value in values) == pytest.approx(1.5, abs=0.25)
+    usual, same = mean()[0], mean(wind_m_s=0.5)[0]
+    assert usual == same
+    assert math.hypot(*usual) == pytest.approx(1.0, abs=0.15)
+    assert math.atan2(usual[1], usual[0]) == pytest.approx(math.atan2(north, east), abs=0.15)

@@ -57,6 +57,7 @@ class Thresholds:
 
 
 DEFAULT_THRESHOLDS = Thresholds()
+PUSHED = "the wind, or an autopilot that does not follow"
 
 
 def _blocked(state: GuidanceReport, limits: Thresholds) -> SkillEnd | None:
@@ -66,13 +67,13 @@ def _blocked(state: GuidanceReport, limits: Thresholds) -> SkillEnd | None:
         return SkillEnd("BLOCKED", f"held back for {state.still_s:.1f} s: no sensor watches the way ahead")
     if state.obstacle_stop:
         return SkillEnd("BLOCKED", f"held back for {state.still_s:.1f} s by an obstacle {state.obstacle_m:.1f} m ahead")
-    return SkillEnd("BLOCKED", f"no nearer to the target for {state.still_s:.1f} s")
+    return SkillEnd("BLOCKED", f"no nearer to the target for {state.still_s:.1f} s, and nothing seen in the way: {PUSHED}")
 
 
 def _drifted(state: GuidanceReport, limit_m: float) -> SkillEnd | None:
     if state.drift_m <= limit_m:
         return None
-    return SkillEnd("ABORTED", f"{state.drift_m:.1f} m off the line, more than {limit_m:.1f} m")
+    return SkillEnd("ABORTED", f"{state.drift_m:.1f} m off the line, more than {limit_m:.1f} m: {PUSHED}")
 
 
 def decide_takeoff(state: GuidanceReport, limits: Thresholds = DEFAULT_THRESHOLDS) -> SkillEnd | None:

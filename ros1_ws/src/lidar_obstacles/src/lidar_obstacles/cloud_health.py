@@ -19,6 +19,7 @@ if TYPE_CHECKING:
     Floats = NDArray[np.float64]
 
 SECTORS = 36
+SECTOR_RAD = 2.0 * np.pi / SECTORS
 LOST_TOGETHER = 3  # neighbouring sectors that no edge of a wall takes away from one sweep to the next
 LONG_AGO_NS = -(10**12)
 GONE_S = 1.0  # for so long the way through a sector that lost its returns counts as not seen
@@ -75,15 +76,22 @@ class CloudJudge:
         self._specks = Specks()
         self._gates = RangeGates()
         self._steps = RangeSteps(limits.max_speed_m_s)
+        self._turned_rad = 0.0
         self._gone_ns: NDArray[np.int64] = np.full(SECTORS, LONG_AGO_NS, dtype=np.int64)
+        """By the sectors of a sensor that has not turned."""
         self.gone: NDArray[np.bool_] = np.zeros(SECTORS, dtype=np.bool_)
         """Sectors (SECTORS,), from -180 degrees around the sensor's z axis on, that lost their returns in the last `GONE_S` seconds.
 
         Those that had lost them where the vehicle was before stay in it.
         """
 
-    def finding(self, sweep: Sweep, *, self_m: float, position_m: Floats | None = None) -> Finding:
-        """Return what the sweep tells; returns nearer than ``self_m`` are the vehicle's own. Its position (3,) is None while unknown."""
+    def finding(self, sweep: Sweep, *, self_m: float, position_m: Floats | None = None, turned_rad: float = 0.0) -> Finding:
+        """Return what the sweep tells; returns nearer than ``self_m`` are the vehicle's own. Its position (3,) is None while unknown.
+
+        ``turned_rad``: by how much the sensor has turned about its z axis since the sweep before. What it saw has then moved to other
+        sectors: a vehicle that leans in a gust loses nothing.
+        """
+        self._turned_rad += turned_rad
         stride = max(1, len(sweep.points) // SAMPLE) | 1  # odd: every second ring, or every 16th, is no sample of a sweep
         sample = np.ascontiguousarray(sweep.points[::stride].T)
         previous, self._previous = self._previous, sample
@@ -91,7 +99,7 @@ class CloudJudge:
         returned = ranges > self_m
         seen = Seen.of(sample, ranges)
         outside = seen.select(seen.ranges_m > self_m)
-        sectors = _sectors(seen, stride, self_m)
+        sectors = _sectors(seen, stride, self_m, self._turned_rad)
         moved_m = self._moved_m(sweep.stamp_ns, position_m)
         if self._left_behind(position_m):
             self._forget()
@@ -143,7 +151,7 @@ class CloudJudge:
         return bool(np.linalg.norm(position_m - self._lost_at_m) > LEFT_BEHIND_M)
 
     def _forget(self) -> None:
-        self._blind |= self._lost
+        self._blind |= self._of_sensor(self._lost)
         self._lost[:] = False
         self._recent.clear()
         self._noise.forget()
@@ -156,6 +164,10 @@ class CloudJudge:
             return np.zeros(SECTORS)
         hidden = np.any([sectors.near for sectors in self._recent], axis=0)
         return np.where(hidden, 0.0, np.min([sectors.counts for sectors in self._recent], axis=0))
+
+    def _of_sensor(self, sectors: NDArray[np.bool_]) -> NDArray[np.bool_]:
+        """Return sectors (SECTORS,) that stood still as those of the sensor that has turned, to half a sector."""
+        return np.roll(sectors, -round(self._turned_rad / SECTOR_RAD))
 
     def _expected(self, before: Floats) -> Floats:
         """Return how many returns each sector should have at least, (SECTORS,): what it lately had, less what it lately lost a sweep.
@@ -191,28 +203,43 @@ class CloudJudge:
         if thin and (not self._lost.any() or self._lost[before > 0].all()):
             return broken(FaultKind.RETURNS, f"returns fell from {before.sum():.0f} to {counts.sum():.0f}")
         if self._lost.any():
-            return broken(FaultKind.SECTOR, f"no returns any more from {_angles(self._lost)} around the sensor's z axis")
+            return broken(FaultKind.SECTOR, f"no returns any more from {_angles(self._of_sensor(self._lost))} around the sensor's z axis")
         self._recent.append(sectors)
         self._gone_ns[counts >= SECTOR_RETURNS * stride] = LONG_AGO_NS
         self._gone_ns[gone] = stamp_ns
-        empty = counts < BLIND_RETURNS * stride
-        self._blind = (self._blind | _holes(gone & empty, counts >= SECTOR_RETURNS * stride)) & empty
-        self.gone = (np.abs(stamp_ns - self._gone_ns) < GONE_S * NS) | self._blind  # a clock may have gone back
+        holes = _holes(gone & (counts < BLIND_RETURNS * stride), counts >= SECTOR_RETURNS * stride)
+        self._blind = (self._blind | self._of_sensor(holes)) & (sectors.of_sensor < BLIND_RETURNS * stride)
+        lately = np.abs(stamp_ns - self._gone_ns) < GONE_S * NS  # a clock may have gone back
+        self.gone = self._of_sensor(lately) | self._blind
         return FINE
 
 
 @dataclass(frozen=True)
 class _Sectors:
-    """A sweep by sectors, (SECTORS,) each: returns from outside of the vehicle, and whether most are too near to stay in view."""
+    """A sweep by sectors, (SECTORS,) each: returns from outside of the vehicle, and whether most are too near to stay in view.
+
+    Sectors stand still where the sensor turns about its z axis, but for ``of_sensor``: the returns by the sensor's own.
+    """
 
     counts: Floats
     near: NDArray[np.bool_]
+    of_sensor: Floats
 
 
-def _sectors(seen: Seen, stride: int, self_m: float) -> _Sectors:
-    sector = ((seen.azimuth_rad + np.float32(np.pi)) * np.float32(SECTORS / (2.0 * np.pi))).astype(np.intp) % SECTORS
-    counts, near = (np.bincount(sector[which], minlength=SECTORS) for which in (seen.ranges_m > self_m, seen.ranges_m <= NEAR * self_m))
-    return _Sectors(counts.astype(np.float64) * stride, 2 * near > np.bincount(sector, minlength=SECTORS))
+def _sectors(seen: Seen, stride: int, self_m: float, turned_rad: float) -> _Sectors:
+    outside = seen.ranges_m > self_m
+    own, sector = (_sector(seen.azimuth_rad, turn_rad) for turn_rad in (0.0, turned_rad))
+    of_sensor, counts, near = (
+        np.bincount(which, minlength=SECTORS) for which in (own[outside], sector[outside], sector[seen.ranges_m <= NEAR * self_m])
+    )
+    hidden = 2 * near > np.bincount(sector, minlength=SECTORS)
+    return _Sectors(counts.astype(np.float64) * stride, hidden, of_sensor.astype(np.float64) * stride)
+
+
+def _sector(azimuth_rad: NDArray[np.float32], turned_rad: float) -> NDArray[np.intp]:
+    turned = (azimuth_rad + np.float32(np.pi + turned_rad % (2.0 * np.pi))) * np.float32(1.0 / SECTOR_RAD)
+    sector: NDArray[np.intp] = turned.astype(np.intp) % SECTORS
+    return sector
 
 
 def _holes(gone: NDArray[np.bool_], seen: NDArray[np.bool_]) -> NDArray[np.bool_]:

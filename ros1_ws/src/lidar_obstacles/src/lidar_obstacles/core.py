@@ -56,6 +56,7 @@ class LidarObstacles:
         self._ahead = LidarAhead(settings.ahead)
         self._stamps, self._turns = SweepStamps(), TurnJoiner()
         self._mounting = MountCheck()
+        self._R_map_lidar: NDArray[np.float64] | None = None
         self._health = SensorWatch(host, "lidar", resource="perception.lidar_status", limits=settings.health, stamps=settings.stamps)
 
     @property
@@ -111,8 +112,9 @@ class LidarObstacles:
         sweep = self._turns.joined(self._stamps.begun(sweep, self._host.now_ns()))
         # The moment of the last return: a sweep stamped at its beginning is not a tenth of a second old when it comes.
         stamp = self._health.stamp(sweep.end_ns)
-        position_m, self_m = self._position_m(sweep.end_ns), self._settings.body_radius_m
-        content = self._judge.finding(sweep, self_m=self_m, position_m=position_m)
+        pose, self_m = self._pose(sweep.end_ns), self._settings.body_radius_m
+        turned_rad = self._turned_rad(pose, frame)
+        content = self._judge.finding(sweep, self_m=self_m, position_m=None if pose is None else pose[:3, 3], turned_rad=turned_rad)
         mounted = self._mounted(sweep, frame, self_m) if stamp.ok and content.ok else FINE
         return Judged(sweep, first_trouble(stamp, content, mounted), self._judge.gone)
 
@@ -128,13 +130,25 @@ class LidarObstacles:
             return FINE
         return self._mounting.finding(sweep, mount, self.vehicle.poses, self_m=self_m)
 
-    def _position_m(self, stamp_ns: int) -> NDArray[np.float64] | None:
+    def _turned_rad(self, pose: NDArray[np.float64] | None, frame: str) -> float:
+        """Return by how much the LiDAR has turned about its z axis since the sweep before; 0 where that is not known."""
+        before, self._R_map_lidar = self._R_map_lidar, None
+        try:
+            self._R_map_lidar = None if pose is None else pose[:3, :3] @ self.vehicle.mount(frame)[:3, :3]
+        except LookupError:
+            return 0.0
+        if before is None or self._R_map_lidar is None:
+            return 0.0
+        turn = before.T @ self._R_map_lidar
+        return math.atan2(turn[1, 0], turn[0, 0])
+
+    def _pose(self, stamp_ns: int) -> NDArray[np.float64] | None:
         try:
             # An older one would say that the vehicle stands, and the ranges that its motion changes would be the sensor's error.
             poses = self.vehicle.poses.at([stamp_ns], tolerance_s=POSE_LATE_S)
         except LookupError:
             return None
-        return poses.matrix()[:3, 3]
+        return poses.matrix()
 
     def _process(self, judged: Judged, frame: str, stamp_ns: int) -> None:
         try:

@@ -11,6 +11,7 @@ if TYPE_CHECKING:
     from numpy.typing import NDArray
 
 MOVING_M_S = 0.2
+PUSHED_M_S = 1.0  # by gusts of a wind of 8 m/s; it stops within its own radius
 AT_TARGET_M = 0.3
 
 
@@ -87,9 +88,18 @@ class Ahead:
 
 
 def direction_of_motion(position_enu_m: NDArray[np.float64], nose: NDArray[np.float64], motion: VehicleMotion) -> NDArray[np.float64]:
-    """Return the horizontal unit vector (3,) of the motion: of the velocity if moving, else towards the target, else of the nose."""
-    target = position_enu_m if motion.target_enu_m is None else np.array(motion.target_enu_m)
-    for way, least in ((motion.velocity_enu_m_s, MOVING_M_S), (target - position_enu_m, AT_TARGET_M), (nose, 0.0)):
+    """Return the horizontal unit vector (3,) of the motion: of the velocity if moving, else towards the target, else of the nose.
+
+    What is slow and not towards the target is the wind's push: the autopilot brings the vehicle back, and its way is to the target.
+    """
+    velocity = np.array(motion.velocity_enu_m_s[:2])
+    to_target = np.zeros(2) if motion.target_enu_m is None else np.array(motion.target_enu_m[:2]) - position_enu_m[:2]
+    to_go_m = float(np.linalg.norm(to_target))
+    if to_go_m > AT_TARGET_M:
+        towards = to_target / to_go_m
+        pushed = velocity - max(float(velocity @ towards), 0.0) * towards
+        velocity = velocity if np.linalg.norm(pushed) > PUSHED_M_S else np.zeros(2)
+    for way, least in ((velocity, MOVING_M_S), (to_target, AT_TARGET_M), (nose, 0.0)):
         length = float(np.hypot(way[0], way[1]))
         if length > least:
             return np.array([way[0] / length, way[1] / length, 0.0])

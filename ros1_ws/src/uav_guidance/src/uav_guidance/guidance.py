@@ -43,6 +43,7 @@ from uav_guidance.standing import GROUND_M, Standing, above_home_m
 from uav_guidance.takeover import Takeover
 from uav_guidance.vectors import Vec3
 from uav_guidance.vehicle import Landed, Mode, VehicleSnapshot, in_map, leapt, mode_name, updated
+from uav_guidance.wind import WindWatch
 
 log = logging.getLogger(__name__)
 
@@ -76,6 +77,7 @@ class Guidance:
         self._heard_s: float | None = None
         self._readiness = Readiness()
         self._positioning = Positioning()
+        self._wind = WindWatch()
         self._begun_s: float | None = None
         self._introduced = False
         self._follower = Follower(settings)
@@ -188,6 +190,8 @@ class Guidance:
         lost = self._positioning.step(self.odometry, now_s, lost_s=self._settings.position_lost_s)
         if lost and self.odometry.off_ground:
             self._note(f"the position is lost: {self._positioning.reason}")
+        if strong := self._wind.step(self.odometry, now_s):
+            self._note(strong)
         self._introduce(now_s)
         self._take_authority_at_start(now_s)
         command = self._procedure.due(now_s) if self._procedure is not None else None

@@ -54,7 +54,7 @@ class SimulatedAutopilotVehicle:
     ) -> None:
         """``params`` of the autopilot; ``ground_link``: a ground station speaks over a link of its own, so none is made up."""
         airframe = Airframe()
-        self.vehicle = Hexacopter(airframe, Wind(seed=seed), home, yaw_rad=0.0)
+        self.vehicle = Hexacopter(airframe, Wind.of(imperfections, seed), home, yaw_rad=0.0)
         self.autopilot = Autopilot(
             self.vehicle, airframe, seed=seed, boot_before_s=boot_before_s, params=params, imperfections=imperfections
         )

@@ -36,6 +36,10 @@ class Imperfections:
     """The autopilot's position jumps by so much, each time in another direction, ..."""
     jump_every_s: float = 20.0
     """... so often in the air."""
+    wind_m_s: float = 0.0
+    """The mean wind, where it is more than the 1 m/s that always blows, from a side that depends on the seed, ..."""
+    gust_m_s: float = 0.0
+    """... and the standard deviation of its gusts, where that is more than 0.5."""
     pixel_noise: float = 0.0
     """Standard deviation of grey values, on top of 2."""
     exposure: float = 0.0

@@ -6,6 +6,9 @@ import math
 import random
 
 from uav_simulator.frames import Vec3
+from uav_simulator.imperfections import Imperfections
+
+MEAN_M_S, GUST_M_S = 1.0, 0.5
 
 
 class SlowNoise:
@@ -27,12 +30,17 @@ class SlowNoise:
 
 
 class Wind:
-    """A mild mean wind with gusts, in map, m/s; its direction depends on the seed."""
+    """A mean wind with gusts, mild by default, in map, m/s; its direction depends on the seed."""
 
-    def __init__(self, *, seed: int, mean_m_s: float = 1.0, gust_m_s: float = 0.5) -> None:
+    def __init__(self, *, seed: int, mean_m_s: float = MEAN_M_S, gust_m_s: float = GUST_M_S) -> None:
         direction = random.Random(f"wind {seed}").uniform(-math.pi, math.pi)  # noqa: S311 - repeatable on purpose
         self._mean = (mean_m_s * math.cos(direction), mean_m_s * math.sin(direction))
         self._gusts = SlowNoise(sigma=gust_m_s, tau_s=1.5, limit=3.0 * gust_m_s, seed=f"gusts {seed}")
+
+    @classmethod
+    def of(cls, imperfections: Imperfections, seed: int) -> Wind:
+        """Return the wind that always blows, or a stronger one."""
+        return cls(seed=seed, mean_m_s=max(MEAN_M_S, imperfections.wind_m_s), gust_m_s=max(GUST_M_S, imperfections.gust_m_s))
 
     def step(self, dt_s: float) -> Vec3:
         """Advance and return the wind; up and down it is a third as strong."""
