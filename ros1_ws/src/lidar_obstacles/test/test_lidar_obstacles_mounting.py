@@ -2,6 +2,9 @@
 
 from __future__ import annotations
 
+import os
+from pathlib import Path
+
 import numpy as np
 import pytest
 from scipy.spatial.transform import Rotation
@@ -9,10 +12,22 @@ from scipy.spatial.transform import Rotation
 from lidar_obstacles import MountCheck
 from perception_core import NS, FaultKind, Finding, PoseBuffer, Sweep, Verdict
 
+DATA = Path(os.environ.get("ALULA_DATA", Path(__file__).resolve().parents[5] / "shared" / "data")) / "lidar_kitti"
 UP = np.eye(4)
 ACROSS = np.array([[0.0, 0, 1, 0.1], [1, 0, 0, 0], [0, 1, 0, -0.15], [0, 0, 0, 1]])  # spins across the nose
-AZIMUTH, ELEVATION = (grid.ravel() for grid in np.meshgrid(np.radians(np.arange(0, 360, 0.8)), np.radians(np.linspace(-30, 30, 32))))
-RAYS = np.column_stack([np.cos(ELEVATION) * np.cos(AZIMUTH), np.cos(ELEVATION) * np.sin(AZIMUTH), np.sin(ELEVATION)])
+
+
+def rays(rings: int, step_deg: float, low_deg: float, high_deg: float) -> np.ndarray:
+    """Return the directions (N, 3) of a sensor's beams, ring after ring as its driver sends them."""
+    elevation, azimuth = np.meshgrid(
+        np.radians(np.linspace(low_deg, high_deg, rings)), np.radians(np.arange(0, 360, step_deg)), indexing="ij"
+    )
+    level = np.cos(elevation)
+    return np.stack([level * np.cos(azimuth), level * np.sin(azimuth), np.sin(elevation)], axis=-1).reshape(-1, 3)
+
+
+RAYS = rays(32, 0.8, -30, 30)
+DENSE = rays(64, 0.19, -24, 3)  # 121,000 a sweep, half of them on the ground nearby
 HIGH, LOW = np.array([12.0, 5.0, np.inf]), np.array([-8.0, -7.0, 0.0])  # a yard's walls and its ground, in the map
 TURNED = {
     "mirrored": np.diag([1.0, -1.0, 1.0]),
@@ -22,7 +37,7 @@ TURNED = {
 OVERTURNED = {"rolled": np.diag([1.0, -1.0, -1.0]), "pitched": np.diag([-1.0, 1.0, -1.0]), "mirrored": np.diag([1.0, 1.0, -1.0])}
 
 
-def fly(way, *, mount=UP, turned=None, rate_hz=10.0, repeat_from=None, lost_from=None) -> list[Finding]:
+def fly(way, *, mount=UP, turned=None, rate_hz=10.0, repeat_from=None, lost_from=None, beams=RAYS, box=(LOW, HIGH)) -> list[Finding]:
     """Return the findings of sweeps along a way of (x, y, yaw) in a yard, 1.5 m above the ground; the data are ``turned`` in base_link.
 
     From sweep ``repeat_from`` on the sensor repeats what it saw, in another order and with noise of 1 cm; from ``lost_from`` on no pose
@@ -36,11 +51,11 @@ def fly(way, *, mount=UP, turned=None, rate_hz=10.0, repeat_from=None, lost_from
         if lost_from is None or k < lost_from:
             poses.add(stamp_ns, (x, y, 1.5), attitude.as_quat())
         rotation, origin = attitude.as_matrix() @ mount[:3, :3], np.array([x, y, 1.5]) + attitude.as_matrix() @ mount[:3, 3]
-        ray = RAYS @ rotation.T
+        ray = beams @ rotation.T
         ray[np.abs(ray) < 1e-9] = 1e-9
-        ranges = np.min(np.where(ray > 0, HIGH - origin, LOW - origin) / ray, axis=1) + rng.normal(0.0, 0.02, len(ray))
+        ranges = np.min(np.where(ray > 0, box[1] - origin, box[0] - origin) / ray, axis=1) + rng.normal(0.0, 0.02, len(ray))
         seen = ranges < 60.0
-        points = RAYS[seen] * ranges[seen, None]
+        points = beams[seen] * ranges[seen, None]
         if turned is not None:
             points = points @ (mount[:3, :3].T @ turned @ mount[:3, :3]).T
         if repeat_from is not None and k >= repeat_from and last is not None:
@@ -67,8 +82,9 @@ def test_a_mirrored_or_turned_sensor_is_broken_as_soon_as_motion_shows_it(name, 
     findings = fly(FORTH + ROUND, mount=mount, turned=TURNED[name])
     first = next(k for k, finding in enumerate(findings) if not finding.ok)
     assert {(finding.verdict, finding.fault) for finding in findings[first:]} == {(Verdict.BROKEN, FaultKind.CALIBRATION)}
-    assert findings[first].reason == f"by the vehicle's own motion the LiDAR is {name}"
+    assert name in findings[first].reason
     assert first <= 20  # 3 m
+    assert findings[-1].reason == f"by the vehicle's own motion the LiDAR is {name}", "the turns tell it from others"
 
 
 @pytest.mark.parametrize("name", OVERTURNED)
@@ -109,3 +125,69 @@ def test_a_sensor_that_repeats_what_it_saw_is_frozen_when_motion_shows_it(mount)
 def test_what_the_motion_does_not_tell_apart_is_told_together() -> None:
     findings = fly([(0.0, 0.13 * k, 0.0) for k in range(30)], turned=TURNED["turned by 180 degrees"])
     assert findings[-1].reason == "by the vehicle's own motion the LiDAR is turned by 180 degrees or mirrored"
+
+
+@pytest.mark.parametrize("name", TURNED)
+def test_a_dense_sensor_that_is_mirrored_or_turned_is_known_as_soon_as_a_sparse_one(name) -> None:
+    assert {finding.verdict for finding in fly(FORTH + ROUND[::4], beams=DENSE)} == {Verdict.OK}
+    findings = fly(FORTH + ROUND[::4], turned=TURNED[name], beams=DENSE)
+    first = next(k for k, finding in enumerate(findings) if not finding.ok)
+    assert findings[first].reason == f"by the vehicle's own motion the LiDAR is {name}"
+    assert first <= 20  # 3 m
+
+
+def test_a_dense_sensor_that_repeats_what_it_saw_with_noise_is_frozen() -> None:
+    findings = fly(FORTH, repeat_from=5, beams=DENSE)
+    first = next(k for k, finding in enumerate(findings) if not finding.ok)
+    assert {(finding.verdict, finding.fault) for finding in findings[first:]} == {(Verdict.BROKEN, FaultKind.FROZEN)}
+    assert first <= 25
+
+
+OPEN = np.array([-1e3, -1e3, 0.0]), np.array([1e3, 1e3, np.inf])
+
+
+def test_a_mount_that_can_not_be_judged_in_5_s_of_motion_is_unknown_until_walls_show_it() -> None:
+    way = [(0.13 * k, 0.07 * k, 0.0) for k in range(90)]
+    findings = fly(way, box=OPEN)
+    first = next(k for k, finding in enumerate(findings) if not finding.ok)
+    assert 50 <= first <= 80
+    assert {(finding.verdict, finding.fault) for finding in findings[first:]} == {(Verdict.UNKNOWN, FaultKind.CALIBRATION)}
+    assert findings[first].reason.endswith("too few walls and posts within 20 m")
+    farther = fly([(0.13 * k, 0.07 * k, 0.0) for k in range(140)], box=(OPEN[0], np.array([32.0, 1e3, np.inf])))
+    assert not farther[first].ok
+    assert farther[-1].ok
+    assert all(finding.ok for finding in fly(way[:1] * 90, box=OPEN)), "a vehicle that stands"
+
+
+def test_a_mount_that_was_judged_once_stays_so_in_the_open() -> None:
+    check, poses, rng = MountCheck(), PoseBuffer(keep_s=1e6), np.random.default_rng(1)
+    for k in range(200):
+        stamp_ns, origin = NS + k * NS // 10, np.array([0.13 * k, 0.0, 1.5])
+        poses.add(stamp_ns, tuple(origin), (0.0, 0.0, 0.0, 1.0))
+        low, high = (LOW, np.array([15.0, 5.0, np.inf])) if k < 30 else OPEN
+        ranges = np.min(np.where(RAYS > 0, high - origin, low - origin) / np.where(RAYS == 0, 1e-9, RAYS), axis=1)
+        points = RAYS * (ranges + rng.normal(0.0, 0.02, len(RAYS)))[:, None]
+        sweep = Sweep(stamp_ns, points[ranges < 60.0].astype(np.float32), np.zeros(np.count_nonzero(ranges < 60.0), np.float32))
+        assert check.finding(sweep, UP, poses, self_m=1.0).ok, k
+
+
+def real(turned=None, *, repeated=False) -> list[Finding]:
+    """Return what is said of three real sweeps of 124,000 points, 0.8 m apart; ``repeated``: the first one again, with 5 mm of noise."""
+    ways = np.loadtxt(DATA / "T_first_scan.txt").reshape(-1, 3, 4)
+    scans = [np.fromfile(path, np.float32).reshape(-1, 4)[:, :3] for path in sorted(DATA.glob("*.bin"))]
+    poses, check, rng, found = PoseBuffer(keep_s=1e6), MountCheck(), np.random.default_rng(2), []
+    for k, (scan, way) in enumerate(zip(scans, ways, strict=True)):
+        poses.add(NS + k * NS // 2, tuple(way[:, 3] + [0.0, 0.0, 1.7]), Rotation.from_matrix(way[:, :3]).as_quat())
+        points = scans[0] + rng.normal(0.0, 0.005, scans[0].shape) if repeated else scan @ (np.eye(3) if turned is None else turned).T
+        found.append(
+            check.finding(Sweep(NS + k * NS // 2, points.astype(np.float32), np.zeros(len(points), np.float32)), UP, poses, self_m=2.5)
+        )
+    return found
+
+
+@pytest.mark.skipif(not DATA.exists(), reason=f"no real data at {DATA}: set ALULA_DATA")
+def test_real_dense_sweeps_tell_a_turned_or_frozen_sensor_after_two_comparisons() -> None:
+    assert {finding.verdict for finding in real()} == {Verdict.OK}
+    for name in ("turned by 180 degrees", "turned by 90 degrees to the right"):
+        assert name in real(TURNED[name])[-1].reason
+    assert real(repeated=True)[-1].fault is FaultKind.FROZEN

@@ -1,16 +1,17 @@
 """Is the LiDAR mounted as it is told? What stands still must stay where it is while the vehicle moves, and the ground is below.
 
-A sweep of a mirrored, turned or overturned sensor looks like any other; how it changes with the vehicle's own motion does not. Small planes
-are fitted to the sweeps that are looked at. The walls among them are held against those of a look before, by the vehicle's poses: with the
-mount as it is told, as if it were mirrored, or turned by quarters, and as if the vehicle had not moved: a sensor that repeats what it saw,
-noise, another order of the points and all, sees nothing move. An overturned sensor moves rightly as long as it flies level, but
-has level surfaces above it and none below.
+A sweep of a mirrored, turned or overturned sensor looks like any other; how it changes with the vehicle's own motion does not. Planes are
+fitted to all returns of a sweep, one in each cube of a grid: so walls count by their area, however dense the sensor is and whatever else it
+sees. The walls among them, and posts such as trunks, are held against those of a look before, by the vehicle's poses: with the mount as it
+is told, as if it were mirrored, or turned by quarters, and as if the vehicle had not moved: a sensor that repeats what it saw, noise,
+another order of the points and all, sees nothing move. An overturned sensor moves rightly as long as it flies level, but has level surfaces
+above it and none below. Where there is nothing to hold against each other, a mount that was not judged before is unknown.
 """
 
 from __future__ import annotations
 
 from contextlib import suppress
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -28,13 +29,17 @@ SOON_S, LATER_S = 0.3, 2.0  # between two looks that may tell something new, and
 FIRST_LOOKS = 10
 OLDEST_S = 5.0  # of what is compared: the autopilot's own drift
 NEAREST, FARTHEST_M = 1.5, 20.0  # of the vehicle's radius; metres: beyond, an error of the attitude moves a wall more than the vehicle does
-SAMPLE, SEEDS, NEIGHBOURS = 1800, 180, 9
+CELL_M, LEAST_RETURNS = 1.0, 9  # edge of the cubes, and returns of one that can be a plane
 FLAT_M, WIDE_M = 0.06, 0.12  # deviation across a plane at most, and along its shorter side at least: the points of a ring are a line
 UPRIGHT, LEVEL = 0.35, 0.9  # of the normals' z
+SLIM_M, LONG_M = 0.15, 0.2  # deviation across a post at most, and along it at least
+NOTHING_BESIDE = 3  # returns in the cubes around a post: a single ring on a wall is as slim, but has others beside it
 KNOTS = 8  # poses within a sweep
 BESIDE_M = 1.5  # from a wall to what is compared with it
 FITS_M, FITS_COSINE = 0.2, 0.9
-PAIRS = 15  # of walls; with fewer nothing is said
+FITS_POST_M = 0.3  # another side of it is seen from elsewhere
+PAIRS = 8  # of walls, a square metre each, and posts, a metre each; with fewer nothing is said
+UNJUDGED_S = 5.0  # of motion, in which too little was seen to judge a mount that was not judged before
 FITTING = ((0.7, 0.2), (0.4, 0.3))  # shares of the pairs that fit with the sensor turned, and by how much they are greater than as told
 """Where motion and walls do not tell, all shares are alike; among trees fewer fit."""
 ALIKE = 0.01  # by which two shares may differ that tell nothing apart: on a way straight to a wall, turned back and mirrored are the same
@@ -59,11 +64,15 @@ OTHERS = {
 
 @dataclass(frozen=True)
 class _Look:
-    """Small planes of a sweep: places and normals (N, 3) in base_link's axes from the sensor on, and the poses of each one's moment."""
+    """Planes and posts of a sweep: places and normals (N, 3) in base_link's axes from the sensor on, and the poses of each one's moment.
+
+    ``posts`` (N,) are those that are long and slim; instead of a normal they have the direction in which they are long.
+    """
 
     stamp_ns: int
     places: Floats
     normals: Floats
+    posts: NDArray[np.bool_]
     rotations: Floats
     origins: Floats
 
@@ -75,16 +84,18 @@ class _Look:
     def unmoved(self) -> _Look:
         """Return the planes as they are seen from the vehicle, wherever it is."""
         unturned = np.broadcast_to(np.eye(3), self.rotations.shape)
-        return _Look(self.stamp_ns, self.places, self.normals, unturned, np.zeros_like(self.origins))
+        return replace(self, rotations=unturned, origins=np.zeros_like(self.origins))
 
-    def walls(self) -> _Look:
-        """Return only the planes that are upright."""
-        kept = np.abs(np.einsum("nj,nj->n", self.rotations[:, 2], self.normals)) < UPRIGHT
-        return _Look(self.stamp_ns, self.places[kept], self.normals[kept], self.rotations[kept], self.origins[kept])
+    def upright(self) -> _Look:
+        """Return only the walls and the posts."""
+        up = np.abs(np.einsum("nj,nj->n", self.rotations[:, 2], self.normals))
+        kept = np.where(self.posts, up > LEVEL, up < UPRIGHT)
+        parts = (each[kept] for each in (self.places, self.normals, self.posts, self.rotations, self.origins))
+        return _Look(self.stamp_ns, *parts)
 
     def level(self) -> Floats:
         """Return how high above the sensor the level planes are, metres."""
-        level = np.abs(np.einsum("nj,nj->n", self.rotations[:, 2], self.normals)) > LEVEL
+        level = ~self.posts & (np.abs(np.einsum("nj,nj->n", self.rotations[:, 2], self.normals)) > LEVEL)
         above: Floats = np.einsum("nj,nj->n", self.rotations[:, 2], self.places)[level]
         return above
 
@@ -98,6 +109,8 @@ class MountCheck:
         self._looks = 0
         self._suspected: set[str] = set()
         self._times = 0
+        self._as_told = False  # whether walls have stayed where they were, with the mount as it is told
+        self._unjudged_ns = 0  # of motion
         self._above, self._below = 0.0, 0.0
 
     def finding(self, sweep: Sweep, T_base_lidar: Floats, poses: PoseBuffer, *, self_m: float) -> Finding:  # noqa: N803 -- T_target_source
@@ -110,6 +123,9 @@ class MountCheck:
             return self._found()
         if self._overturned:
             return unsure(FaultKind.CALIBRATION, "level surfaces above the LiDAR and none below: is it upside down?")
+        if not self._as_told and self._unjudged_ns > UNJUDGED_S * NS:
+            told = "by the vehicle's own motion it can't be judged how the LiDAR is mounted"
+            return unsure(FaultKind.CALIBRATION, f"{told}: too few walls and posts within {FARTHEST_M:g} m")
         return FINE
 
     @property
@@ -146,21 +162,22 @@ class MountCheck:
         moved_m, turned_rad = self._motion(pose)
         old = self._before is None or not 0 <= sweep.stamp_ns - self._before[1].stamp_ns <= OLDEST_S * NS
         if old or moved_m >= MOVED_M or turned_rad >= TURNED_RAD:
-            before, self._before = self._before, (pose, look.walls())
+            before, self._before = self._before, (pose, look.upright())
             if before is not None and not old:
                 self._compare(before[1], self._before[1])
 
-    def _compare(self, before: _Look, walls: _Look) -> None:
+    def _compare(self, before: _Look, now: _Look) -> None:
         """Count the looks that say that the sensor is turned in the same way. A fault that was found stays until motion shows otherwise."""
-        as_told = _fitting(before, walls, np.eye(3))
+        as_told = _fitting(before, now, np.eye(3))
         if as_told is None:
+            self._unjudged_ns += abs(now.stamp_ns - before.stamp_ns)
             return
         found = self._times >= LOOKS
         if as_told > 1.0 - FITTING[0][1] and not found:
-            self._suspected, self._times = set(), 0
+            self._suspected, self._times, self._as_told = set(), 0, True
             return
-        shares = {name: _fitting(before, walls, turn) or 0.0 for name, turn in OTHERS.items()}
-        shares[FROZEN] = _fitting(before.unmoved(), walls.unmoved(), np.eye(3)) or 0.0
+        shares = {name: _fitting(before, now, turn) or 0.0 for name, turn in OTHERS.items()}
+        shares[FROZEN] = _fitting(before.unmoved(), now.unmoved(), np.eye(3)) or 0.0
         best = max(shares.values())
         if any(best >= max(share, as_told + better) for share, better in FITTING):
             alike = {name for name, share in shares.items() if share >= best - ALIKE}
@@ -178,36 +195,75 @@ class MountCheck:
 
 
 def _fitting(before: _Look, now: _Look, turn: Floats) -> float | None:
-    """Return which share of the walls is where it was, both looks turned; None with too few of them side by side."""
+    """Return which share of the walls and posts is where it was, both looks turned; None with too few of them side by side."""
     places, normals = before.in_map(turn)
-    if len(places) < PAIRS or len(now.places) < PAIRS:
-        return None
     seen, facing = now.in_map(turn)
-    distance, nearest = cKDTree(places).query(seen)
-    beside = distance < BESIDE_M
-    if np.count_nonzero(beside) < PAIRS:
-        return None
-    of_wall = normals[nearest[beside]]
-    off_m = np.abs(np.einsum("nj,nj->n", of_wall, seen[beside] - places[nearest[beside]]))
-    alike = np.abs(np.einsum("nj,nj->n", of_wall, facing[beside])) > FITS_COSINE
-    return float(np.mean((off_m < FITS_M) & alike))
+    fits: list[NDArray[np.bool_]] = [np.empty(0, np.bool_)]
+    if not (before.posts.all() or now.posts.all()):
+        of_wall, mine = ~before.posts, ~now.posts
+        distance, nearest = cKDTree(places[of_wall]).query(seen[mine])
+        beside, wall = distance < BESIDE_M, normals[of_wall][nearest]
+        off_m = np.abs(np.einsum("nj,nj->n", wall, seen[mine] - places[of_wall][nearest]))
+        alike = np.abs(np.einsum("nj,nj->n", wall, facing[mine])) > FITS_COSINE
+        fits.append(((off_m < FITS_M) & alike)[beside])
+    if before.posts.any() and now.posts.any():
+        apart: Floats = cKDTree(places[before.posts, :2]).query(seen[now.posts, :2])[0]  # at any height
+        fits.append(apart[apart < BESIDE_M] < FITS_POST_M)
+    fitting = np.concatenate(fits)
+    return float(np.mean(fitting)) if len(fitting) >= PAIRS else None
 
 
 def _planes(sweep: Sweep, T_base_lidar: Floats, poses: PoseBuffer, least_m: float) -> _Look:  # noqa: N803 -- T_target_source
     usable = sweep.within(least_m, FARTHEST_M)
-    stride = max(1, len(usable.points) // SAMPLE)
-    points = usable.points[::stride] @ T_base_lidar[:3, :3].T
-    times_s = usable.times_s[::stride].astype(np.float64)
-    if len(points) < NEIGHBOURS:
+    if not len(usable.points):
         nothing = np.empty((0, 3))
-        return _Look(sweep.stamp_ns, nothing, nothing, np.empty((0, 3, 3)), nothing)
-    _, index = cKDTree(points).query(points[:: max(1, len(points) // SEEDS)], k=NEIGHBOURS)
-    patches = points[index]
-    places = patches.mean(axis=1)
-    spread, axes = np.linalg.eigh(np.einsum("ski,skj->sij", patches - places[:, None], patches - places[:, None]) / NEIGHBOURS)
+        return _Look(sweep.stamp_ns, nothing, nothing, np.empty(0, np.bool_), np.empty((0, 3, 3)), nothing)
+    cells = _Cells.of(usable.points @ T_base_lidar[:3, :3].T, usable.times_s.astype(np.float64))
+    spread, axes = np.linalg.eigh(cells.covariances)
     flat = (spread[:, 0] < FLAT_M**2) & (spread[:, 1] > WIDE_M**2)
-    knots_s = np.linspace(times_s.min(), times_s.max(), KNOTS)
+    posts = (spread[:, 1] < SLIM_M**2) & (spread[:, 2] > LONG_M**2) & cells.alone & ~flat
+    normals = np.where(posts[:, None], axes[:, :, 2], axes[:, :, 0])
+    knots_s = np.linspace(usable.times_s.min(), usable.times_s.max(), KNOTS)
     at_knots = poses.at([sweep.stamp_ns + int(knot * NS) for knot in knots_s])
-    knot = np.searchsorted(knots_s, times_s[index[flat, 0]] - (knots_s[1] - knots_s[0]) / 2.0).clip(0, KNOTS - 1)
+    kept = flat | posts
+    knot = np.searchsorted(knots_s, cells.times_s[kept] - (knots_s[1] - knots_s[0]) / 2.0).clip(0, KNOTS - 1)
     origins = at_knots.position + at_knots.rotation @ T_base_lidar[:3, 3]
-    return _Look(sweep.stamp_ns, places[flat], axes[flat, :, 0], at_knots.rotation[knot], origins[knot])
+    return _Look(sweep.stamp_ns, cells.places[kept], normals[kept], posts[kept], at_knots.rotation[knot], origins[knot])
+
+
+@dataclass(frozen=True)
+class _Cells:
+    """The returns of the cubes with enough of them: their middle (N, 3), covariance (N, 3, 3) and mean time (N,).
+
+    ``alone`` (N,) are those with nothing in the cubes beside them.
+    """
+
+    places: Floats
+    covariances: Floats
+    times_s: Floats
+    alone: NDArray[np.bool_]
+
+    @classmethod
+    def of(cls, points: Floats, times_s: Floats) -> _Cells:
+        """Sum up points (N, 3) and their times (N,), cube by cube."""
+        half = int(np.ceil(FARTHEST_M / CELL_M)) + 1
+        shape = (2 * half,) * 3
+        corner = np.floor(points / CELL_M)
+        cell = ((corner + half) @ [shape[1] * shape[2], shape[2], 1]).astype(np.intp)
+        counts = np.bincount(cell, minlength=int(np.prod(shape)))
+        chosen = np.flatnonzero(counts >= LEAST_RETURNS)
+        # From the cube's own corner: squares of places far away would lose the millimetres.
+        inside = (points - corner * CELL_M).T
+
+        def mean(values: Floats) -> Floats:
+            means: Floats = np.bincount(cell, weights=values, minlength=len(counts))[chosen] / counts[chosen]
+            return means
+
+        middle = np.stack([mean(axis) for axis in inside], axis=1)
+        squares = {(i, j): mean(inside[i] * inside[j]) - middle[:, i] * middle[:, j] for i in range(3) for j in range(i, 3)}
+        covariances = np.stack([squares[min(i, j), max(i, j)] for i in range(3) for j in range(3)], axis=1).reshape(-1, 3, 3)
+        grid = counts.reshape(shape)
+        wide = np.pad(grid, ((1, 1), (1, 1), (0, 0)))
+        around = sum(wide[x : x + shape[0], y : y + shape[1]] for x in range(3) for y in range(3)) - grid
+        number = np.stack(np.unravel_index(chosen, shape), axis=1)
+        return cls(middle + (number - half) * CELL_M, covariances, mean(times_s), around.reshape(-1)[chosen] < NOTHING_BESIDE)
