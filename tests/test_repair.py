@@ -5,6 +5,9 @@ from __future__ import annotations
 import io
 import json
 import re
+import signal
+import subprocess
+import sys
 from contextlib import redirect_stderr, redirect_stdout
 from dataclasses import replace
 from pathlib import Path
@@ -219,3 +222,55 @@ def test_over_mocks_all_faults_end_as_with_the_branch_by_hand(repaired: Repaired
 def decisions(run: MockedMission) -> list[str]:
     """Return the skills that have ended, in their order."""
     return [one.skill for one in run.ended]
+
+
+# --- the rover ----------------------------------------------------------------------------------------------------------
+
+
+@pytest.fixture
+def rover(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
+    """Return a folder with the rover's missions, to be changed."""
+    monkeypatch.setenv("ALULA_ROBOT", str(ALULA_ROOT / "examples/rover"))
+    for one in (ALULA_ROOT / "examples/rover/missions").glob("*.xml"):
+        (tmp_path / one.name).write_bytes(one.read_bytes())
+    return tmp_path
+
+
+@pytest.mark.long
+@pytest.mark.timeout(0)  # a minute of processor time: as long as the machine needs
+def test_a_way_that_is_blocked_gets_another_chance(rover: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    answers = rover / "answers.xml"
+    once = '    <base.drive_to name="drive" target="{target}" outcome="{driven}"/>\n'
+    text, count = re.subn(r'(<BehaviorTree ID="drive">\n).*?(  </BehaviorTree>)', rf"\1{once}\2", answers.read_text(), flags=re.DOTALL)
+    assert count == 1
+    answers.write_text(text)
+    found = answer(capsys, rover / "patrol.xml", "--fault", "person")
+    assert found["answer"] == "repaired"
+    one = found["repair"]
+    assert isinstance(one, dict)
+    assert one["around"]
+    needed = "base.authority == MISSION &amp;&amp; base.pose_status == GOOD"
+    assert one["xml"] == f'<RetryAfter name="follow the walls again" attempts="3" wait="1" if="{needed}"/>'
+    fates = found["fates"]
+    assert isinstance(fates, list)
+    assert [fate["after"]["survives"] for fate in fates if fate["after"]["faults"] == ["person"]] == [True]
+
+
+@pytest.mark.parametrize("fault", ["laser", "person", "door"])
+def test_the_rover_survives_as_it_is(rover: Path, capsys: pytest.CaptureFixture[str], fault: str) -> None:
+    assert answer(capsys, rover / "patrol.xml", "--fault", fault)["answer"] == "nothing to repair"
+
+
+def test_ctrl_c_ends_the_search_with_what_it_has(no_lidar: Path) -> None:
+    """It comes in the proof of a branch, which would otherwise end that proof alone."""
+    words = [sys.executable, "-m", "alula.cli.repair", str(no_lidar), "--fault", "zed", "--most-faults", "1", "--time", TIME_S, "--json"]
+    with subprocess.Popen(words, stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True) as search:
+        assert search.stderr is not None
+        assert search.stdout is not None
+        for line in search.stderr:
+            if "may not be accomplished, and may end in no safe state" in line:
+                search.send_signal(signal.SIGINT)
+                break
+        said, progress = search.stdout.read(), search.stderr.read()
+        assert search.wait() == 1, progress
+    assert json.loads(said)["answer"] == "unknown"

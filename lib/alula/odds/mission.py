@@ -3,7 +3,8 @@
 The system takes each step that only an unlucky robot takes. Here a step is taken by whatever the robot's files say takes it:
 
 - a state that a fault of ``faults.yaml`` shows comes with that fault alone, and goes when it is mended;
-- a state that a skill brings about (``then`` of its mock) comes with a success of that skill alone;
+- a state that a skill brings about (``then`` of its mock) comes with a success of that skill alone, but for one that the mocks'
+  ``timeline`` has: before the mission begins that comes by itself;
 - any other arrow of the functional layer comes some time, or, if it breaks an invariant, is a fault of its own,
   ``skillset.resource STATE``;
 - a broken invariant over data is a fault of its own, ``skillset.skill INVARIANT``, where no fault of ``faults.yaml`` brings it about.
@@ -55,6 +56,7 @@ class MissionSteps:
         brought: what skills bring about.
         departure: the resource and state that the robot leaves at its departure.
         figures: what may never happen is left out, and an arrow that has figures of its own comes as these say.
+        at_first: the states that come by themselves after power-up: resource and state.
     """
 
     def __init__(
@@ -64,6 +66,7 @@ class MissionSteps:
         brought: Brought,
         departure: tuple[str, str] | None = None,
         figures: Figures = Figures(),  # noqa: B008 - a value
+        at_first: Collection[tuple[str, str]] = (),
     ) -> None:
         self._system = system
         self._faults = {name: one for name, one in faults.items() if _touches(one, system)}
@@ -71,6 +74,7 @@ class MissionSteps:
         self._departure = departure
         self._figures = figures
         self._states = {pair for several in brought.values() for pair in several}
+        self._at_first = frozenset(at_first)
 
     def initial(self) -> list[Place]:
         """Return the situation at power-up."""
@@ -89,6 +93,10 @@ class MissionSteps:
     def holds(self, state: Place, condition: Expression) -> bool:
         """Tell whether a condition of a mission's property is true."""
         return true_in(self._system, condition, state.state)
+
+    def may_end(self, state: Place, end: str) -> bool:
+        """Tell whether a fault is there that can bring about this end of an execution, ``skillset.skill END``."""
+        return any(_any(self._faults[name].ends, end) for name in state.faults)
 
     def steps(self, state: Place) -> Iterator[Step[Place]]:
         """Yield what can happen; nothing where the mission was aborted. Before it begins nothing fails, and it waits for all it needs."""
@@ -140,11 +148,11 @@ class MissionSteps:
             case Happens.START:
                 yield Step(Kind.NOW, event.skill, target, uses=(event.skill,))
             case Happens.REFUSE | Happens.INTERRUPT:
-                yield Step(Kind.NOW, event.skill, target)
+                yield Step(Kind.NOW, event.skill, target, event.result)
             case Happens.RESULT:
                 brought = target if event.failure else target._replace(state=self._with_brought(event.skill, after))
                 yield Step(Kind.END, event.skill, brought, event.result, self._left(state.state, brought.state))
-                if event.failure and self._is_there(state, f"{event.skill} {event.result}"):
+                if event.failure and self.may_end(state, f"{event.skill} {event.result}"):
                     yield Step(Kind.ANY, f"{event.skill} {event.result}", target)
             case Happens.EXTERN:
                 yield from self._extern(state, event, target)
@@ -152,16 +160,12 @@ class MissionSteps:
                 end = f"{event.skill} {event.result or Happens.FAIL.value}"
                 if not any(_any(one.ends, end) for one in self._faults.values()):
                     yield Step(Kind.FAULT, end, target)
-                elif self._is_there(state, end):
+                elif self.may_end(state, end):
                     yield Step(Kind.ANY, end, target)
             case Happens.EVENT:
                 yield Step(Kind.ANY, event.skill, target)
             case _:
                 pass  # deaths are faults of processes; nobody aborts
-
-    def _is_there(self, state: Place, end: str) -> bool:
-        """Tell whether a fault is there that can bring about this end of an execution."""
-        return any(_any(self._faults[name].ends, end) for name in state.faults)
 
     def _extern(self, state: Place, event: Event, target: Place) -> Iterator[Step[Place]]:
         resource = event.skill
@@ -173,8 +177,11 @@ class MissionSteps:
                 yield Step(Kind.ANY, shown, target, uses=uses)
         elif showing:
             yield from (Step(Kind.MENDED, name, target._replace(faults=state.faults - {name}), uses=uses) for name in showing)
-        elif (resource, event.result) not in self._states:
+        elif (resource, event.result) not in self._states or self._comes_at_first(state.state, (resource, event.result)):
             yield Step(Kind.FAULT if event.failure or shown in self._figures.faults else Kind.SOON, shown, target, uses=uses)
+
+    def _comes_at_first(self, state: State, pair: tuple[str, str]) -> bool:
+        return pair in self._at_first and not self._system.started(state)
 
     def _strikes(self, state: Place, steps: Iterable[tuple[Event, State]]) -> Iterator[Step[Place]]:
         """Yield what the fault that comes may bring about first; the rest may follow, at any time while it is there."""

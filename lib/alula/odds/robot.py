@@ -8,7 +8,8 @@ from pathlib import Path
 from alula.check.robot import Warn, models_of, part_of
 from alula.common.robots import FAULTS, RobotFolder, find_robot
 from alula.missions.scenario import by_mission, flown, inputs_of
-from alula.mock import load_behaviour
+from alula.mock import Behaviour, load_behaviour
+from alula.mock.behaviour import Place
 from alula.model.model import Skillset
 from alula.odds.figures import Figures
 from alula.odds.graph import MOST_SITUATIONS, Graph, Tell, explore
@@ -46,7 +47,9 @@ def mission_of(
     models = models_of(robot, warn)
     figures, effects = _of_faults(robot, models)
     failures = Failures(refusals=False, hooks=False, aborts=False)
-    part, brought, departure = part_of(robot, warn), _brought(robot, models), _departure(robot, models)
+    part, departure = part_of(robot, warn), _departure(robot, models)
+    mocks = load_behaviour(robot.behaviour_files, models)
+    brought, at_first = _brought(mocks), {_named(place, state) for one in mocks.timeline for place, state in one.states.items()}
     scenario = by_mission().get(path.resolve())
     inputs = None if scenario is None else inputs_of(scenario, world)
     file = changed or path
@@ -56,7 +59,7 @@ def mission_of(
     def read(why_any_order: str) -> System:
         return System.read(source, models, part, failures, few=COUNTED, known=inputs, why_any_order=why_any_order)
 
-    return read, lambda system: MissionSteps(system, effects, brought, departure, known), known
+    return read, lambda system: MissionSteps(system, effects, brought, departure, known, at_first), known
 
 
 def graph_of(
@@ -101,15 +104,18 @@ def _of_faults(robot: RobotFolder, models: Sequence[Skillset]) -> tuple[Figures,
     return (Figures(), {}) if file is None else (load_figures(file, models), load_effects(file, models).known)
 
 
-def _brought(robot: RobotFolder, models: Sequence[Skillset]) -> Brought:
+def _brought(mocks: Behaviour) -> Brought:
     """Return what the mocks of skills bring about: the functional layer does the same."""
-    rules = load_behaviour(robot.behaviour_files, models).rules
     found: dict[str, set[tuple[str, str]]] = {}
-    for (skillset, skill), several in rules.items():
+    for (skillset, skill), several in mocks.rules.items():
         for change in (change for rule in several for change in rule.changes or ()):
-            pairs = {(f"{of}.{resource}", state) for (of, resource), state in change.states.items()}
-            found.setdefault(f"{skillset}.{skill}", set()).update(pairs)
+            found.setdefault(f"{skillset}.{skill}", set()).update(_named(place, state) for place, state in change.states.items())
     return {skill: sorted(pairs) for skill, pairs in found.items()}
+
+
+def _named(place: Place, state: str) -> tuple[str, str]:
+    skillset, resource = place
+    return f"{skillset}.{resource}", state
 
 
 def _departure(robot: RobotFolder, models: Sequence[Skillset]) -> tuple[str, str] | None:

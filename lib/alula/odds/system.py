@@ -46,7 +46,7 @@ class Step(Generic[State]):
 
     Attributes:
         name: of the skill that ends, ``skillset.skill``, or of the fault; of the others, what a reader calls it.
-        result: how an execution ends.
+        result: how an execution ends, or the precondition by which a request is refused.
         uses: what is used from here on: skills that start, as ``skillset.skill``, and DEPARTURE.
         seconds: how long a WAIT is; 0: the figures of the skill ``name`` say so.
     """

@@ -22,11 +22,12 @@ class Branch:
     """A branch.
 
     Attributes:
-        use: the node that is put into the mission: a use of a subtree.
+        use: the node that is put into the mission: a use of a subtree, or what the node that it answers for is put into.
         tree: the node at the top of that subtree; None: the subtree is there already.
         at: the place of the node that it answers for.
         why: lines for a comment: for which situation it is, and why each step is there.
         wraps: the node stands in no Fallback yet, so that one is put around it.
+        around: ``use`` is put around the node.
     """
 
     use: Element
@@ -34,6 +35,7 @@ class Branch:
     at: Place
     why: tuple[str, ...]
     wraps: bool = False
+    around: bool = False
 
     @property
     def size(self) -> int:
@@ -53,6 +55,8 @@ class Branch:
 
     def as_xml(self) -> str:
         """Return the subtree as it will stand in the file."""
+        if self.around:
+            return "\n".join(_lines(self.use, 0))
         return "" if self.tree is None else "\n".join(_lines_of_tree(self))
 
     def written(self, subject: Subject, leave_out: tuple[str, ...] = (), more: str = "") -> tuple[str, list[str]]:
@@ -100,7 +104,9 @@ def _insert(document: Document, branch: Branch) -> None:
     element = at_place(document, branch.at)
     parent = parent_of(root, element)
     use = clone(branch.use)
-    if parent.tag in FALLBACKS:
+    if branch.around:
+        _put_around(parent, element, use)
+    elif parent.tag in FALLBACKS:
         lead = _lead(parent, element)
         place = parent.content.index(element)
         parent.content[place + 1 : place + 1] = [lead, use]
@@ -114,14 +120,18 @@ def _insert(document: Document, branch: Branch) -> None:
 
 
 def _wrap(parent: Element, element: Element, use: Element, name: str) -> None:
+    fallback = node("Fallback", name=name)
+    _put_around(parent, element, fallback)
+    fallback.content[2:2] = [fallback.content[0], use]
+
+
+def _put_around(parent: Element, element: Element, outer: Element) -> None:
     lead = _lead(parent, element)
-    deeper = lead + STEP
     place = parent.content.index(element)
     _shift(element, STEP)
-    fallback = node("Fallback", name=name)
-    fallback.empty = False
-    fallback.content = [deeper, element, deeper, use, lead]
-    parent.content[place] = fallback
+    outer.empty = False
+    outer.content = [lead + STEP, element, lead]
+    parent.content[place] = outer
 
 
 def _shift(element: Element, by: str) -> None:

@@ -2,8 +2,9 @@
 
 The world's moves are those that the odds are computed from (`MissionSteps`): what a mission's skills bring about, what the functional layer
 does in time, the chosen faults in their order, each at any moment, and whatever a fault that is there may bring about. A fault that has
-come stays. Executions end well; fairness is the prover's: what can happen again and again happens some time. So a mission survives when,
-from every situation that it can come into, it can still be accomplished.
+come stays, but it ends skills badly no more often than faults may come. Requests are not refused, and executions not ended, by data of
+which nothing is known, unless a fault that is there does that. Executions end well; fairness is the prover's: what can happen again and
+again happens some time. So a mission survives when, from every situation that it can come into, it can still be accomplished.
 """
 
 from __future__ import annotations
@@ -11,6 +12,7 @@ from __future__ import annotations
 from collections import deque
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
+from typing import NamedTuple
 
 from alula.common.graphs import reachable_from
 from alula.model.expressions import Expression
@@ -20,8 +22,35 @@ from alula.odds.system import Kind, Outcome, Step
 from alula.prove.limits import Deadline
 
 GOOD = frozenset({Outcome.ACCOMPLISHED, Outcome.DEGRADED})
-Here = tuple[Place, int]
-"""A situation, and how many of the faults have come."""
+MOST_FAULTS = 2
+"""How often a fault strikes that ends skills, unless more is asked for."""
+
+
+class Here(NamedTuple):
+    """A situation, how many of the faults have come, and how often they have ended skills badly."""
+
+    place: Place
+    come: int = 0
+    struck: int = 0
+
+
+@dataclass(frozen=True)
+class _Ends:
+    """How executions end: by ``skillset.skill`` the good results, and ``skillset.skill RESULT`` of the bad ones."""
+
+    good: Mapping[str, frozenset[str]]
+    bad: frozenset[str]
+
+    @classmethod
+    def of(cls, skillsets: Sequence[Skillset]) -> _Ends:
+        good: dict[str, frozenset[str]] = {}
+        bad: set[str] = set()
+        for skillset in skillsets:
+            for skill in skillset.skills:
+                name = f"{skillset.name}.{skill.name}"
+                good[name] = frozenset(one.name for one in skill.results if skill.kind_of(one.name) is ResultKind.SUCCESS)
+                bad |= {f"{name} {one.name}" for one in skill.results if one.name not in good[name]}
+        return cls(good, frozenset(bad))
 
 
 @dataclass(frozen=True)
@@ -63,15 +92,16 @@ def fate_of(
     rest: Sequence[tuple[str, str]] = (),
     most: int | None = None,
     goal: Expression | None = None,
+    strikes: int = MOST_FAULTS,
 ) -> Fate | None:
     """Return it; None: there are more situations than ``most``. ``rest`` are states of resources in which a robot is safe.
 
-    With a ``goal``, a mission survives, too, when it comes to be true after the faults.
+    With a ``goal``, a mission survives, too, when it comes to be true after the faults. Faults end skills badly ``strikes`` times.
 
     Raises OutOfTimeError.
     """
-    ends = {f"{of.name}.{one.name}": _good_results(of, one.name) for of in skillsets for one in of.skills}
-    first = [(place, 0) for place in steps.initial()]
+    ends = _Ends.of(skillsets)
+    first = [Here(place) for place in steps.initial()]
     before: dict[Here, tuple[Here, Step[Place]] | None] = dict.fromkeys(first)
     leading: dict[Here, list[Here]] = {}
     good: list[Here] = []
@@ -84,21 +114,21 @@ def fate_of(
         deadline.check()
         if most is not None and len(before) > most:
             return None
-        outcome = steps.outcome(here[0])
-        if outcome in GOOD or (goal is not None and here[1] == len(faults) and steps.holds(here[0], goal)):
+        outcome = steps.outcome(here.place)
+        if outcome in GOOD or (goal is not None and here.come == len(faults) and steps.holds(here.place, goal)):
             good.append(here)
         if outcome is not None:
             ends_at_rest.append(here)
-            safe = safe and (not rest or any(steps.resource(here[0], name) == state for name, state in rest))
-        following = [] if outcome is not None else list(_following(steps, here, faults, ends))
-        if here[1] == len(faults) and not following:
+            safe = safe and (not rest or any(steps.resource(here.place, name) == state for name, state in rest))
+        following = [] if outcome is not None else list(_following(steps, here, faults, ends, strikes))
+        if here.come == len(faults) and not following:
             outcomes.add("none" if outcome is None else outcome.value)
         for step, there in following:
             leading.setdefault(there, []).append(here)
             if there not in before:
                 before[there] = (here, step)
                 todo.append(there)
-    hopeful, ending = (reachable_from(ends, lambda one: leading.get(one, ())) for ends in (good, ends_at_rest))
+    hopeful, ending = (reachable_from(several, lambda one: leading.get(one, ())) for several in (good, ends_at_rest))
     lost = next((one for one in before if one not in hopeful), None)
     safe = safe and len(ending) == len(before)
     return Fate(tuple(faults), frozenset(outcomes), lost is None, safe, () if lost is None else _run(before, lost), len(before))
@@ -106,44 +136,48 @@ def fate_of(
 
 def needs(steps: MissionSteps, skillsets: Sequence[Skillset], skill: str, deadline: Deadline) -> bool:
     """Tell whether every run in which nothing fails, and the mission is accomplished, starts a skill; raises OutOfTimeError."""
-    ends = {f"{of.name}.{one.name}": _good_results(of, one.name) for of in skillsets for one in of.skills}
-    todo = deque((place, 0) for place in steps.initial())
+    ends = _Ends.of(skillsets)
+    todo = deque(Here(place) for place in steps.initial())
     seen = set(todo)
     while todo:
         here = todo.popleft()
         deadline.check()
-        if steps.outcome(here[0]) in GOOD:
+        if steps.outcome(here.place) in GOOD:
             return False
-        for step, there in _following(steps, here, (), ends):
+        for step, there in _following(steps, here, (), ends, 0):
             if skill not in step.uses and there not in seen:
                 seen.add(there)
                 todo.append(there)
     return True
 
 
-def _good_results(skillset: Skillset, name: str) -> frozenset[str]:
-    skill = skillset.skill(name)
-    return frozenset(one.name for one in skill.results if skill.kind_of(one.name) is ResultKind.SUCCESS)
-
-
-def _following(
-    steps: MissionSteps, here: Here, faults: Sequence[str], ends: Mapping[str, frozenset[str]]
-) -> list[tuple[Step[Place], Here]]:
+def _following(steps: MissionSteps, here: Here, faults: Sequence[str], ends: _Ends, strikes: int) -> list[tuple[Step[Place], Here]]:
     """Return the steps that are taken; while the software is at work, nothing but a fault comes between."""
-    place, come = here
+    place = here.place
     found: list[tuple[Step[Place], Here]] = []
-    for step in steps.steps(place):
+    several = list(steps.steps(place))
+    can_start = {step.name for step in several if step.uses and step.kind is Kind.NOW}
+    for step in several:
+        there = here._replace(place=step.target)
         match step.kind:
             case Kind.FAULT:
-                if come < len(faults) and step.name == faults[come]:
-                    found.append((step, (step.target, come + 1)))
+                if here.come < len(faults) and step.name == faults[here.come]:
+                    found.append((step, there._replace(come=here.come + 1)))
             case Kind.MENDED:
                 pass
-            case Kind.END if step.result not in ends[step.name]:
+            case Kind.END if step.result not in ends.good[step.name]:
                 pass
+            case Kind.NOW if place.coming:
+                struck = step.target.state != place.state
+                found.append((step, there._replace(struck=min(here.struck + struck, strikes))))
+            case Kind.NOW if step.result and step.name in can_start and not steps.may_end(place, f"{step.name} {step.result}"):
+                pass  # by data, which are as they should be
+            case Kind.ANY if step.name in ends.bad:
+                if here.struck < strikes:
+                    found.append((step, there._replace(struck=here.struck + 1)))
             case _:
                 if step.target != place:
-                    found.append((step, (step.target, come)))
+                    found.append((step, there))
     now = [one for one in found if one[0].kind in {Kind.NOW, Kind.FAULT}]
     return now if any(step.kind is Kind.NOW for step, _ in now) else found
 

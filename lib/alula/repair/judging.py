@@ -16,7 +16,7 @@ from alula.prove.limits import Deadline
 from alula.prove.mission.prover import Proved, prove_within
 from alula.prove.mission.run import MissionRun
 from alula.prove.mission.system import System
-from alula.repair.fates import Fate, fate_of, needs
+from alula.repair.fates import MOST_FAULTS, Fate, fate_of, needs
 from alula.repair.subject import Subject
 
 BOUND = "ALU710"
@@ -53,8 +53,9 @@ def _what(finding: Diagnostic) -> tuple[str, str]:
 class Judge:
     """Looks at a mission, and at what is made of it."""
 
-    def __init__(self, subject: Subject, deadline: Deadline, goal: Expression | None = None) -> None:
+    def __init__(self, subject: Subject, deadline: Deadline, goal: Expression | None = None, strikes: int = MOST_FAULTS) -> None:
         self._subject = subject
+        self._strikes = strikes
         self._deadline = deadline
         self._goal = goal
 
@@ -98,7 +99,8 @@ class Judge:
 
         def fate(faults: Sequence[str], most: int | None) -> Fate | None:
             self._deadline.doing = f"looking at the runs with {' and then '.join(faults) or 'no fault'}"
-            return fate_of(steps, self._subject.skillsets, faults, self._deadline, self._subject.at_rest, most, self._goal)
+            subject = self._subject
+            return fate_of(steps, subject.skillsets, faults, self._deadline, subject.at_rest, most, self._goal, self._strikes)
 
         return fate
 

@@ -2,6 +2,7 @@
 
 - A subtree of the files that nothing uses.
 - What the mission does to come to rest.
+- What failed once more, where a fault is no more than its bad end.
 - What failed, with skills that stand for those that can't run: their inputs are the same, what they need is asked before, and what the
   others held besides is held beside them.
 """
@@ -10,17 +11,19 @@ from __future__ import annotations
 
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
+from fnmatch import fnmatchcase
 from itertools import islice, product
 
 from alula.missions.mission_file import READY, STOP_HERE
 from alula.missions.palette import palette_of
-from alula.missions.skill_types import type_of
+from alula.missions.skill_types import OUTCOME_PORT, type_of
 from alula.model.conditions import NO_DATA, judge
 from alula.model.model import Parameter
 from alula.model.units import told_unit
 from alula.prove.mission.accepted import DESCRIPTION
 from alula.prove.mission.system import System
 from alula.repair.branches import FALLBACKS, Branch, clone, node, parent_of
+from alula.repair.fates import MOST_FAULTS
 from alula.repair.naming import Renaming, another, assigned, plain
 from alula.repair.purposes import Purpose, Purposes, asked_of_others, broken_by
 from alula.repair.subject import Subject, texts_of
@@ -31,18 +34,25 @@ from alula.trees.reading import is_port, node_name, type_name
 from alula.trees.values import ANY
 
 MOST_NODES = 15
+AGAIN_S = "1"
+"""How long after a failure a node gets its other chance, seconds."""
+RETRIES = frozenset({"RetryAfter", "RetryUntilSuccessful"})
 BEYOND = frozenset({READY, STOP_HERE})
 """Trees that the mission uses though no tree does."""
 
 
 @dataclass(frozen=True)
 class Failing:
-    """What is to be answered: a leaf, and the states with which its skill can't run (``skillset.resource``, state)."""
+    """What is to be answered: a leaf, and the states with which its skill can't run (``skillset.resource``, state).
+
+    ``results`` are those by which the fault ends it.
+    """
 
     leaf: Node
     skill: str
     states: tuple[tuple[str, str], ...] = ()
     fault: str = ""
+    results: tuple[str, ...] = ()
 
     @property
     def words(self) -> str:
@@ -60,18 +70,19 @@ def failing_by(fault: str, subject: Subject, system: System) -> list[Failing]:
         name = f"{leaf.skillset}.{leaf.model.name}"
         mine = tuple((at.partition(".")[2], state) for at, state in states if at.partition(".")[0] == leaf.skillset)
         broken = tuple((at, state) for at, state in mine if broken_by(leaf.model, at, state))
-        ends = any(one.partition(" ")[0] == name for one in effects.ends)
-        if (broken or ends) and leaf in system.trees[0].nodes:
+        results = tuple(one.name for one in leaf.model.results if any(fnmatchcase(f"{name} {one.name}", end) for end in effects.ends))
+        if (broken or results) and leaf in system.trees[0].nodes:
             full = tuple((f"{leaf.skillset}.{at}", state) for at, state in broken)
-            found.setdefault(id(leaf.wiring.element), Failing(leaf, name, full, fault))
+            found.setdefault(id(leaf.wiring.element), Failing(leaf, name, full, fault, results))
     return list(found.values())
 
 
 class Patterns:
     """Makes branches for what failed."""
 
-    def __init__(self, subject: Subject, using: Sequence[str] = ()) -> None:
+    def __init__(self, subject: Subject, using: Sequence[str] = (), most_faults: int = MOST_FAULTS) -> None:
         self._subject = subject
+        self._most_faults = most_faults
         self._purposes = Purposes(subject.skillsets)
         self._using = set(using)
         self._palette: Palette = palette_of(subject.files, subject.skillsets, subject.part)
@@ -101,8 +112,33 @@ class Patterns:
             at = at.parent
 
     def _at(self, place: Node, failing: Failing) -> Iterator[Branch]:
+        yield from self._again(place, failing)
         for one in (*self._unused(place, failing), *self._coming_to_rest(place, failing), *self._standing_in(place, failing)):
             yield replace(one, wraps=not _in_fallback(place))
+
+    # --- once more -----------------------------------------------------------------------------------------------------
+
+    def _again(self, place: Node, failing: Failing) -> Iterator[Branch]:
+        """Yield the node in a RetryAfter, with one chance more than faults may come; there are no more in one that is there."""
+        if failing.states or place.wiring.element.tag in RETRIES:
+            return
+        element, attempts = place.wiring.element, str(self._most_faults + 1)
+        name = f"{node_name(element)} again"
+        condition = self._worth_it(place, failing)
+        if condition:
+            again = node("RetryAfter", name=name, attempts=attempts, wait=AGAIN_S, if_=condition)
+        else:
+            again = node("RetryUntilSuccessful", name=name, num_attempts=attempts)
+        yield Branch(again, None, element.place, (f"When {failing.words}: it gets another chance.",), around=True)
+
+    def _worth_it(self, place: Node, failing: Failing) -> str:
+        """Return when another chance is worth it: it has ended as the fault ends it, or what it needs is there; empty: always."""
+        entry = pointer(failing.leaf.wiring.element.get(OUTCOME_PORT), OUTCOME_PORT)
+        if entry and place is failing.leaf:
+            return " || ".join(f"{entry} == '{one}'" for one in failing.results)
+        purpose = self._purposes.known[failing.skill]
+        needed = asked_of_others(purpose)
+        return " && ".join(f"{purpose.skillset.name}.{resource.name} == {state}" for resource, state in needed)
 
     # --- what is there -----------------------------------------------------------------------------------------------
 
@@ -163,7 +199,9 @@ class Patterns:
         guard = self._guard(made.top, failing)
         degraded = node("Script", name="degraded", code="@degraded := true")
         name = renaming.name(node_name(place))
-        top = node("Sequence", degraded, made.top, name=name if name != node_name(made.top) else f"{name}, degraded", _failureIf=guard)
+        top = node("Sequence", degraded, made.top, name=name if name != node_name(made.top) else f"{name}, degraded")
+        if guard:
+            top.set("_failureIf", guard)
         tree_name = renaming.identifier(place.get("ID")) if place.tag == "SubTree" else "_".join(name.lower().split())
         tree_name = another("".join(sign for sign in tree_name if sign.isalnum() or sign == "_"), self._trees)
         use = node("SubTree", ID=tree_name, name=name, _autoremap="true")

@@ -26,7 +26,7 @@ from alula.prove.mission.run import MissionRun
 from alula.prove.mission.system import System
 from alula.repair.branches import Branch
 from alula.repair.errors import RepairError
-from alula.repair.fates import Fate
+from alula.repair.fates import MOST_FAULTS, Fate
 from alula.repair.game import played
 from alula.repair.judging import Judge, Judgement, run_of
 from alula.repair.patterns import Failing, Patterns, failing_by
@@ -63,7 +63,7 @@ class Question:
     finding: int = 0
     within: str = ""
     using: tuple[str, ...] = ()
-    most_faults: int = 2
+    most_faults: int = MOST_FAULTS
     goal: str = ""
     never: str = ""
 
@@ -133,10 +133,11 @@ class Search:
         self._subject = subject
         self._question = question
         self._deadline = deadline
+        self._deadlines = [deadline]
         self._tell = tell
         self._goal = _condition(question.goal) if question.goal else None
-        self._judge = Judge(subject, deadline, self._goal)
-        self._patterns = Patterns(subject, question.using)
+        self._judge = Judge(subject, deadline, self._goal, question.most_faults)
+        self._patterns = Patterns(subject, question.using, question.most_faults)
         self._refuted: set[frozenset[str]] = set()
         self._missing = tuple(subject.names_asked())
 
@@ -145,6 +146,11 @@ class Search:
         """What `check` finds in the mission as it is, in all the runs that it looks at."""
         text, _ = self._without_branch(self._missing)
         return self._judge.check(text, also=True)
+
+    def stop(self) -> None:
+        """Have the search end with the best that it has found; a signal's handler may call it."""
+        for one in self._deadlines:
+            one.at_s = 0.0
 
     def run(self) -> Answer:
         """Search; raises AlulaError where the mission can't be looked at."""
@@ -218,14 +224,16 @@ class Search:
         """Return the first branch that is proved, and how many were tried."""
         tried = 0
         several = [one for leaf in failing for one in self._patterns.branches(leaf, within=self._question.within)]
-        branches = {one.key: one for one in several[::-1]}.values()  # two leaves may have the same answer
-        for branch in sorted(branches, key=lambda one: one.size + one.wraps):
+        branches: dict[tuple[str, ...], Branch] = {}
+        for one in several:
+            branches.setdefault(one.key, one)  # two leaves may have the same answer
+        for branch in sorted(branches.values(), key=lambda one: one.size + one.wraps):
             if self._is_refuted(branch):
                 continue
             tried += 1
             try:
                 found = self._judged(branch, before, fate, finding)
-            except (OutOfTimeError, KeyboardInterrupt):
+            except OutOfTimeError:
                 return None, tried
             if isinstance(found, Repair):
                 return replace(found, tried=tried), tried
@@ -267,13 +275,13 @@ class Search:
         try:
             if not failing.states or not self._judge.needs(text, failing.skill):
                 return []
-        except (OutOfTimeError, KeyboardInterrupt):
+        except OutOfTimeError:
             return []
         for purpose in self._patterns.all_stand_ins(failing):
             own = [(at.partition(".")[2], state) for at, state in failing.states if at.partition(".")[0] == purpose.skillset.name]
             try:
                 game = played(purpose.skillset, purpose.skill.name, own, self._deadline) if own else None
-            except (OutOfTimeError, KeyboardInterrupt):
+            except OutOfTimeError:
                 return []
             if game is None or game.won:
                 return []
@@ -313,8 +321,9 @@ class Search:
         stripped, _ = repair.branch.written(self._subject, self._missing)
         before: dict[tuple[str, ...], Fate] = {}
         after: dict[tuple[str, ...], Fate] = {}
-        judge = Judge(self._subject, Deadline.after(self._deadline.left_s() * SHARE, self._deadline.tell), self._goal)
-        with suppress(OutOfTimeError, KeyboardInterrupt):
+        self._deadlines.append(Deadline.after(self._deadline.left_s() * SHARE, self._deadline.tell))
+        judge = Judge(self._subject, self._deadlines[-1], self._goal, self._question.most_faults)
+        with suppress(OutOfTimeError):
             was, now = judge.fates(text), judge.fates(stripped)
             for faults in (*singles, *pairs):
                 fates = was(faults, MOST_SITUATIONS), now(faults, MOST_SITUATIONS)

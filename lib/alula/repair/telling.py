@@ -27,10 +27,10 @@ def as_text(answer: Answer, odds: Both | None) -> str:
 
 def _of_repair(repair: Repair, what: str, odds: Both | None, reasons: Sequence[str]) -> list[str]:
     branch = repair.branch
-    where = "in a Fallback around" if branch.wraps else "behind"
+    where = "around" if branch.around else "in a Fallback around" if branch.wraps else "behind"
     lines = [f"repaired, proved by check: {what}", f"  '{branch.name}', {branch.size} nodes, {where} the node at {branch.at}"]
     lines += [f"  it can't be accomplished then, and ends safely: {one}" for one in reasons]
-    lines += ["", branch.as_xml(), ""] if branch.tree is not None else []
+    lines += ["", text, ""] if (text := branch.as_xml()) else []
     lines += [f"  not proved: the property `{one}` asks for a node that the mission has not" for one in repair.not_asked]
     lines += [f"  left as it was: {one}" for one in repair.left]
     for faults, after in repair.after.items():
@@ -58,7 +58,13 @@ def as_dict(answer: Answer, odds: Both | None) -> dict[str, object]:
     if repair is None:
         return found
     places = {"file": repair.branch.at.path, "line": repair.branch.at.line, "column": repair.branch.at.column}
-    branch = {"name": repair.branch.name, "nodes": repair.branch.size, "at": places, "wraps": repair.branch.wraps}
+    branch = {
+        "name": repair.branch.name,
+        "nodes": repair.branch.size,
+        "at": places,
+        "wraps": repair.branch.wraps,
+        "around": repair.branch.around,
+    }
     found["repair"] = {**branch, "xml": repair.branch.as_xml(), "use": "".join(repair.branch.use.pieces())}
     found["not_asked"] = list(repair.not_asked)
     found["left"] = list(repair.left)

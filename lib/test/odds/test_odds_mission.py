@@ -14,6 +14,7 @@ from alula.odds.figures import FaultFigures, Figures, SkillFigures, point
 from alula.odds.graph import Graph, explore
 from alula.odds.odds import odds_of
 from alula.odds.process import quantify
+from alula.odds.robot import mission_of
 from alula.odds.storm import Storm
 from alula.odds.system import Kind, Step
 
@@ -95,3 +96,44 @@ def test_the_drone_has_useful_odds(capsys: pytest.CaptureFixture[str], monkeypat
     assert 0 < said["outcomes"]["given_up"]["chance"][0] < 0.05
     assert {cost["name"] for cost in said["costs"]} > {"zed", "pilot"}
     assert "encoder" not in {cost["name"] for cost in said["costs"]}  # no video there
+
+
+FINDING = {
+    "robot.yaml": "name: finder\n",
+    "skillsets/finder.skill": """skillset finder {
+  resource pose { initial UNKNOWN  extern UNKNOWN -> GOOD  extern GOOD -> LOST  extern LOST -> GOOD }
+  skill find { result { success FOUND } }
+}""",
+    "skillsets/mock.yaml": """
+skills: {finder.find: {delay: 8, result: FOUND, then: [{after: 7, set: {finder.pose: GOOD}}]}}
+timeline: [{after: 1, set: {finder.pose: GOOD}}]
+""",
+    "missions/find.xml": """<root BTCPP_format="4" main_tree_to_execute="find">
+  <BehaviorTree ID="find"><Sequence>
+    <WaitFor name="it is lost" if="finder.pose == LOST"/>
+    <WaitFor name="it is found" if="finder.pose == GOOD"/>
+  </Sequence></BehaviorTree>
+  <BehaviorTree ID="ready"><Needs name="knows" if="finder.pose == GOOD" otherwise="'it is lost'"/></BehaviorTree>
+</root>""",
+}
+
+
+def test_what_a_skill_brings_about_comes_by_the_clock_before_the_mission_begins_only(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    for name, text in FINDING.items():
+        (tmp_path / name).parent.mkdir(exist_ok=True)
+        (tmp_path / name).write_text(text)
+    monkeypatch.setenv("ALULA_ROBOT", str(tmp_path))
+    read, steps_of, _ = mission_of(tmp_path / "missions/find.xml")
+    system = read("")
+    steps = steps_of(system)
+    seen = set(steps.initial())
+    todo = list(seen)
+    while todo:
+        new = {step.target for step in steps.steps(todo.pop())} - seen
+        seen |= new
+        todo += new
+    poses = {(system.started(one.state), steps.resource(one, "finder.pose")) for one in seen}
+    assert poses == {(False, "UNKNOWN"), (False, "GOOD"), (True, "GOOD"), (False, "LOST"), (True, "LOST")}
+    assert not any(steps.outcome(one) for one in seen)  # nothing that runs brings it back

@@ -97,14 +97,14 @@ class Sky:
     never: Mapping[str, Expression] = field(default_factory=dict)
 
     def with_faults(self, faults: Mapping[str, float], seed: int) -> Outcome:
-        """Fly with faults, each from a moment on: they stay, what they end they may end again, and nothing else fails."""
+        """Fly with faults, each from a moment on: they stay, what they end they end once more at most, and nothing else fails."""
         chance = random.Random(seed)  # noqa: S311 - for tests
         mocked = {name: _mocked(self.effects[name]) for name in faults}
         requests = [FaultRequest(name, begin_s=at_s) for name, at_s in faults.items()]
         mission = self._mission(Behaviour(rules=self._rules(_well, chance), faults=mocked), seed, *requests)
         for name, at_s in faults.items():
             for place, result in mocked[name].ends.items():
-                _end_now_and_then(mission, place, result, at_s, chance)
+                _end_once_more(mission, place, result, at_s, chance)
         return Flight(mission).fly()
 
     def with_anything(self, seed: int) -> list[str]:
@@ -145,8 +145,8 @@ def _mocked(effects: FaultEffects) -> MockFault:
     return MockFault(states, ends={_place(text): result for text, result in (one.rsplit(" ", 1) for one in effects.ends)})
 
 
-def _end_now_and_then(mission: MockedMission, place: Place, result: str, at_s: float, chance: random.Random) -> None:
-    """Have a fault end executions of a skill several times more."""
+def _end_once_more(mission: MockedMission, place: Place, result: str, at_s: float, chance: random.Random) -> None:
+    """Have a fault end an execution of a skill once more: with its coming that is as often as faults may come."""
     engine = mission.world.managers[place[0]].engine
 
     def strike() -> None:
@@ -154,8 +154,7 @@ def _end_now_and_then(mission: MockedMission, place: Place, result: str, at_s: f
             if one.skill == place[1] and one.state is ExecutionState.RUNNING:
                 engine.terminate(one.id, result)
 
-    for _ in range(chance.randrange(4)):
-        mission.world.clock.after(at_s + chance.expovariate(0.3), strike)
+    mission.world.clock.after(at_s + chance.expovariate(0.5), strike)
 
 
 def _place(text: str) -> Place:
