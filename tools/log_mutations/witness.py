@@ -6,8 +6,8 @@ from collections.abc import Callable, Sequence
 
 from alula.model.execution_state import ExecutionState as S
 from alula.model.model import Skillset
+from alula.model.steps import Cause, Stimulus
 from alula.records.conformance import SkillsetMonitor
-from alula.records.conformance.beliefs import Ask, Stimulus
 from alula.runtime.core import SkillsetEngine
 from alula.runtime.core.events import EngineEvent, TransitionEvent
 from alula.runtime.core.execution import Execution
@@ -71,37 +71,33 @@ def _played(skillset: Skillset, stimuli: Sequence[Stimulus]) -> list[EngineEvent
 
 
 def _ask(engine: SkillsetEngine, hooks: dict[str, _Hooks], stimulus: Stimulus) -> None:
-    names = stimulus.subject
-    match stimulus.ask:
-        case Ask.EXTERN:
-            engine.transition(*names)
-        case Ask.EVENT:
-            engine.trigger(*names)
-        case Ask.REQUEST:
-            engine.register(names[0], {}, execution_id=names[1])
-        case Ask.START | Ask.REFUSE:
-            engine.run(names[1])
-        case Ask.PHASE:
-            _enter(engine, hooks, *names)
-        case Ask.RESULT:
-            engine.terminate(names[1], names[2])
-        case Ask.INTERRUPTED:
-            engine.interrupted(names[1])
-        case Ask.FAIL:
-            engine.fail(names[1], "asked to")
+    name, asked = stimulus.name, stimulus.execution
+    match stimulus.cause:
+        case Cause.EXTERN:
+            engine.transition(name, stimulus.target)
+        case Cause.EVENT:
+            engine.trigger(name)
+        case Cause.REQUEST:
+            engine.register(asked.skill, {}, execution_id=asked.id)
+        case Cause.START | Cause.REFUSE:
+            engine.run(asked.id)
+        case Cause.REJECT:
+            hooks[asked.skill].refusal = "asked to"
+            engine.run(asked.id)
+            hooks[asked.skill].refusal = ""
+        case Cause.PHASE:
+            _PHASES[S(name)](engine, asked.id)
+        case Cause.RESULT:
+            engine.terminate(asked.id, name)
+        case Cause.INTERRUPT:
+            running = engine.execution(asked.id)
+            (engine.interrupted if running is not None and running.state is S.INTERRUPTING else engine.interrupt)(asked.id)
+        case Cause.FAIL:
+            engine.fail(asked.id, "asked to")
 
 
-def _enter(engine: SkillsetEngine, hooks: dict[str, _Hooks], skill: str, execution_id: str, state: str) -> None:
-    if S(state) is S.NOT_VALIDATED:
-        hooks[skill].refusal = "asked to"
-        engine.run(execution_id)
-        hooks[skill].refusal = ""
-        return
-    ways: dict[S, Callable[[], object]] = {
-        S.PAUSED: lambda: engine.pause(execution_id),
-        S.RUNNING: lambda: engine.resume(execution_id),
-        S.INTERRUPTING: lambda: engine.interrupt(execution_id),
-        S.INTERRUPTED: lambda: engine.interrupt(execution_id),
-        S.FAILED: lambda: engine.fail(execution_id, "asked to"),
-    }
-    ways[S(state)]()
+_PHASES: dict[S, Callable[[SkillsetEngine, str], object]] = {
+    S.PAUSED: SkillsetEngine.pause,
+    S.RUNNING: SkillsetEngine.resume,
+    S.INTERRUPTING: SkillsetEngine.interrupt,
+}

@@ -240,7 +240,7 @@ class Judge:
 
     def _look(self, path: Path, skillsets: tuple[Skillset, ...], part: MissionPart, why_any_order: str = "") -> Looked:
         deadline = Deadline.after(GIVEN_S)
-        system = System.read(path, skillsets, part, LOOKED_AT, deadline, why_any_order=why_any_order)
+        system = System.read(path, skillsets, part, LOOKED_AT, why_any_order=why_any_order)
         regions = Regions(system, deadline)
         regions.explore()
         return Looked(path, system.skillsets, part, regions, Answers(regions), self._shown.of(regions, path))

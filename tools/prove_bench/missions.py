@@ -163,7 +163,7 @@ def _warn(line: str) -> None:
 def _looked_at(path: Path, models: Sequence[Skillset], part: MissionPart, timeout_s: float) -> dict[str, object]:
     begin, worked = time.monotonic(), time.process_time()
     deadline = Deadline.after(timeout_s)
-    regions = Regions(System.read(path, models, part, LOOKED_AT, deadline), deadline)
+    regions = Regions(System.read(path, models, part, LOOKED_AT), deadline)
     with contextlib.suppress(OutOfTimeError):
         regions.explore()
     found = findings(regions, Answers(regions))

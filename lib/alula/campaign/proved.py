@@ -89,7 +89,7 @@ def proved(
         source = flown(robot.root / scenario.mission, scenario)
         part = robot.part("missions") or NO_PART
         regions, unproved = look_at(
-            lambda why: System.read(source, models, part, LOOKED_AT, deadline, why_any_order=why),
+            lambda why: System.read(source, models, part, LOOKED_AT, why_any_order=why),
             lambda system: _explored(Regions(system, deadline), time_s),
         )
     except (UndecidedError, InputError, RobotError) as error:

@@ -9,6 +9,7 @@ from __future__ import annotations
 from collections.abc import Iterator
 from dataclasses import replace
 
+from alula.model.effects import effects_of
 from alula.model.model import Effect, Resource, Skillset
 
 Arrow = tuple[str, str, str]
@@ -45,7 +46,4 @@ def _effects(skillset: Skillset) -> Iterator[Effect]:
     for event in skillset.events:
         yield event.effect
     for skill in skillset.skills:
-        yield skill.start
-        yield skill.interrupt.effect
-        yield from (invariant.effect for invariant in skill.invariants)
-        yield from (result.effect for result in skill.results)
+        yield from effects_of(skill)

@@ -2,14 +2,22 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Iterator, Mapping
 from dataclasses import replace
 
 from alula.model.arrows import may_go
 from alula.model.conditions import States
 from alula.model.errors import EffectError
-from alula.model.model import Effect, Event, Skillset
+from alula.model.model import Effect, Event, Skill, Skillset
 from alula.model.situation import Change, Running, Situation
+
+
+def effects_of(skill: Skill) -> Iterator[Effect]:
+    """Yield the effects of a skill: of its start, its interruption, its invariants and its results."""
+    yield skill.start
+    yield skill.interrupt.effect
+    yield from (invariant.effect for invariant in skill.invariants)
+    yield from (result.effect for result in skill.results)
 
 
 def effect_changes(skillset: Skillset, execution: Running, effect: Effect, place: str, states: States) -> tuple[Change, ...]:

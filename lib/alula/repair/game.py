@@ -42,7 +42,7 @@ def played(skillset: Skillset, skill: str, states: Collection[tuple[str, str]], 
     Raises OutOfTimeError.
     """
     leaves = {number: one.name for number, one in enumerate(skillset.skills)}
-    steps = ManagersSteps(skillset, leaves, HELPFUL, deadline, _as_it_is)
+    steps = ManagersSteps(skillset, leaves, HELPFUL, _as_it_is)
     number = next(leaf for leaf, name in leaves.items() if name == skill)
     first: Here = (steps.initial(), False)
     seen, todo, refused = {first}, deque([first]), dict[str, None]()

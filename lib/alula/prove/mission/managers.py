@@ -1,22 +1,23 @@
-"""What can happen in the managers of one skillset: each step is taken by ``alula.model.semantics``, which the managers execute."""
+"""The steps of ``alula.model.steps`` between the managers of a mission's search, with what the tree still hangs on."""
 
 from __future__ import annotations
 
 from collections.abc import Callable, Iterable, Iterator, Mapping
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 
 from alula.language.outside import opened, untaken
 from alula.model import semantics
 from alula.model.breaking import breaks
-from alula.model.conditions import data_of, judge, whatever_the_data
+from alula.model.conditions import NO_DATA, judge
 from alula.model.execution_state import ExecutionState
-from alula.model.model import ResultKind, Skill, Skillset
+from alula.model.model import ResultKind, Skillset
+from alula.model.overapproximation import OverApproximation, over_approximate
 from alula.model.situation import Change, Entered, Running, Situation, Step
-from alula.prove.limits import Deadline
+from alula.model.steps import Cause, PossibleSteps, Stimulus, take
 from alula.prove.mission.state import Ending, Event, Execution, Kind, Managers
-from alula.prove.skillset.abstract import Abstraction, Breaker, without_data
 
-NOT_VALIDATED = ExecutionState.NOT_VALIDATED.value
+NOT_VALIDATED, NOT_READY = ExecutionState.NOT_VALIDATED.value, ExecutionState.NOT_READY.value
+INTERRUPTED = ExecutionState.INTERRUPTED.value
 End = tuple[str, str]
 """State and result of an execution that has ended."""
 SENT, RUNNING, ENDED = "sent", "running", "ended"
@@ -41,14 +42,9 @@ class Failures:
     pauses: bool = False
 
 
-def searched(skillset: Skillset, deadline: Deadline) -> Abstraction:
-    """Return a skillset as it is searched: without data, and with arrows that nothing in the model takes as extern ones.
-
-    Its preconditions keep their names; data that make one false refuse in a step of their own.
-    """
-    abstraction = without_data(opened(skillset, untaken(skillset)), deadline)
-    skills = tuple(map(_named, abstraction.original.skills, abstraction.skillset.skills))
-    return replace(abstraction, skillset=replace(abstraction.skillset, skills=skills))
+def searched(skillset: Skillset) -> OverApproximation:
+    """Return a skillset as it is searched: over resources alone, and with arrows that nothing in the model takes as extern ones."""
+    return over_approximate(opened(skillset, untaken(skillset)))
 
 
 class ManagersSteps:
@@ -58,16 +54,14 @@ class ManagersSteps:
     tell of it.
     """
 
-    def __init__(
-        self, skillset: Skillset, skills: Mapping[int, str], failures: Failures, deadline: Deadline, told: Callable[[int, End], End]
-    ) -> None:
-        abstraction = searched(skillset, deadline)
-        self.model = abstraction.original
+    def __init__(self, skillset: Skillset, skills: Mapping[int, str], failures: Failures, told: Callable[[int, End], End]) -> None:
+        searchable = searched(skillset)
+        self.model = searchable.original
         self.skills = skills
         self._failures = failures
         self._told_end = told
-        self._skillset = abstraction.skillset
-        self._breakers = _breakers_of(abstraction)
+        self._skillset = searchable.skillset
+        self._possible = PossibleSteps(searchable)
         self._names = tuple(resource.name for resource in self.model.resources)
         self._bad = {
             (resource.name, arrow.source, arrow.target)
@@ -92,8 +86,7 @@ class ManagersSteps:
                 yield from self._arrivals(managers, situation, execution)
             elif execution.phase == RUNNING:
                 yield from self._ends(managers, situation, execution)
-        yield from self._extern(managers, situation)
-        yield from self._events(managers, situation)
+        yield from self._outside(managers, situation)
         if self._failures.deaths:
             yield self._death(managers)
 
@@ -104,26 +97,30 @@ class ManagersSteps:
     # --- steps -------------------------------------------------------------------------------------------------------
 
     def _arrivals(self, managers: Managers, situation: Situation, execution: Execution) -> Iterator[tuple[Event, Managers]]:
+        """Yield what becomes of a request; data that make a precondition false are a failure."""
         name = self.skills[execution.leaf]
-        skill = self._skillset.skill(name)
-        if execution.asked:
-            state = ExecutionState.INTERRUPTED.value
-            ended = self._ended(execution, state)
-            yield (
-                self._event(Kind.INTERRUPT, execution, ended=(self._ending(execution, state),)),
-                _with(managers, execution, ended),
-            )
-        step = semantics.start(self._skillset, situation, Running(str(execution.leaf), name))
-        refused = next((one for one in step.happenings if isinstance(one, Entered) and one.state is ExecutionState.NOT_READY), None)
-        if refused is not None:
-            yield self._refused(managers, execution, ExecutionState.NOT_READY.value, refused.result)
-        else:
-            yield self._event(Kind.START, execution, step), self._after(managers, step)
-        for precondition in self.model.skill(name).preconditions:
-            if any(data_of(precondition.condition)) and judge(precondition.condition, situation.states, {}) is not True:
-                yield self._refused(managers, execution, ExecutionState.NOT_READY.value, precondition.name, failure=True)
-        if self._failures.refusals and skill.inputs:
-            yield self._refused(managers, execution, NOT_VALIDATED, "", failure=True)
+        preconditions = {one.name: one.condition for one in self.model.skill(name).preconditions}
+        for stimulus in self._possible.of_request(situation, Running(str(execution.leaf), name)):
+            match stimulus.cause:
+                case Cause.INTERRUPT if execution.asked:
+                    ended = (self._ending(execution, INTERRUPTED),)
+                    yield (
+                        self._event(Kind.INTERRUPT, execution, ended=ended),
+                        _with(managers, execution, self._ended(execution, INTERRUPTED)),
+                    )
+                case Cause.REJECT if self._failures.refusals and self.model.skill(name).inputs:
+                    yield self._refused(managers, execution, NOT_VALIDATED, "", failure=True)
+                case Cause.REFUSE:
+                    failure = judge(preconditions[stimulus.name], situation.states, NO_DATA) is not False
+                    yield self._refused(managers, execution, NOT_READY, stimulus.name, failure=failure)
+                case Cause.START:
+                    yield self._started(managers, situation, execution, stimulus)
+
+    def _started(self, managers: Managers, situation: Situation, execution: Execution, stimulus: Stimulus) -> tuple[Event, Managers]:
+        step = take(self._skillset, situation, stimulus)
+        if any(isinstance(one, Entered) and one.state is ExecutionState.NOT_READY for one in step.happenings):
+            return self._refused(managers, execution, NOT_READY, "")  # its effect is no transition
+        return self._event(Kind.START, execution, step), self._after(managers, step)
 
     def _refused(
         self, managers: Managers, execution: Execution, state: str, result: str, *, failure: bool = False
@@ -135,25 +132,23 @@ class ManagersSteps:
         return event, _with(managers, execution, ended)
 
     def _ends(self, managers: Managers, situation: Situation, execution: Execution) -> Iterator[tuple[Event, Managers]]:
-        running = Running(str(execution.leaf), self.skills[execution.leaf])
-        skill = self._skillset.skill(running.skill)
-        for result in skill.results:
-            step = semantics.terminate(self._skillset, situation, running, result.name)
-            failure = skill.kind_of(result.name) is not ResultKind.SUCCESS
-            yield self._event(Kind.RESULT, execution, step, result=result.name, failure=failure), self._after(managers, step)
-        if execution.asked:
-            step = semantics.interrupt(self._skillset, situation, running)
-            yield self._event(Kind.INTERRUPT, execution, step), self._after(managers, step)
-        for breaker in self._breakers.get(skill.name, ()):
-            if judge(breaker.when, situation.states, {}) is True:
-                step = semantics.lose(self._skillset, situation, running, breaker.invariant)
-                yield self._event(Kind.BREAK, execution, step, result=breaker.invariant, failure=True), self._after(managers, step)
-        if self._failures.hooks:
-            step = semantics.fail(self._skillset, situation, running, "")
-            yield self._event(Kind.FAIL, execution, step, failure=True), self._after(managers, step)
-        if self._failures.pauses and not execution.asked:
-            step = semantics.interrupt(self._skillset, situation, running)
-            yield self._event(Kind.PAUSE, execution, step, failure=True), self._after(managers, step)
+        skill = self._skillset.skill(self.skills[execution.leaf])
+        for stimulus in self._possible.of_running(situation, Running(str(execution.leaf), skill.name)):
+            kind = self._kind_of_end(stimulus, execution)
+            if kind is not None:
+                step = take(self._skillset, situation, stimulus)
+                failure = kind is not Kind.INTERRUPT and (kind is not Kind.RESULT or skill.kind_of(stimulus.name) is not ResultKind.SUCCESS)
+                yield self._event(kind, execution, step, result=stimulus.name, failure=failure), self._after(managers, step)
+
+    def _kind_of_end(self, stimulus: Stimulus, execution: Execution) -> Kind | None:
+        """Return what such an end of an execution is called, None where it is not looked at."""
+        match stimulus.cause:
+            case Cause.INTERRUPT if not execution.asked:
+                return Kind.PAUSE if self._failures.pauses else None
+            case Cause.FAIL if not self._failures.hooks:
+                return None
+            case cause:
+                return _ENDS[cause]
 
     def _death(self, managers: Managers) -> tuple[Event, Managers]:
         state = ExecutionState.FAILED.value
@@ -161,20 +156,19 @@ class ManagersSteps:
         ended = tuple(self._ending(one, state) for one in managers.executions if one.phase != ENDED)
         return Event(Kind.DIE, self.model.name, failure=True, ended=ended), Managers(None, _ordered(known))
 
-    def _extern(self, managers: Managers, situation: Situation) -> Iterator[tuple[Event, Managers]]:
-        for resource in self._skillset.resources:
-            source = situation.states[resource.name]
-            for target in resource.targets(source, extern=True):
-                step = semantics.transition(self._skillset, situation, resource.name, target)
-                bad = (resource.name, source, target) in self._bad
-                event = Event(Kind.EXTERN, self.model.name, resource.name, target, source=source, failure=bad)
-                yield self._told(event, step), self._after(managers, step)
-
-    def _events(self, managers: Managers, situation: Situation) -> Iterator[tuple[Event, Managers]]:
-        for event in self._skillset.events:
-            if event.effect.assignments and not semantics.event_refusal(self._skillset, situation, event.name):
-                step = semantics.event(self._skillset, situation, event.name)
-                yield self._told(Event(Kind.EVENT, self.model.name, event.name), step), self._after(managers, step)
+    def _outside(self, managers: Managers, situation: Situation) -> Iterator[tuple[Event, Managers]]:
+        for stimulus in self._possible.of_outside(situation):
+            name, target = stimulus.name, stimulus.target
+            if stimulus.cause is Cause.EXTERN:
+                source = situation.states[name]
+                bad = (name, source, target) in self._bad
+                event = Event(Kind.EXTERN, self.model.name, name, target, source=source, failure=bad)
+            elif any(one.name == name and one.effect.assignments for one in self._skillset.events):
+                event = Event(Kind.EVENT, self.model.name, name)
+            else:
+                continue
+            step = take(self._skillset, situation, stimulus)
+            yield self._told(event, step), self._after(managers, step)
 
     # --- values ------------------------------------------------------------------------------------------------------
 
@@ -237,17 +231,4 @@ def _with(managers: Managers, execution: Execution, ended: Execution) -> Manager
     return Managers(managers.states, (*running, *_ordered(others)))
 
 
-def _named(skill: Skill, abstract: Skill) -> Skill:
-    """Return the abstract skill with the preconditions of the skill, each of which some data fulfil."""
-    kept = tuple(
-        replace(one, condition=whatever_the_data(one.condition, unknown=True)) if any(data_of(one.condition)) else one
-        for one in skill.preconditions
-    )
-    return replace(abstract, preconditions=kept)
-
-
-def _breakers_of(abstraction: Abstraction) -> dict[str, list[Breaker]]:
-    found: dict[str, list[Breaker]] = {}
-    for breaker in abstraction.breakers:
-        found.setdefault(breaker.skill, []).append(breaker)
-    return found
+_ENDS = {Cause.RESULT: Kind.RESULT, Cause.INTERRUPT: Kind.INTERRUPT, Cause.FAIL: Kind.FAIL, Cause.BREAK: Kind.BREAK}

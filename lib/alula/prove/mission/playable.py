@@ -13,9 +13,8 @@ from functools import lru_cache
 from alula.model.conditions import data_of
 from alula.model.expressions import And, Expression, Not, ResourceIs
 from alula.model.model import Resource, Skill, Skillset, Transition
-from alula.prove.limits import Deadline
+from alula.model.overapproximation import OverApproximation
 from alula.prove.mission.managers import searched
-from alula.prove.skillset.abstract import Abstraction
 
 AS_WANTED = "as_wanted"
 """Data say what every condition asks for."""
@@ -32,9 +31,9 @@ class Playable:
 @lru_cache(maxsize=32)  # many runs are played of one mission
 def playable(skillset: Skillset) -> Playable:
     """Return a skillset without inputs, outputs and data, and with the arrows that the search counts as extern."""
-    abstraction = searched(skillset, Deadline.after(30.0))
-    against = list(dict.fromkeys(_against(abstraction)))
-    bare = replace(abstraction.skillset, skills=tuple(replace(one, inputs=(), outputs=()) for one in abstraction.skillset.skills))
+    model = searched(skillset)
+    against = list(dict.fromkeys(_against(model)))
+    bare = replace(model.skillset, skills=tuple(replace(one, inputs=(), outputs=()) for one in model.skillset.skills))
     if not against:
         return Playable(bare)
     taken = {*(one.name for one in skillset.resources), *(one.name for one in skillset.data)}
@@ -55,10 +54,10 @@ def refuses(skill: str, precondition: str) -> str:
     return f"refuses_{precondition}_of_{skill}"
 
 
-def _against(abstraction: Abstraction) -> Iterator[str]:
-    for breaker in abstraction.breakers:
+def _against(model: OverApproximation) -> Iterator[str]:
+    for breaker in model.breakers:
         yield breaks(breaker.skill, breaker.invariant)
-    for skill in abstraction.original.skills:
+    for skill in model.original.skills:
         for one in skill.preconditions:
             if any(data_of(one.condition)):
                 yield refuses(skill.name, one.name)

@@ -158,14 +158,14 @@ class _Search:
             _explore(regions)
             return regions, several
 
-        return look_at(lambda why: System.read(self._source, self._models, self._part, LOOKED_AT, deadline, why_any_order=why), look)
+        return look_at(lambda why: System.read(self._source, self._models, self._part, LOOKED_AT, why_any_order=why), look)
 
     def also(self, before: _Seen, deadline: Deadline, given: str) -> _Seen:
         """Look at runs in which hooks raise, managers die, or somebody aborts or pauses the mission; of those, what is new."""
         if before.regions is None or before.bounds:
             return before
         try:
-            regions = Regions(before.regions.system.looking_at(ALSO, deadline), deadline)
+            regions = Regions(before.regions.system.looking_at(ALSO), deadline)
             _explore(regions)
             found = [one for one in findings(regions, Answers(regions)) if one.code in TOLD]
             seen_waiting, complete = _waits(Waits(regions), regions, deadline)

@@ -31,7 +31,6 @@ from alula.missions.skill_types import OUTCOME_PORT
 from alula.missions.world import states_of
 from alula.model.execution_state import ExecutionState
 from alula.model.model import Skillset
-from alula.prove.limits import Deadline
 from alula.prove.mission.ahead import RUNS
 from alula.prove.mission.managers import ENDED, RUNNING, SENT, End, Failures, ManagersSteps
 from alula.prove.mission.measured import Conditions
@@ -51,7 +50,6 @@ from alula.trees.palette import Direction, NodeType, Port, name_in_files
 from alula.trees.reading import TreeFiles, type_name
 from alula.trees.source import TreeSource, source_of
 
-_GIVEN_S = 30.0
 T = TypeVar("T")
 TERMINATED, FAILED = ExecutionState.TERMINATED.value, ExecutionState.FAILED.value
 
@@ -59,9 +57,7 @@ TERMINATED, FAILED = ExecutionState.TERMINATED.value, ExecutionState.FAILED.valu
 class System:
     """All runs of a mission. ``skillsets`` are those that its trees name, in the models' order."""
 
-    def __init__(
-        self, ticker: Ticker, body: Body, skillsets: Sequence[Skillset], failures: Failures, deadline: Deadline, own: OwnNodes
-    ) -> None:
+    def __init__(self, ticker: Ticker, body: Body, skillsets: Sequence[Skillset], failures: Failures, own: OwnNodes) -> None:
         self.skillsets = tuple(skillsets)
         self.own = own
         self.failures = failures
@@ -70,7 +66,7 @@ class System:
         self.leaves = tuple(ticker.leaves)
         """The leaves that are skills, by the numbers that executions and events have them by."""
         self.nodes: tuple[Node, ...] = tuple(ticker.nodes)
-        self._steps = [ManagersSteps(one, self._skills_of(one), failures, deadline, self.told_end) for one in skillsets]
+        self._steps = [ManagersSteps(one, self._skills_of(one), failures, self.told_end) for one in skillsets]
         self.reads = body.read
         """What the trees decide by."""
         self._place = {one.name: number for number, one in enumerate(skillsets)}
@@ -85,7 +81,6 @@ class System:
         models: Sequence[Skillset],
         part: MissionPart,
         failures: Failures = Failures(),  # noqa: B008 - a value
-        deadline: Deadline | None = None,
         few: int = FEW,
         known: Inputs | None = None,
         why_any_order: str = "",
@@ -123,14 +118,14 @@ class System:
         board.pending = Waits(robot, [one.name for one in skillsets], ticker.leaves)
         for number, node in enumerate(ticker.leaves):
             node.leaf.with_inputs(_Starting(robot, number))
-        return cls(ticker, body, skillsets, failures, deadline or Deadline.after(_GIVEN_S), own)
+        return cls(ticker, body, skillsets, failures, own)
 
-    def looking_at(self, failures: Failures, deadline: Deadline) -> System:
+    def looking_at(self, failures: Failures) -> System:
         """Return the same mission with other failures: what is known of its ticks, and the numbers, hold for both."""
         other = copy.copy(self)
         other.failures = failures
         other._steps = [  # noqa: SLF001 - the same class
-            ManagersSteps(one, self._skills_of(one), failures, deadline, self.told_end) for one in self.skillsets
+            ManagersSteps(one, self._skills_of(one), failures, self.told_end) for one in self.skillsets
         ]
         other._moves = {}  # noqa: SLF001 - the same class
         return other

@@ -1,9 +1,6 @@
-"""A skillset without data and without clocks, for the search: what data or time decide may go either way.
+"""The over-approximation that proofs search, where a solver tells what some data fulfil together.
 
-A precondition becomes what it asks of resources, if some data fulfil the rest. An invariant over data, or one with
-a ``hold``, becomes what it asks at once of resources alone, whatever the data; that data (also the lack of a fresh
-value) or time may break it all the same for an execution is a step of its own, a ``Breaker``. A progress deadline ends an
-execution as an interruption does, so it adds no step. Every run of the skillset is a run of this one.
+The preconditions of a skill become what they ask of resources if some data fulfil the rest of all of them at once.
 """
 
 from __future__ import annotations
@@ -12,53 +9,39 @@ from collections.abc import Callable, Iterator, Mapping
 from dataclasses import dataclass, replace
 
 from alula.language.outside import Arrow
-from alula.model.conditions import whatever_the_data
+from alula.model.deadlines import waits
 from alula.model.expressions import TRUE, And, Atom, Constant, DataIs, Expression, Implies, Not, Or, ResourceIs, atoms
-from alula.model.model import Event, Invariant, Precondition, Skill, Skillset
+from alula.model.model import Invariant, Precondition, Skill, Skillset
+from alula.model.overapproximation import Breaker, OverApproximation, at_once, over_approximate
 from alula.prove.limits import Deadline
 from alula.prove.skillset.solver import Solver
 
 
 @dataclass(frozen=True)
-class Breaker:
-    """Data or time may break this invariant of an execution in every situation that fulfils ``when``."""
+class Abstraction(OverApproximation):
+    """The over-approximation of a skillset, as exact as a solver can tell what some data fulfil.
 
-    skill: str
-    invariant: str
-    when: Expression
-
-
-@dataclass(frozen=True)
-class Abstraction:
-    """The skillset over resources alone, and what else can happen in it.
-
-    ``births`` tell when an invariant over data may be false right after the start: ``when`` is asked before it. ``original`` is
-    the skillset with its data, ``outside`` are the arrows (resource, source, target) that nothing in the model takes.
+    ``births`` tell when an invariant over data may be false right after the start: ``when`` is asked before it. ``outside`` are the
+    arrows (resource, source, target) that nothing in the model takes.
     """
 
-    skillset: Skillset
-    original: Skillset
     solver: Solver
-    breakers: tuple[Breaker, ...] = ()
     births: tuple[Breaker, ...] = ()
     outside: frozenset[Arrow] = frozenset()
 
 
 def without_data(skillset: Skillset, deadline: Deadline, outside: frozenset[Arrow] = frozenset()) -> Abstraction:
-    """Return the skillset for the search."""
+    """Return the skillset for the search; the preconditions of a skill are one."""
     solver = Solver(skillset, deadline)
     possibly = _Possibly(solver)
-    skills = tuple(_skill(skill, possibly) for skill in skillset.skills)
-    events = tuple(_event(event, possibly) for event in skillset.events)
-    undecided = [(skill, one) for skill in skillset.skills for one in skill.invariants if not _at_once(one)]
-    breakers = [Breaker(skill.name, one.name, Not(whatever_the_data(one.condition, unknown=False))) for skill, one in undecided]
-    births = [Breaker(skill.name, one.name, _at_birth(skill, one, possibly)) for skill, one in undecided if not _timed(one)]
-    resources = replace(skillset, skills=skills, events=events)
-    return Abstraction(resources, skillset, solver, tuple(breakers), tuple(births), outside)
-
-
-def _timed(invariant: Invariant) -> bool:
-    return invariant.hold is not None and invariant.hold.for_s > 0
+    model = over_approximate(skillset)
+    skills = tuple(
+        replace(one, preconditions=_asked(skill, possibly)) for skill, one in zip(skillset.skills, model.skillset.skills, strict=True)
+    )
+    events = tuple(replace(event, guard=possibly(event.guard)) for event in skillset.events)
+    undecided = [(skill, one) for skill in skillset.skills for one in skill.invariants if not at_once(one) and not waits(one)]
+    births = tuple(Breaker(skill.name, one.name, _at_birth(skill, one, possibly)) for skill, one in undecided)
+    return Abstraction(replace(skillset, skills=skills, events=events), skillset, model.breakers, solver, births, outside)
 
 
 def _at_birth(skill: Skill, invariant: Invariant, possibly: _Possibly) -> Expression:
@@ -74,26 +57,9 @@ def _after(atom: Atom, after: Mapping[str, str]) -> Expression:
     return atom
 
 
-def _at_once(invariant: Invariant) -> bool:
-    return not _timed(invariant) and not any(isinstance(atom, DataIs) for atom in atoms(invariant.condition))
-
-
-def _skill(skill: Skill, possibly: _Possibly) -> Skill:
+def _asked(skill: Skill, possibly: _Possibly) -> tuple[Precondition, ...]:
     asked = conjunction(precondition.condition for precondition in skill.preconditions)
-    preconditions = (Precondition("preconditions", possibly(asked)),) if skill.preconditions else ()
-    invariants = tuple(map(_invariant, skill.invariants))
-    return replace(skill, preconditions=preconditions, invariants=invariants)
-
-
-def _invariant(invariant: Invariant) -> Invariant:
-    if _at_once(invariant):
-        return invariant
-    condition = TRUE if _timed(invariant) else whatever_the_data(invariant.condition, unknown=True)
-    return replace(invariant, condition=condition, hold=None)
-
-
-def _event(event: Event, possibly: _Possibly) -> Event:
-    return replace(event, guard=possibly(event.guard))
+    return (Precondition("preconditions", possibly(asked)),) if skill.preconditions else ()
 
 
 def conjunction(conditions: Iterator[Expression]) -> Expression:

@@ -48,7 +48,7 @@ def move_of(graph: Graph, edge: Edge) -> Move:
     """Take the step of an edge again, for its details."""
     target = graph.states[edge.target]
     for move in graph.world.moves(graph.states[edge.source]):
-        if move.target == target and move.kind == edge.kind and move.subject == edge.subject and move.step is not None:
+        if move.target == target and move.kind is edge.kind and move.subject == edge.subject and move.step is not None:
             return move
     raise LookupError(edge)
 

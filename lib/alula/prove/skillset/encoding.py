@@ -1,6 +1,6 @@
 """Encodes a skillset's steps as diagrams (see ``diagrams``).
 
-The steps say the same as ``alula.model.semantics``; the tests hold them against it. In one thing sets are wider:
+The steps are those of ``alula.model.steps``, as updates of sets; the tests hold them against it. In one thing sets are wider:
 executions that one change breaks take effect in any order here, in the order of their start there, so that what is proved for
 sets holds, and a counterexample is walked again step by step.
 """
@@ -15,9 +15,12 @@ from dd import cudd
 
 from alula.model.expressions import Expression, ResourceIs, atoms
 from alula.model.model import Effect, Event, Resource, Skill, Skillset
+from alula.model.overapproximation import Breaker
+from alula.model.steps import Cause, ends_of
 from alula.prove.limits import Deadline
-from alula.prove.skillset.abstract import Abstraction, Breaker
+from alula.prove.skillset.abstract import Abstraction
 from alula.prove.skillset.diagrams import ENDED, Encoded, Update, Within, bits, broken_name, runs_name
+from alula.prove.skillset.local import end_key
 
 
 def encode(abstraction: Abstraction, copies: int, deadline: Deadline) -> Encoded:
@@ -150,16 +153,13 @@ def _starts(model: Encoded, skill: Skill) -> None:
 
 
 def _ends(model: Encoded, skill: Skill) -> None:
-    running, stop = model.runs(skill.name), skill.interrupt
-    stops = model.applies(stop.effect)
-    key: tuple[str, ...] = ("interrupt", skill.name)
-    _end_faults(model, key, running, stop.effect, stops, stop.postcondition)
-    model.steps += [update for update, _ in _ending(model, skill, running, stop.effect, stops)]
-    # An end whose effect does not apply is a failure, which does what an interruption does: that step is there already.
-    for result in skill.results:
-        applies = model.applies(result.effect)
-        _end_faults(model, ("result", skill.name, result.name), running, result.effect, applies, result.postcondition)
-        model.steps += [update for update, _ in _ending(model, skill, running & applies, result.effect, applies)]
+    running = model.runs(skill.name)
+    for end in ends_of(skill):
+        applies = model.applies(end.effect)
+        _end_faults(model, end_key(skill.name, end.name), running, end.effect, applies, end.postcondition)
+        # An end whose effect does not apply is a failure, which does what an interruption does.
+        guard = running if end.cause is Cause.INTERRUPT else running & applies
+        model.steps += [update for update, _ in _ending(model, skill, guard, end.effect, applies)]
 
 
 def _breaks(model: Encoded, breaker: Breaker) -> None:

@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections import deque
 from dataclasses import dataclass, field
 
+from alula.language.counterexamples import StepKind
 from alula.prove.limits import Deadline
 from alula.prove.skillset.steps import Key, Move, State, World
 
@@ -15,7 +16,7 @@ class Edge:
 
     source: int
     target: int
-    kind: str
+    kind: StepKind
     subject: tuple[str, ...]
     ended: tuple[str, ...]
 
@@ -64,7 +65,7 @@ def explore(world: World, deadline: Deadline, *, most: int) -> Graph:
                 graph.faults.setdefault(fault, (number, move))
             if move.step is None:
                 continue
-            if move.kind == "start":
+            if move.kind is StepKind.START:
                 graph.started[move.subject[0]].add(number)
             fresh = move.target not in graph.numbers
             target = _number(graph, move.target, (number, move)) if fresh else graph.numbers[move.target]

@@ -10,13 +10,14 @@ from __future__ import annotations
 from collections.abc import Iterable, Iterator
 
 from alula.language.errors import Diagnostic
+from alula.model.effects import effects_of
 from alula.model.expressions import Expression, ResourceIs, SkillRuns, atoms
 from alula.model.model import Effect, Property, Skill, Skillset
 from alula.prove.limits import Deadline, OutOfTimeError
 from alula.prove.skillset.abstract import Abstraction
 from alula.prove.skillset.explore import Graph, explore
 from alula.prove.skillset.properties import check_property
-from alula.prove.skillset.steps import Part, World, effects_of
+from alula.prove.skillset.steps import Part, World
 
 MOST = 3000
 """Situations that are looked at with each number of skills."""

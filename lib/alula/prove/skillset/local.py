@@ -15,7 +15,7 @@ from typing import Any
 from alula.language.errors import Diagnostic, Severity
 from alula.model.conditions import whatever_the_data
 from alula.model.expressions import TRUE, DataIs, Expression, ResourceIs, atoms
-from alula.model.model import NO_EFFECT, Effect, Event, Invariant, Result, ResultKind, Skill, Skillset
+from alula.model.model import NO_EFFECT, Effect, Event, Invariant, ResultKind, Skill, Skillset
 from alula.model.span import NOWHERE, Span
 from alula.prove.limits import Deadline
 from alula.prove.skillset.solver import Solver
@@ -93,11 +93,11 @@ class _Checks:
         """ALU511 to ALU516; what is neither a success nor a failure counts as a success."""
         interrupt = skill.interrupt
         where, span = f"the interruption of `{skill.name}`", interrupt.span if interrupt.span.line else skill.span
-        self._end(skill, where, interrupt.effect, interrupt.postcondition, span, "ALU511", ("interrupt", skill.name))
+        self._end(skill, where, interrupt.effect, interrupt.postcondition, span, "ALU511", end_key(skill.name, ""))
         for result in skill.results:
             code = "ALU515" if skill.kind_of(result.name) is ResultKind.FAILURE else "ALU513"
             where = f"{_KIND[result.kind]} `{result.name}` of `{skill.name}`"
-            self._end(skill, where, result.effect, result.postcondition, result.span, code, _key(skill, result))
+            self._end(skill, where, result.effect, result.postcondition, result.span, code, end_key(skill.name, result.name))
 
     # --- parts ----------------------------------------------------------------------------------------------------
 
@@ -203,8 +203,9 @@ class _Checks:
 _KIND = {ResultKind.PLAIN: "result", ResultKind.SUCCESS: "success", ResultKind.FAILURE: "failure"}
 
 
-def _key(skill: Skill, result: Result) -> tuple[str, ...]:
-    return ("result", skill.name, result.name)
+def end_key(skill: str, result: str) -> tuple[str, ...]:
+    """Return what suspects and the search call the end of a skill with a result, or (``""``) by its interruption."""
+    return ("result", skill, result) if result else ("interrupt", skill)
 
 
 def _data_of(conditions: Sequence[Expression]) -> set[str]:
@@ -229,10 +230,10 @@ def keys(skillset: Skillset) -> Iterator[tuple[str, ...]]:
     for skill in skillset.skills:
         parts: list[tuple[tuple[str, ...], Effect]] = [
             (("start", skill.name), skill.start),
-            (("interrupt", skill.name), skill.interrupt.effect),
+            (end_key(skill.name, ""), skill.interrupt.effect),
         ]
         parts += [(("invariant", skill.name, one.name), one.effect) for one in skill.invariants]
-        parts += [(_key(skill, result), result.effect) for result in skill.results]
+        parts += [(end_key(skill.name, result.name), result.effect) for result in skill.results]
         for key, effect in parts:
             if effect.assignments:
                 yield ("effect", *key)

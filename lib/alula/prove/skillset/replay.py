@@ -24,19 +24,10 @@ from alula.model.execution_state import ExecutionState
 from alula.model.expressions import Expression, Not
 from alula.model.model import Invariant, Skill
 from alula.model.situation import Change, Entered, Running, Situation, Step
+from alula.model.steps import take
 from alula.prove.skillset import words
 from alula.prove.skillset.steps import Key, Move, State, World
 from alula.prove.skillset.witness import States, Wish, Witness, data_atoms, fallen
-
-_KINDS: Mapping[str, StepKind] = {
-    "extern": StepKind.EXTERN,
-    "outside": StepKind.OUTSIDE,
-    "event": StepKind.EVENT,
-    "start": StepKind.START,
-    "terminate": StepKind.RESULT,
-    "interrupt": StepKind.INTERRUPT,
-    "data": StepKind.BREAK,
-}
 
 
 class _NoValuesError(Exception):
@@ -68,7 +59,7 @@ class Replay:
     def take(self, move: Move, fault: Key = (), *, loop: bool = False) -> None:
         """Take a step; ``fault`` is what the last one is to show, if anything."""
         begun, situation, values = len(self.steps), self._situation, self._values
-        if move.kind == "start" and move.step is not None:
+        if move.kind is StepKind.START and move.step is not None:
             self._numbers[move.subject[0]] += 1
         names = self._names(move)
         try:
@@ -87,7 +78,7 @@ class Replay:
     def _names(self, move: Move) -> dict[str, Running]:
         """Return each execution by the name that the search gives it in this step."""
         names = {str(place): execution for place, execution in enumerate(self._running, 1)}
-        if move.kind == "start":
+        if move.kind is StepKind.START:
             skill = move.subject[0]
             number = self._numbers[skill] + (1 if move.step is None else 0)
             names["new"] = Running(f"{skill}-{number}", skill)
@@ -105,7 +96,7 @@ class Replay:
     def _take_with_data(self, move: Move, names: Mapping[str, Running], fault: Key) -> None:
         if not self._with_data:
             raise _NoValuesError
-        if move.kind == "data":
+        if move.kind is StepKind.BREAK:
             self._break(move, names)
             if self._differs(move, self._situation):
                 raise _NoValuesError
@@ -126,18 +117,9 @@ class Replay:
         self._situation = step.situation
 
     def _step(self, move: Move, names: Mapping[str, Running]) -> Step:
-        skillset, situation = self._skillset, self._situation
-        match move.kind:
-            case "extern" | "outside":
-                return semantics.transition(skillset, situation, *move.subject)
-            case "event":
-                return semantics.event(skillset, situation, move.subject[0])
-            case "start":
-                return semantics.start(skillset, situation, names["new"])
-            case "terminate":
-                return semantics.terminate(skillset, situation, names[move.execution], move.subject[1])
-            case _:
-                return semantics.interrupt(skillset, situation, names[move.execution])
+        stimulus = move.stimulus
+        acting = names.get(stimulus.execution.id, stimulus.execution)
+        return take(self._skillset, self._situation, stimulus._replace(execution=acting))
 
     def _differs(self, move: Move, situation: Situation) -> bool:
         states = self._world.situation(move.target).states
@@ -225,7 +207,7 @@ class Replay:
 
     def _ready(self, move: Move) -> list[Wish]:
         """Return the preconditions over data of a skill that starts."""
-        if move.kind != "start":
+        if move.kind is not StepKind.START:
             return []
         conditions = [precondition.condition for precondition in self._skill(move).preconditions]
         return [Wish(condition, self._states) for condition in conditions if data_atoms([condition])]
@@ -267,17 +249,17 @@ class Replay:
 
     def _take_as_searched(self, move: Move, names: Mapping[str, Running]) -> None:
         step = None if move.step is None else _renamed(move.step, names)
-        if move.kind == "data" and step is not None:
+        if move.kind is StepKind.BREAK and step is not None:
             self._add(StepKind.BREAK, words.broken(move, step, self._name), subject=move.subject, step=step)
         else:
             self._tell(move, step, names)
 
     def _tell(self, move: Move, step: Step | None, names: Mapping[str, Running]) -> None:
-        acting = names.get("new" if move.kind == "start" else move.execution)
+        acting = names.get(move.stimulus.execution.id)
         called = "" if acting is None else self._name(acting)
         text = words.told(move, step, self._name, called)
         execution = None if acting is None else self._execution(acting)
-        self._add(_KINDS[move.kind], text, subject=move.subject, step=step, execution=execution, refused=step is None)
+        self._add(move.kind, text, subject=move.subject, step=step, execution=execution, refused=step is None)
 
     def _add(
         self,

@@ -1,4 +1,4 @@
-"""All steps out of a situation, each taken by ``alula.model.semantics``, which the managers execute.
+"""The steps of ``alula.model.steps`` between the states of a search, and the faults that they show.
 
 A situation is kept as small as its future needs: the states of the resources and the names of the running skills.
 Executions of one skill differ in nothing but their age. The order of the start decides in which order violations take
@@ -8,16 +8,19 @@ effect; skills whose violations change nothing are therefore kept sorted by name
 from __future__ import annotations
 
 from collections.abc import Iterator, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
+from alula.language.counterexamples import StepKind
 from alula.model import semantics
 from alula.model.conditions import holds
-from alula.model.effects import effect_changes
+from alula.model.effects import effect_changes, effects_of
 from alula.model.errors import EffectError
 from alula.model.execution_state import ExecutionState
-from alula.model.model import Effect, Skill, Skillset
+from alula.model.model import Effect, Event, Skill, Skillset
 from alula.model.situation import Entered, Running, Situation, Step
-from alula.prove.skillset.abstract import Abstraction, Breaker
+from alula.model.steps import Cause, PossibleSteps, Stimulus, ends_of, take
+from alula.prove.skillset.abstract import Abstraction
+from alula.prove.skillset.local import end_key
 
 Key = tuple[str, ...]
 """What fails: ``("effect" | "post", kind, names...)`` or ``("after start", skill, invariant)``, as in ``local.Suspect``."""
@@ -33,16 +36,18 @@ class State:
 
 @dataclass(frozen=True)
 class Move:
-    """A step to ``target``. ``kind`` and ``subject`` say what asked for it; ``ended`` names the skills that it ended."""
+    """A step to ``target``; without a ``step``, what ``stimulus`` asks for is refused.
 
-    kind: str
+    ``kind`` and ``subject`` say what asked for it, whichever execution it is about; ``ended`` names the skills that it ended.
+    """
+
+    kind: StepKind
     subject: tuple[str, ...]
     target: State
+    stimulus: Stimulus
     ended: tuple[str, ...] = ()
     faults: tuple[Key, ...] = ()
     step: Step | None = None
-    execution: str = ""
-    """The execution that starts, ends or breaks, as ``step`` calls it."""
 
 
 @dataclass(frozen=True)
@@ -66,7 +71,12 @@ class World:
         self.copies = copies
         self.crowded: set[str] = set()
         """Skills of which more executions could have started than are looked at, and would have mattered."""
-        self._breakers = abstraction.breakers
+        self._possible = PossibleSteps(abstraction)
+        self._effects = {
+            (end.cause, skill.name, end.name): (skill, end.effect, end_key(skill.name, end.name))
+            for skill in self.skillset.skills
+            for end in ends_of(skill)
+        }
         self._births = abstraction.births
         self._startable = [s for s in self.skillset.skills if part is None or s.name in part.skills]
         self._changing = [r for r in self.skillset.resources if part is None or r.name in part.resources]
@@ -101,87 +111,63 @@ class World:
     def moves(self, state: State) -> Iterator[Move]:
         """Yield every step out of a state, also those that change nothing but show a fault."""
         situation = self.situation(state)
-        yield from self._extern(situation)
-        yield from self._events(situation)
-        yield from self._starts(situation)
-        yield from self._ends(situation)
-        yield from self._breaks(situation)
-
-    def _extern(self, situation: Situation) -> Iterator[Move]:
         for resource in self._changing:
-            source = situation.states[resource.name]
-            for target in resource.targets(source, extern=True):
-                step = semantics.transition(self.skillset, situation, resource.name, target)
-                yield self._move(self._taker(resource.name, source, target), (resource.name, target), step)
-
-    def _events(self, situation: Situation) -> Iterator[Move]:
+            for stimulus in self._possible.of_resource(situation, resource):
+                yield self._move(situation, stimulus)
         for event in self._happening:
-            if not holds(event.guard, situation.states, {}):
-                continue
-            if semantics.event_refusal(self.skillset, situation, event.name):
-                yield Move("event", (event.name,), self.state(situation), faults=(("effect", "event", event.name),))
-            elif event.effect.assignments:
-                yield self._move("event", (event.name,), semantics.event(self.skillset, situation, event.name))
-
-    def _starts(self, situation: Situation) -> Iterator[Move]:
-        counts = [execution.skill for execution in situation.running]
+            yield from self._event(situation, event)
         for skill in self._startable:
-            if next(semantics.unmet_preconditions(skill, situation.states, {}), None) is not None:
-                continue
+            yield from self._start(situation, skill)
+        yield from self._ends(situation)
+
+    def _event(self, situation: Situation, event: Event) -> Iterator[Move]:
+        stimulus = Stimulus(Cause.EVENT, event.name)
+        if event.effect.assignments and stimulus in self._possible.of_event(situation, event.name):
+            yield self._move(situation, stimulus)
+        elif event.effect.assignments and holds(event.guard, situation.states, {}):
+            yield self._fault(situation, stimulus, ("effect", "event", event.name))
+
+    def _start(self, situation: Situation, skill: Skill) -> Iterator[Move]:
+        for stimulus in self._possible.of_start(situation, Running("new", skill.name)):
             if self._fails(skill, skill.start, situation):
-                yield Move("start", (skill.name,), self.state(situation), faults=(("effect", "start", skill.name),))
-                continue
-            if counts.count(skill.name) >= self.copies:
+                yield self._fault(situation, stimulus, ("effect", "start", skill.name))
+            elif sum(one.skill == skill.name for one in situation.running) >= self.copies:
                 # One more that changes nothing adds nothing that the others do not show.
                 self.crowded |= {skill.name} - self.idle
-                continue
-            step = semantics.start(self.skillset, situation, Running("new", skill.name))
-            faults = (*self._broken_at_birth(skill, step), *self._broken_by_data(skill, situation))
-            yield self._move("start", (skill.name,), step, faults, "new")
+            else:
+                move = self._move(situation, stimulus)
+                faults = (*self._broken_at_birth(skill, move.step), *self._broken_by_data(skill, situation))
+                yield replace(move, faults=(*faults, *move.faults)) if faults else move
 
     def _ends(self, situation: Situation) -> Iterator[Move]:
-        seen: set[tuple[State, tuple[str, ...]]] = set()
+        """Yield how executions end; a failure does what an interruption does."""
+        seen: set[tuple[State, Cause, tuple[str, ...]]] = set()
         for execution in situation.running:
-            for move in self._ends_of(situation, execution):
-                if (move.target, move.subject) not in seen:
-                    seen.add((move.target, move.subject))
-                    yield move
+            for stimulus in self._possible.of_running(situation, execution):
+                if stimulus.cause is not Cause.FAIL:
+                    move = self._move(situation, stimulus)
+                    identity = move.target, stimulus.cause, move.subject
+                    if identity not in seen:
+                        seen.add(identity)
+                        yield move
 
-    def _ends_of(self, situation: Situation, execution: Running) -> Iterator[Move]:
-        skill = self.skillset.skill(execution.skill)
-        for result in skill.results:
-            key: Key = ("result", skill.name, result.name)
-            step = semantics.terminate(self.skillset, situation, execution, result.name)
-            faults = self._end_faults(skill, result.effect, key, situation, step, execution)
-            yield self._move("terminate", (skill.name, result.name), step, faults, execution.id)
-        key = ("interrupt", skill.name)
-        step = semantics.interrupt(self.skillset, situation, execution)
-        faults = self._end_faults(skill, skill.interrupt.effect, key, situation, step, execution)
-        yield self._move("interrupt", (skill.name,), step, faults, execution.id)
+    def _move(self, situation: Situation, stimulus: Stimulus) -> Move:
+        step = take(self.skillset, situation, stimulus)
+        ended = tuple(h.execution.skill for h in step.happenings if isinstance(h, Entered) and h.state is not ExecutionState.RUNNING)
+        faults = (*self._end_faults(situation, stimulus, step), *self._violation_faults(step))
+        return Move(self._kind(situation, stimulus), _subject(stimulus), self.state(step.situation), stimulus, ended, faults, step)
 
-    def _breaks(self, situation: Situation) -> Iterator[Move]:
-        seen: set[tuple[State, str, str]] = set()
-        for breaker in self._breakers:
-            for execution in situation.running:
-                if execution.skill != breaker.skill or not holds(breaker.when, situation.states, {}):
-                    continue
-                step = self._lost(situation, execution, breaker)
-                move = self._move("data", (breaker.skill, breaker.invariant), step, execution=execution.id)
-                if (move.target, *move.subject) not in seen:
-                    seen.add((move.target, breaker.skill, breaker.invariant))
-                    yield move
-
-    def _lost(self, situation: Situation, execution: Running, breaker: Breaker) -> Step:
-        return semantics.lose(self.skillset, situation, execution, breaker.invariant)
+    def _kind(self, situation: Situation, stimulus: Stimulus) -> StepKind:
+        if stimulus.cause is Cause.EXTERN and self.abstraction.outside:
+            arrow = stimulus.name, situation.states[stimulus.name], stimulus.target
+            return StepKind.OUTSIDE if arrow in self.abstraction.outside else StepKind.EXTERN
+        return _KINDS[stimulus.cause]
 
     # --- faults ---------------------------------------------------------------------------------------------------
 
-    def _taker(self, resource: str, source: str, target: str) -> str:
-        return "outside" if (resource, source, target) in self.abstraction.outside else "extern"
-
-    def _move(self, kind: str, subject: tuple[str, ...], step: Step, faults: tuple[Key, ...] = (), execution: str = "") -> Move:
-        ended = tuple(h.execution.skill for h in step.happenings if isinstance(h, Entered) and h.state is not ExecutionState.RUNNING)
-        return Move(kind, subject, self.state(step.situation), ended, (*faults, *self._violation_faults(step)), step, execution)
+    def _fault(self, situation: Situation, stimulus: Stimulus, fault: Key) -> Move:
+        """Return that what is asked for is refused, because its effect is no transition."""
+        return Move(_KINDS[stimulus.cause], _subject(stimulus), self.state(situation), stimulus, faults=(fault,))
 
     def _fails(self, skill: Skill, effect: Effect, situation: Situation) -> bool:
         try:
@@ -190,10 +176,14 @@ class World:
             return True
         return False
 
-    def _end_faults(self, skill: Skill, effect: Effect, key: Key, situation: Situation, step: Step, execution: Running) -> tuple[Key, ...]:
+    def _end_faults(self, situation: Situation, stimulus: Stimulus, step: Step) -> tuple[Key, ...]:
+        end = self._effects.get((stimulus.cause, stimulus.execution.skill, stimulus.name))
+        if end is None:
+            return ()
+        skill, effect, key = end
         if self._fails(skill, effect, situation):
             return (("effect", *key),)
-        entered = next(h for h in step.happenings if isinstance(h, Entered) and h.execution == execution)
+        entered = next(h for h in step.happenings if isinstance(h, Entered) and h.execution == stimulus.execution)
         return (("post", *key),) if entered.state is ExecutionState.FAILED else ()
 
     @staticmethod
@@ -203,8 +193,8 @@ class World:
         return tuple(("effect", "invariant", entered.execution.skill, entered.result) for entered in failed)
 
     @staticmethod
-    def _broken_at_birth(skill: Skill, step: Step) -> tuple[Key, ...]:
-        for entered in step.happenings:
+    def _broken_at_birth(skill: Skill, step: Step | None) -> tuple[Key, ...]:
+        for entered in step.happenings if step is not None else ():
             if isinstance(entered, Entered) and entered.execution.id == "new" and entered.state is not ExecutionState.RUNNING:
                 return (("after start", skill.name, entered.result),)
         return ()
@@ -215,11 +205,16 @@ class World:
         return tuple(("after start", skill.name, birth.invariant) for birth in births)
 
 
-def effects_of(skill: Skill) -> Iterator[Effect]:
-    """Yield the effects of a skill: of its start, its interruption, its invariants and its results."""
-    yield skill.start
-    yield skill.interrupt.effect
-    for invariant in skill.invariants:
-        yield invariant.effect
-    for result in skill.results:
-        yield result.effect
+_KINDS = {
+    Cause.EXTERN: StepKind.EXTERN,
+    Cause.EVENT: StepKind.EVENT,
+    Cause.START: StepKind.START,
+    Cause.RESULT: StepKind.RESULT,
+    Cause.INTERRUPT: StepKind.INTERRUPT,
+    Cause.BREAK: StepKind.BREAK,
+}
+"""What counterexamples call the steps of the search."""
+
+
+def _subject(stimulus: Stimulus) -> tuple[str, ...]:
+    return tuple(name for name in (stimulus.execution.skill, stimulus.name, stimulus.target) if name)

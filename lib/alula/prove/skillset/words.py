@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Iterable, Mapping, Sequence
 
-from alula.language.counterexamples import Path, Value
+from alula.language.counterexamples import Path, StepKind, Value
 from alula.model.execution_state import ExecutionState
 from alula.model.situation import Change, Entered, Running, Step
 from alula.prove.skillset.steps import Key, Move
@@ -76,15 +76,15 @@ def listed(changes: Sequence[Change]) -> str:
 
 def _opening(move: Move, acting: str) -> str:
     match move.kind:
-        case "extern":
+        case StepKind.EXTERN:
             return "the functional layer"
-        case "outside":
+        case StepKind.OUTSIDE:
             return "from outside"
-        case "event":
+        case StepKind.EVENT:
             return f"event {move.subject[0]}"
-        case "start":
+        case StepKind.START:
             return f"{acting} {'starts' if move.step is not None else 'is asked for, and its preconditions are true'}"
-        case "terminate":
+        case StepKind.RESULT:
             return f"{acting} ends with {move.subject[1]}"
         case _:
             return f"{acting} is interrupted"
@@ -102,7 +102,7 @@ def _failure(move: Move, step: Step, name: Name, acting: str) -> str:
 
 def _own_end(move: Move, step: Step) -> Entered | None:
     """Return how the execution entered its next state that a request is about."""
-    if move.kind not in {"terminate", "interrupt"}:
+    if move.kind not in {StepKind.RESULT, StepKind.INTERRUPT}:
         return None
     return next((one for one in step.happenings if isinstance(one, Entered)), None)
 

@@ -4,39 +4,13 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from dataclasses import dataclass, field
-from enum import Enum
 
 from alula.model.execution_state import ExecutionState
 from alula.model.situation import Change, Entered, Running, Situation
+from alula.model.steps import Stimulus
 from alula.runtime.core.events import EngineEvent, TransitionEvent
 
 Happening = Change | Entered
-
-
-class Ask(Enum):
-    """What can ask for a step."""
-
-    EXTERN = "{0} is reported {1}"
-    EVENT = "event {0}"
-    REQUEST = "{0} {1} is requested"
-    START = "{0} {1} starts"
-    REFUSE = "{0} {1} is refused"
-    PHASE = "{0} {1} becomes {2}"
-    RESULT = "{0} {1} ends with {2}"
-    INTERRUPTED = "{0} {1} is interrupted"
-    FAIL = "{0} {1} fails"
-    BREAK = "data or time break {2} of {0} {1}"
-
-
-@dataclass(frozen=True)
-class Stimulus:
-    """What has asked for a step: names as the text of ``ask`` wants them."""
-
-    ask: Ask
-    subject: tuple[str, ...]
-
-    def __str__(self) -> str:
-        return self.ask.value.format(*self.subject)
 
 
 @dataclass(frozen=True)

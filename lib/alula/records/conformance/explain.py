@@ -2,22 +2,23 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Mapping, Sequence
 
 from alula.model import semantics
 from alula.model.conditions import NO_DATA, judge
 from alula.model.execution_state import ExecutionState as S
 from alula.model.model import Skillset
 from alula.model.situation import Entered, Running
+from alula.model.steps import PHASES, Cause
 from alula.records.conformance.beliefs import Belief, agrees, told
-from alula.records.conformance.possible import PHASES, PossibleSteps
+from alula.records.conformance.possible import LoggedSteps, Possible
 from alula.runtime.core.events import EngineEvent, ExecutionEvent, TransitionEvent
 
 _SHOWN = 12
 """Steps that are named where many would have been allowed."""
 
 
-def refusal(steps: PossibleSteps, beliefs: Sequence[Belief], ended: Mapping[str, str], event: EngineEvent) -> str:
+def refusal(steps: LoggedSteps, beliefs: Sequence[Belief], ended: Mapping[str, str], event: EngineEvent) -> str:
     """Return why no belief allows an event; ``ended`` has the last state of the executions that have ended."""
     belief = beliefs[0]
     if belief.expected:
@@ -75,7 +76,7 @@ def _refused_state(skillset: Skillset, belief: Belief, execution: Running, event
     return ""
 
 
-def _out_of_step(steps: PossibleSteps, belief: Belief, event: EngineEvent) -> str:
+def _out_of_step(steps: LoggedSteps, belief: Belief, event: EngineEvent) -> str:
     """Say what has to come before, where a step has this event further on; otherwise that no step has it."""
     for step in steps.of(belief, event):
         if any(agrees(event, happening) for happening in step.happenings[1:]):
@@ -83,34 +84,19 @@ def _out_of_step(steps: PossibleSteps, belief: Belief, event: EngineEvent) -> st
     return "no step that the model allows in this situation has it"
 
 
-def allowed(steps: PossibleSteps, beliefs: Sequence[Belief]) -> tuple[str, ...]:
+def allowed(steps: LoggedSteps, beliefs: Sequence[Belief]) -> tuple[str, ...]:
     """Return what would have been allowed, as a reader of the log wants it: the next event of each step."""
     under_way = [told(belief.expected[0]) for belief in beliefs if belief.expected]
     if under_way:
         return tuple(dict.fromkeys(under_way))
     belief = beliefs[0]
-    found = list(dict.fromkeys([*_of_executions(steps, belief), *_extern(steps.skillset, belief), *_events(steps.skillset, belief)]))
+    found = list(dict.fromkeys(_beginning(step) for step in steps.possible(belief) if step.happenings))
     more = [f"and {len(found) - _SHOWN} more"] if len(found) > _SHOWN else []
     return (*found[:_SHOWN], *more, "a request of any skill")
 
 
-def _of_executions(steps: PossibleSteps, belief: Belief) -> Iterator[str]:
-    for execution in belief.open:
-        ended = ExecutionEvent(0, 0, execution.skill, execution.id, S.FAILED, "", "", {}, {})
-        for step in steps.of(belief, ended):
-            if step.happenings:
-                first, what = step.happenings[0], f" ({step.stimulus})"
-                yield told(first) + ("" if isinstance(first, Entered) else what)
-
-
-def _extern(skillset: Skillset, belief: Belief) -> Iterator[str]:
-    for resource in skillset.resources:
-        state = belief.situation.states[resource.name]
-        for target in resource.targets(state, extern=True):
-            yield f"{resource.name} {state} -> {target} ({semantics.EXTERN})"
-
-
-def _events(skillset: Skillset, belief: Belief) -> Iterator[str]:
-    for event in skillset.events:
-        if not semantics.event_refusal(skillset, belief.situation, event.name):
-            yield f"event {event.name}"
+def _beginning(step: Possible) -> str:
+    """Say the first event of a step, and what asks for the step if the event does not say it."""
+    first = step.happenings[0]
+    says_it = isinstance(first, Entered) or step.stimulus.cause in {Cause.EXTERN, Cause.EVENT}
+    return told(first) + ("" if says_it else f" ({step.stimulus})")

@@ -13,7 +13,7 @@ from alula.model import semantics
 from alula.model.model import Skillset
 from alula.records.conformance.beliefs import Belief, after_happening, agrees, event_told, told
 from alula.records.conformance.explain import allowed, refusal
-from alula.records.conformance.possible import PossibleSteps
+from alula.records.conformance.possible import LoggedSteps
 from alula.runtime.core.events import EngineEvent, ExecutionEvent
 
 
@@ -49,7 +49,7 @@ class SkillsetMonitor:
         self.restarts: list[float] = []
         """When the managers were restarted, seconds of mission clock."""
         self.events = 0
-        self._steps = PossibleSteps(skillset)
+        self._steps = LoggedSteps(skillset)
         self._begin()
 
     def _begin(self) -> None:

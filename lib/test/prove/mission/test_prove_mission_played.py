@@ -113,7 +113,7 @@ def test_data_that_break_an_invariant_or_refuse_are_played(tmp_path: Path) -> No
     assert not [one for one in robot.findings if one.code.startswith("ALU0")]
     path = tmp_path / "mission.xml"
     path.write_text(whole(TELLING))
-    system = System.read(path, robot.skillsets, NO_PART, LOOKED_AT, Deadline.after(60.0))
+    system = System.read(path, robot.skillsets, NO_PART, LOOKED_AT)
     regions = Regions(system, Deadline.after(60.0))
     regions.explore()
     rows = {(row.skill, row.end): row for row in Answers(regions).rows}

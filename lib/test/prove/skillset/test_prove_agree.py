@@ -10,6 +10,7 @@ from hypothesis import HealthCheck, given, settings
 from hypothesis import strategies as st
 from prove_models import VALUES, skillsets, sparse_skillsets
 
+from alula.language.counterexamples import StepKind
 from alula.model import semantics
 from alula.model.conditions import holds
 from alula.model.expressions import TRUE, ResourceIs
@@ -161,7 +162,7 @@ class Bench:
                 engine.trigger(event)
             case ("start", skill):
                 engine.request(skill, {})
-            case ("terminate", _, execution, result):
+            case ("result", _, execution, result):
                 engine.terminate(execution, result)
             case ("interrupt", _, execution):
                 engine.interrupt(execution)
@@ -186,7 +187,7 @@ class Bench:
             "start": [(skill.name,) for skill in skillset.skills if running.count(skill.name) < copies],
             "value": [("d", value) for value in (*VALUES, None)] if skillset.data else [],
             "time": [("to the next moment", 0), ("on", 400)] if skillset.data else [],
-            "terminate": [(e.skill, e.id, result.name) for e in self.engine.executions for result in skillset.skill(e.skill).results],
+            "result": [(e.skill, e.id, result.name) for e in self.engine.executions for result in skillset.skill(e.skill).results],
             "interrupt": [(e.skill, e.id) for e in self.engine.executions],
             "fail": [(e.skill, e.id) for e in self.engine.executions],
         }
@@ -198,22 +199,22 @@ class Bench:
 def asked(edge, stimulus):
     """Tell whether the checker's step is what a stimulus asks for; a failure does what an interruption does."""
     kind = {"fail": "interrupt"}.get(stimulus[0], stimulus[0])
-    return edge.kind in {kind, "interrupt"} and edge.subject[0] == stimulus[1]
+    return edge.kind.value in {kind, "interrupt"} and edge.subject[0] == stimulus[1]
 
 
 def followed(graph, numbers):
     """Return these situations and what data and time make of them: they break one execution after the other."""
-    stuck = {("interrupt", s.name) for s in graph.world.skillset.skills if s.progress is not None}
+    stuck = {(StepKind.INTERRUPT, s.name) for s in graph.world.skillset.skills if s.progress is not None}
     found, todo = set(numbers), list(numbers)
     while todo:
         for edge in graph.edges[todo.pop()]:
-            if (edge.kind == "data" or (edge.kind, edge.subject[0]) in stuck) and edge.target not in found:
+            if (edge.kind is StepKind.BREAK or (edge.kind, edge.subject[0]) in stuck) and edge.target not in found:
                 found.add(edge.target)
                 todo.append(edge.target)
     return found
 
 
-LIKELY = {"start": 6, "value": 6, "time": 4, "event": 4, "extern": 3, "terminate": 1, "interrupt": 1, "fail": 1}
+LIKELY = {"start": 6, "value": 6, "time": 4, "event": 4, "extern": 3, "result": 1, "interrupt": 1, "fail": 1}
 """How likely a walk takes which kind of stimulus: executions are to live long enough for something to happen to them."""
 
 
@@ -276,10 +277,10 @@ def follow(bench, edge):
     """Take a step of the checker; of several executions of a skill any one: these tests compare what is left of all."""
     oldest = next((e.id for e in bench.engine.executions if e.skill == edge.subject[0]), "")
     match edge.kind:
-        case "extern" | "event" | "start":
-            bench.give((edge.kind, *edge.subject))
-        case "terminate":
-            bench.give(("terminate", edge.subject[0], oldest, edge.subject[1]))
+        case StepKind.EXTERN | StepKind.EVENT | StepKind.START:
+            bench.give((edge.kind.value, *edge.subject))
+        case StepKind.RESULT:
+            bench.give(("result", edge.subject[0], oldest, edge.subject[1]))
         case _:
             bench.give(("interrupt", edge.subject[0], oldest))
 
