@@ -91,8 +91,8 @@ bool Ros2Service::answer(const Outgoing & response, rmw_request_id_t request_id)
 // rmw does not pass on this question to DDS, as it does for publishers.
 void Ros2Service::wait_for_arrival(int64_t most_ns) const {
   const auto * service = static_cast<const CustomServiceInfo *>(rcl_service_get_rmw_handle(&service_)->data);
-  const eprosima::fastrtps::Duration_t most(static_cast<long double>(most_ns) / 1e9L);
-  service->response_writer_->wait_for_acknowledgments(most);
+  // A duration of Fast DDS, whose name changed from version 2 to 3: seconds and nanoseconds.
+  service->response_writer_->wait_for_acknowledgments({static_cast<int32_t>(most_ns / 1'000'000'000), static_cast<uint32_t>(most_ns % 1'000'000'000)});
 }
 
 }  // namespace plane

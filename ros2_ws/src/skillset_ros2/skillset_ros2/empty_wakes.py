@@ -14,9 +14,9 @@ from typing import TYPE_CHECKING, Any
 
 from rclpy.callback_groups import MutuallyExclusiveCallbackGroup
 from rclpy.exceptions import InvalidHandle
-from rclpy.waitable import NumberOfEntities, Waitable
+from rclpy.waitable import NumberOfEntities
 
-from skillset_ros2.executor import KINDS
+from skillset_ros2.executor import KINDS, LastingWaitable
 
 if TYPE_CHECKING:
     from rclpy.node import Node
@@ -27,7 +27,7 @@ ROW = 3
 _WATCHED: weakref.WeakKeyDictionary[Node, EmptyWakes] = weakref.WeakKeyDictionary()
 
 
-class EmptyWakes(Waitable):  # type: ignore[misc]  # rclpy has no types
+class EmptyWakes(LastingWaitable):
     """Sees what each wait of a node's executor brings; when that is nothing, again and again, takes from all readers once."""
 
     def __init__(self, node: Node) -> None:

@@ -33,6 +33,19 @@ FAILING_S, AGAIN_S = 1.0, 0.001
 Take = Callable[[Any], Any]
 
 
+class LastingWaitable(Waitable):  # type: ignore[misc]  # rclpy has no types
+    """A waitable that holds no handle of rcl, so that nothing has to be kept from being destroyed while it is waited for.
+
+    From Kilted on, rclpy leaves these two to each class.
+    """
+
+    def __enter__(self) -> None:
+        """Keep nothing."""
+
+    def __exit__(self, *_raised: object) -> None:
+        """Let go of nothing."""
+
+
 class RclpyExecutor(SingleThreadedExecutor):  # type: ignore[misc]  # rclpy has no types
     """Runs callbacks in the thread that spins it: rclpy's own executor, but for what another thread destroys while it waits."""
 

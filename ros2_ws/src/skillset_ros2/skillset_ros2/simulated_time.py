@@ -18,10 +18,11 @@ from rclpy.node import Node
 from rclpy.qos import QoSProfile, ReliabilityPolicy
 from rclpy.time import Time
 from rclpy.time_source import CLOCK_TOPIC
-from rclpy.waitable import NumberOfEntities, Waitable
+from rclpy.waitable import NumberOfEntities
 from rosgraph_msgs.msg import Clock
 
 from skillset_ros2.base import QUIET
+from skillset_ros2.executor import LastingWaitable
 
 NEVER_NS = 1 << 63
 NEWEST = QoSProfile(depth=1, reliability=ReliabilityPolicy.BEST_EFFORT)
@@ -41,7 +42,7 @@ class _Elsewhere(MutuallyExclusiveCallbackGroup):  # type: ignore[misc]  # rclpy
         return False
 
 
-class SimulatedTime(Waitable):  # type: ignore[misc]
+class SimulatedTime(LastingWaitable):
     """Gives a node the ticks of ``/clock``, from a thread of its own; of a node with another clock it does nothing.
 
     To be made before what else the executor waits for, and closed before the node is destroyed.

@@ -20,14 +20,14 @@ from rclpy.executors import ExternalShutdownException, SingleThreadedExecutor  #
 from rclpy.impl.implementation_singleton import rclpy_implementation  # noqa: E402
 from rclpy.node import Node  # noqa: E402
 from rclpy.qos import QoSProfile  # noqa: E402
-from rclpy.waitable import NumberOfEntities, Waitable  # noqa: E402
+from rclpy.waitable import NumberOfEntities  # noqa: E402
 from std_msgs.msg import String  # noqa: E402
 from std_srvs.srv import Trigger  # noqa: E402
 
 from alula.common.fast_dds import stop_discovery  # noqa: E402
 from alula_testing.waits import until  # noqa: E402
 from skillset_ros2 import ActionClient  # noqa: E402
-from skillset_ros2.executor import RclpyExecutor, SparingExecutor  # noqa: E402
+from skillset_ros2.executor import LastingWaitable, RclpyExecutor, SparingExecutor  # noqa: E402
 
 SOON_S = 20.0
 TURN_S = 0.05
@@ -119,7 +119,7 @@ def partner(context, other):
     thread.join(SOON_S)
 
 
-class First(Waitable):
+class First(LastingWaitable):
     """Is dealt with before all other kinds of entities: what it does, it does in the turn that has found them ready."""
 
     def __init__(self, node, act) -> None:

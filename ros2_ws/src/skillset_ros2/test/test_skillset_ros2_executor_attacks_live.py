@@ -15,7 +15,7 @@ from rclpy.action import ActionServer  # noqa: E402
 from rclpy.callback_groups import MutuallyExclusiveCallbackGroup, ReentrantCallbackGroup  # noqa: E402
 from rclpy.exceptions import InvalidHandle  # noqa: E402
 from rclpy.task import Future  # noqa: E402
-from rclpy.waitable import NumberOfEntities, Waitable  # noqa: E402
+from rclpy.waitable import NumberOfEntities  # noqa: E402
 from skillset_ros2_executor_rig import DEEP, SOON_S, First, Victim, connected, make_node, quiet, turn, turned  # noqa: E402
 from std_msgs.msg import String  # noqa: E402
 from std_srvs.srv import Trigger  # noqa: E402
@@ -23,7 +23,7 @@ from std_srvs.srv import Trigger  # noqa: E402
 from alula_testing.waits import until  # noqa: E402
 from skillset_ros2 import ActionClient  # noqa: E402
 from skillset_ros2 import executor as executor_module  # noqa: E402
-from skillset_ros2.executor import SparingExecutor  # noqa: E402
+from skillset_ros2.executor import LastingWaitable, SparingExecutor  # noqa: E402
 
 context, executor, kind, node, other, partner, spun, victim = (
     rig.context,
@@ -101,7 +101,7 @@ def test_what_comes_and_goes_in_another_thread_disturbs_nothing(node, spun):
     assert spun.raised == []
 
 
-class Broken(Waitable):
+class Broken(LastingWaitable):
     """Can't be waited for until it is mended."""
 
     mended = False
