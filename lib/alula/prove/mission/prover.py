@@ -15,6 +15,7 @@ from alula.model.span import Span
 from alula.prove.limits import Deadline, OutOfTimeError
 from alula.prove.mission.accepted import acceptances, divided
 from alula.prove.mission.answers import Answers, Row
+from alula.prove.mission.asked import with_asked_resources
 from alula.prove.mission.conditions import NO_FAULTS, Faults
 from alula.prove.mission.findings import WAITS, findings, taken_as, unless_held_up, waits
 from alula.prove.mission.holding import SINGLE, held
@@ -122,6 +123,10 @@ class _Search:
         self._part = part
         self._faults = faults
 
+    def _read(self, why: str) -> System:
+        models = with_asked_resources(self._source.read(), self._models, self._part, self._faults)
+        return System.read(self._source, models, self._part, LOOKED_AT, why_any_order=why)
+
     def within(self, deadline: Deadline, given: str) -> _Seen:
         """Look at what the models say, and at the properties of the file."""
         try:
@@ -158,7 +163,7 @@ class _Search:
             _explore(regions)
             return regions, several
 
-        return look_at(lambda why: System.read(self._source, self._models, self._part, LOOKED_AT, why_any_order=why), look)
+        return look_at(lambda why: self._read(why), look)
 
     def also(self, before: _Seen, deadline: Deadline, given: str) -> _Seen:
         """Look at runs in which hooks raise, managers die, or somebody aborts or pauses the mission; of those, what is new."""

@@ -197,7 +197,8 @@ def test_a_bound_is_never_silent(tmp_path: Path) -> None:
 def test_a_skillset_with_many_free_resources_is_bounded_too(tmp_path: Path) -> None:
     """Before the first group of situations is known: 2^40 of them come of power-up without a tick."""
     free = "".join(f" resource r{number} {{ initial A extern A -> B extern B -> A }}" for number in range(40))
-    models = [parse_skillset(f"skillset s {{{free} skill go {{ result {{ success DONE }} }} }}")]
+    asked = " and ".join(f"r{number} == A" for number in range(40))
+    models = [parse_skillset(f"skillset s {{{free} skill go {{ precondition {{ p: resource = ({asked}) }} result {{ success DONE }} }} }}")]
     path = tmp_path / "mission.xml"
     path.write_text('<root BTCPP_format="4"><BehaviorTree ID="m"><s.go/></BehaviorTree></root>')
     proved = prove_mission(path, models, NO_PART, timeout_s=0.0)
