@@ -34,10 +34,8 @@ def palette_of(
     given = {one.name: one for one in more}
     types = {**given, **{one.name: one for one in files.declared()}}
     own = {name_in_files(node) for node in part.nodes}
-    known = [
-        one for one in nav2.palette_for(files.trees.values()) if one.name not in own and (one.make is not None or one.name not in given)
-    ]
-    types.update({one.name: one for one in known if not _is_another(types.get(one.name), one)})
+    known = [one for one in nav2.palette_for(files.trees.values()) if one.name not in own and not _is_another(types.get(one.name), one)]
+    types.update({one.name: nav2.told_of(given[one.name], one) if one.name in given and one.make is None else one for one in known})
     types.update({one.name: one for one in mission_nodes(_memory(crew)) if not _is_another(types.get(one.name), one)})
     types.update({one.name: one for one in standard_palette()})
     return _with_robot(Palette(types.values()), skillsets, part, crew)

@@ -268,6 +268,9 @@ def test_a_palette_of_a_release_refuses_what_it_has_not(tmp_path, capsys):
     (finding,) = findings_of("m.xml", text, (), [humble], of_others=True)
     assert (finding.code, finding.message) == ("ALU603", "'Spin' has no port 'disable_collision_checks'")
     assert findings_of("m.xml", text, (), of_others=True) == []
+    quick = '<TruncatePath input_path="{path}" output_path="{path}"/>'
+    known = FILE.format(f'<ReactiveSequence>{quick}<Wait wait_duration="2"/></ReactiveSequence>').encode()
+    assert findings_of("m.xml", known, (), [humble], of_others=True) == []  # it does not run, which a palette can't tell
     for words in ([], ["--nav2", "humble", "trees"], ["--nav2", "humble", "--guess"]):
         assert main(words) == 2
         assert "takes a FOLDER of a robot's models or of trees, or --nav2 RELEASE by itself" in capsys.readouterr().err

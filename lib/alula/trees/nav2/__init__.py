@@ -7,6 +7,6 @@ robot's own.
 """
 
 from alula.trees.nav2.declared import RELEASES, WRITTEN, declared
-from alula.trees.nav2.plugin import palette, palette_for
+from alula.trees.nav2.plugin import palette, palette_for, told_of
 
-__all__ = ["RELEASES", "WRITTEN", "declared", "palette", "palette_for"]
+__all__ = ["RELEASES", "WRITTEN", "declared", "palette", "palette_for", "told_of"]

@@ -59,6 +59,15 @@ def palette_for(trees: Iterable[Element]) -> Palette:
     return Palette(one for one in known if one.name not in others)
 
 
+def told_of(declared: NodeType, known: NodeType) -> NodeType:
+    """Return a type as it is declared elsewhere, with what is known of Nav2's node of that name besides."""
+    ports = {}
+    for name, port in declared.ports.items():
+        mine = known.ports[name]
+        ports[name] = replace(port, optional=mine.optional, unchecked=mine.unchecked)
+    return replace(declared, ports=ports, runs=known.runs, tells=known.tells)
+
+
 def _is_another(element: Element, leaf: NodeType) -> bool:
     ports = [name for name in element.attributes if is_port(name)]
     return bool(element.children) or (bool(ports) and not any(name in leaf.ports for name in ports))
