@@ -24,6 +24,8 @@ from alula.trees.view import NodeView
 
 TREE_LOG, STOP_LOG = "mission.btlog", "stop_here.btlog"
 """Of a mission that is a file, and of what brought the robot to rest after it was left."""
+FUTURE_NS = 1_000_000_000
+"""By so much the clocks of two computers may be apart, corrected as they are."""
 P = ParamSpec("P")
 
 
@@ -57,7 +59,9 @@ class MissionRecord:
         self._plan = plan
         self._clock_ns = clock_ns
         self._parameters = dict(parameters)
-        self._since_ns = clock_ns() if joins else 0
+        self._since_ns = clock_ns() if joins else None
+        self._own: set[str] = set()
+        """The skillsets of which an event of the mission itself has come: all that follow are."""
         self._joined: dict[str, int] = {}
         """The number of the last event of a skillset that was left out."""
         self._joined_told = True
@@ -83,10 +87,19 @@ class MissionRecord:
 
     # --- what the mission comes to know ------------------------------------------------------------------------------
 
+    def _is_earlier(self, event: EngineEvent) -> bool:
+        """Tell whether an event was before the mission; where the wall clock was set back since, it may seem to be of the future."""
+        if self._since_ns is None or event.skillset in self._own:
+            return False
+        earlier = not self._since_ns <= event.stamp_ns <= self._clock_ns() + FUTURE_NS
+        if not earlier:
+            self._own.add(event.skillset)
+        return earlier
+
     @_kept
     def event(self, event: EngineEvent) -> None:
         """Write an event of a skillset."""
-        if event.stamp_ns < self._since_ns:
+        if self._is_earlier(event):
             self._joined[event.skillset] = event.sequence
             self._joined_told = False
             return

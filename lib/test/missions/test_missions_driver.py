@@ -149,6 +149,18 @@ def test_what_happened_before_a_mission_is_not_its_own_where_it_joins_managers_t
     assert len(host.written(TICKS)) == 1
 
 
+def test_what_happened_before_the_clock_was_set_back_is_not_the_missions_own(tmp_path: Path) -> None:
+    host = Host(tmp_path, joins=True)
+    hour_ns = 3600 * 10**9
+    host.clock.now_ns += 10
+    stamps_ns = [host.clock.now_ns - 20, host.clock.now_ns + hour_ns, host.clock.now_ns]
+    for number, stamp_ns in enumerate([*stamps_ns, host.clock.now_ns + hour_ns], start=7):  # the last one came just when it was set again
+        host.driver.event(TransitionEvent(number, stamp_ns, "wheels", "FREE", "USED", "extern", skillset="base"))
+    host.driver.finish(End(Outcome.ACCOMPLISHED))
+    assert [event["sequence"] for event in host.written(EVENTS)] == [9, 10]
+    assert host.written(MISSION)[-1].get("joined") == {"base": 8}
+
+
 def test_several_events_at_a_moment_make_one_tick(host: Host) -> None:
     host.wake(times=3)
     host.wake()
