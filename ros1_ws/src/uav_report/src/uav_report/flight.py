@@ -22,7 +22,7 @@ from uav_report.map_quality import Floats, MapQuality, judge_map, load_map, load
 from uav_report.page import page_entries
 from uav_report.phases import FlightPhases, flight_phases, touch_down
 from uav_report.recording import ON_GROUND, Recording, Track, read_recording
-from uav_report.truth import Encounter, disagreements, encounter, impact, rests, worse
+from uav_report.truth import Encounter, disagreement, encounter, impact, rests, told_or_computed
 from uav_report.video import Video, radio_lost_s, read_video
 from uav_report.video_picture import draw_video
 from uav_report.world import TrueSurfaces
@@ -91,20 +91,20 @@ class FlightReport:
         self._truth = self._compare()
         self._draw(recovery, timeline)
         said, truth = self._recording.simulator, self._truth
-        worst = worse(said, truth.recomputed)
+        found = told_or_computed(said, truth.recomputed)
         simulated = None if said is None else Encounter(said.collisions, said.min_clearance_m, said.distance_m, said.crash)
         down = self._came_down()
         values: dict[str, Any] = {
-            "crash": worst.crash or None,
+            "crash": found.crash or None,
             "left": self._left(down=down) or None,
-            "collisions": worst.collisions,
-            "min_clearance_m": _rounded(worst.min_clearance_m),
-            "distance_m": _rounded(worst.distance_m),
+            "collisions": found.collisions,
+            "min_clearance_m": _rounded(found.min_clearance_m),
+            "distance_m": _rounded(found.distance_m),
             "map": _map(truth.quality, self._recording),
             "video": self._video.summary,
             "accounts": {"simulator": _encounter(simulated), "recomputed": _encounter(truth.recomputed)},
         }
-        return Findings(values, False if worst.crash else down)
+        return Findings(values, False if found.crash else down)
 
     def entries(self) -> Iterable[Entry]:
         """Return path, true surfaces, and what the watches of the sensors said."""
@@ -147,8 +147,8 @@ class FlightReport:
             resting = rests(recording.truth, world, phases)
             if resting and (how := impact(recording.truth, phases)):
                 recomputed = replace(recomputed, crash=how, collisions=max(recomputed.collisions or 0, 1))
-            for sentence in disagreements(recording, recomputed):
-                problems.note(sentence)
+            if different := disagreement(recording, recomputed):
+                problems.note(different)
         points: Floats | None = None
         route: Floats | None = None
         if "map" in self._run.scenario.report and (self._run.scenario.mission or (folder / "map.ply").exists()):

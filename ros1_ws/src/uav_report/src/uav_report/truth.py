@@ -1,6 +1,6 @@
-"""How near the vehicle truly came to the world, computed from its true path and not taken from the simulator's word.
+"""How near the vehicle truly came to the world: by the simulator's count, or where there is none computed from the true path.
 
-From the moment when the take-off has ended or has reached 2 m, and until the landing begins, every surface counts. Before and
+Of a path, from the moment when the take-off has ended or has reached 2 m, and until the landing begins, every surface counts. Before and
 after, the ground below is no obstacle, it is where the vehicle comes from or goes to: then only moments above 1.5 m count,
 and only if the nearest surface is not the one below.
 """
@@ -23,7 +23,6 @@ BELOW_DEG = 45.0  # a surface within this cone around straight down is the groun
 REST_S = 1.0
 REST_MOVE_M = 0.1
 REST_HEIGHT_M = 0.2
-CLEARANCE_AGREES_M = 0.2
 DISTANCE_AGREES = 0.05
 HARD_M_S = 3.0  # down: no landing, also not a pilot's with the throttle at zero
 IMPACT_S = 0.2  # before the vehicle came to rest; long enough for a few poses, so that a jump of an estimated place is no fall
@@ -127,31 +126,30 @@ def _height_above_surface(world: TrueSurfaces, place: NDArray[np.float64]) -> fl
     return float(world.first_hit_m(place, np.array([[0.0, 0.0, -1.0]]))[0])
 
 
-def worse(simulator: SimulatorAccount | None, recomputed: Encounter) -> Encounter:
-    """Return of each number the one that is worse for the vehicle."""
+def told_or_computed(simulator: SimulatorAccount | None, recomputed: Encounter) -> Encounter:
+    """Return the simulator's numbers; where it told none, those of the recorded path.
+
+    The simulator counts at each step of the body, and knows what is ground and whether the vehicle stands, flies or lands. The path knows
+    less: what the autopilot has said of that, and surfaces that are all alike. It has seen a crash that the simulator had no time to tell.
+    """
     if simulator is None:
         return recomputed
-    collisions = [n for n in (simulator.collisions, recomputed.collisions) if n is not None]
-    clearance = [m for m in (simulator.min_clearance_m, recomputed.min_clearance_m) if m is not None]
-    distance = [m for m in (simulator.distance_m, recomputed.distance_m) if m is not None]
     crash = simulator.crash or recomputed.crash
-    return Encounter(max(collisions, default=None), min(clearance, default=None), max(distance, default=None), crash)
+    collisions = recomputed.collisions if simulator.collisions is None else simulator.collisions
+    return Encounter(
+        collisions=max(collisions or 0, 1) if crash else collisions,
+        min_clearance_m=recomputed.min_clearance_m if simulator.min_clearance_m is None else simulator.min_clearance_m,
+        distance_m=recomputed.distance_m if simulator.distance_m is None else simulator.distance_m,
+        crash=crash,
+    )
 
 
-def disagreements(recording: Recording, recomputed: Encounter) -> list[str]:
-    """Say where the simulator's own numbers and the recomputed ones differ by more than sampling explains."""
+def disagreement(recording: Recording, recomputed: Encounter) -> str:
+    """Say where the simulator's way and the recorded one differ by more than sampling explains: a part of the recording is missing."""
     said = recording.simulator
-    if said is None:
-        return []
-    sentences = []
-    if None not in (said.collisions, recomputed.collisions) and said.collisions != recomputed.collisions:
-        sentences.append(f"the simulator counted {said.collisions} collisions, the true path has {recomputed.collisions}")
-    if said.min_clearance_m is not None and recomputed.min_clearance_m is not None:
-        pair = (said.min_clearance_m, recomputed.min_clearance_m)
-        if abs(pair[0] - pair[1]) > CLEARANCE_AGREES_M:
-            sentences.append(f"the simulator saw a clearance of {pair[0]:.2f} m, the true path has {pair[1]:.2f} m")
-    if said.distance_m is not None and recomputed.distance_m is not None:
-        pair = (said.distance_m, recomputed.distance_m)
-        if abs(pair[0] - pair[1]) > 0.5 + DISTANCE_AGREES * max(pair):
-            sentences.append(f"the simulator counted {pair[0]:.1f} m flown, the true path is {pair[1]:.1f} m long")
-    return sentences
+    if said is None or said.distance_m is None or recomputed.distance_m is None:
+        return ""
+    pair = (said.distance_m, recomputed.distance_m)
+    if abs(pair[0] - pair[1]) <= 0.5 + DISTANCE_AGREES * max(pair):
+        return ""
+    return f"the simulator counted {pair[0]:.1f} m flown, the true path is {pair[1]:.1f} m long"
