@@ -8,7 +8,7 @@ import pytest
 from lidar_obstacles.core import LidarObstacles
 from lidar_obstacles.settings import LidarSettings
 from perception_bench.recordings import RecordingHost
-from perception_core import NS, Sweep
+from perception_core import NS, FaultKind, Sweep, Verdict
 
 HEIGHT_M, CLIMB_M_S = 3.0, 2.0
 
@@ -25,6 +25,7 @@ def over_ground(height_m: float, seed: int) -> np.ndarray:
 def test_poses_that_are_late_make_no_error_of_a_climb(late_s: float) -> None:
     host = RecordingHost()
     core = LidarObstacles(LidarSettings(), host)
+    core.vehicle.set_mount("base_link", "lidar", np.eye(4))
     told_ns = NS
     for k in range(1, 30):
         stamp_ns = NS + k * NS // 10
@@ -38,3 +39,21 @@ def test_poses_that_are_late_make_no_error_of_a_climb(late_s: float) -> None:
         host.arrived_ns = stamp_ns
         finding = core.judged(Sweep(stamp_ns, points, np.zeros(len(points), np.float32)), "lidar").finding
         assert finding.ok, (k, finding.reason)
+
+
+def test_a_frame_that_no_transform_tells_of_makes_the_lidar_unknown_until_it_is_told() -> None:
+    host = RecordingHost()
+    core = LidarObstacles(LidarSettings(), host)
+    core.vehicle.set_mount("base_link", "lidar", np.eye(4))
+
+    def finding(k, frame):
+        points = over_ground(HEIGHT_M, seed=k)
+        host.arrived_ns = NS + k * NS // 10
+        core.vehicle.poses.add(host.arrived_ns, (0.0, 0.0, HEIGHT_M), (0.0, 0.0, 0.0, 1.0))
+        return core.judged(Sweep(host.arrived_ns, points, np.zeros(len(points), np.float32)), frame).finding
+
+    strange = finding(1, "os_sensor")
+    assert (strange.verdict, strange.fault) == (Verdict.UNKNOWN, FaultKind.CALIBRATION)
+    assert "no transform from base_link to 'os_sensor' (known: ['lidar'])" in strange.reason
+    assert "frame_id" in strange.reason
+    assert finding(2, "lidar").ok

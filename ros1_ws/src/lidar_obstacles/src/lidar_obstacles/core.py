@@ -16,7 +16,7 @@ from lidar_obstacles.ahead import LidarAhead
 from lidar_obstacles.cloud_health import CloudJudge
 from lidar_obstacles.mounting import MountCheck
 from node_core.core import Input, Output
-from perception_core import FINE, Ahead, Finding, Sweep, SweepStamps, TurnJoiner, first_trouble
+from perception_core import FINE, Ahead, FaultKind, Finding, Sweep, SweepStamps, TurnJoiner, first_trouble, unsure
 from perception_core.clouds import sweep_of_cloud, time_fields
 from perception_core.conversions import obstacle_message
 from perception_core.sensor_watch import HEALTH, TICK_S, SensorWatch
@@ -126,8 +126,8 @@ class LidarObstacles:
     def _mounted(self, sweep: Sweep, frame: str, self_m: float) -> Finding:
         try:
             mount = self.vehicle.mount(frame)
-        except LookupError:
-            return FINE
+        except LookupError as error:
+            return unsure(FaultKind.CALIBRATION, f"it is not known how the LiDAR is mounted: {error}: check the driver's frame_id")
         return self._mounting.finding(sweep, mount, self.vehicle.poses, self_m=self_m)
 
     def _turned_rad(self, pose: NDArray[np.float64] | None, frame: str) -> float:
