@@ -2,10 +2,11 @@
 
 from __future__ import annotations
 
-from collections import deque
 from collections.abc import Iterator
 from dataclasses import dataclass
+from itertools import islice
 
+from alula.common.graphs import ShortestWays
 from alula.model.expressions import ResourceIs, atoms
 from alula.prove.mission.regions import Closure, Regions
 from alula.prove.mission.state import Event, Execution, Kind, Managers, State
@@ -91,20 +92,15 @@ def _runs(execution: Execution) -> bool:
 
 def _again(system: System, first: State, asking: int, holding: int) -> tuple[list[Event], State] | None:
     """Return what leads to the next request of a leaf, while the other one's execution goes on."""
-    before: dict[State, tuple[State, Event] | None] = {first: None}
-    todo = deque([first])
-    while todo and len(before) < MOST:
-        state = todo.popleft()
+
+    def going_on(state: State) -> Iterator[tuple[Event, State]]:
         for event, after in system.steps(state):
-            if after in before or holding in event.interrupted or any(one.leaf == holding for one in event.ended):
-                continue
-            before[after] = (state, event)
-            if asking in event.started:
-                events: list[Event] = []
-                at = after
-                while (step := before[at]) is not None:
-                    at, event_before = step
-                    events.append(event_before)
-                return events[::-1], after
-            todo.append(after)
+            if holding not in event.interrupted and all(one.leaf != holding for one in event.ended):
+                yield event, after
+
+    ways = ShortestWays([first], going_on)
+    for state in islice(ways, MOST):
+        event = ways.step_to(state)
+        if event is not None and asking in event.started:
+            return ways.to(state), state
     return None

@@ -9,11 +9,11 @@ the case at each of its ends. Otherwise the situations are looked at one after a
 from __future__ import annotations
 
 from collections import deque
-from collections.abc import Iterator, Mapping
+from collections.abc import Iterator
 from dataclasses import dataclass
 from itertools import product
 
-from alula.common.graphs import reachable_from
+from alula.common.graphs import ShortestWays, reachable_from, steps_to
 from alula.language.errors import Severity
 from alula.model.expressions import Constant, Expression, Not, ResourceIs, SkillRuns, atoms
 from alula.model.model import Property, PropertyKind
@@ -180,7 +180,7 @@ class _Search:
     def against(self) -> tuple[list[Event], State] | None:
         """Return a run after which it never comes, or comes too late."""
         if self._one.within:
-            return None if self._late is None else (_way(self._before, self._late), self._late[0])
+            return None if self._late is None else (steps_to(self._before, self._late), self._late[0])
         several = all_values(self._system.ticker.about_data)
         return next((self._at_rest(one, values) for values in several for one in self._never(values)), None)
 
@@ -193,23 +193,10 @@ class _Search:
 
     def _at_rest(self, found: Awaiting, values: Values) -> tuple[list[Event], State]:
         """Return a run that goes on until nothing calm happens any more, where that is possible: one sees best there what is waited for."""
-        ways: dict[Awaiting, tuple[Awaiting, Event] | None] = {found: None}
-        todo = deque([found])
-        while todo:
-            here = todo.popleft()
-            after = [one for one in self._calm_after.get(here, ()) if agree(values, one[0].choices)]
-            if not after:
-                return _way(self._before, found) + _way(ways, here), here[0]
-            for event, there in after:
-                if there not in ways:
-                    ways[there] = (here, event)
-                    todo.append(there)
-        return _way(self._before, found), found[0]
 
+        def following(here: Awaiting) -> list[tuple[Event, Awaiting]]:
+            return [one for one in self._calm_after.get(here, ()) if agree(values, one[0].choices)]
 
-def _way(before: Mapping[Awaiting, tuple[Awaiting, Event] | None], there: Awaiting) -> list[Event]:
-    events: list[Event] = []
-    while (step := before[there]) is not None:
-        there, event = step
-        events.append(event)
-    return events[::-1]
+        ways = ShortestWays([found], following)
+        rest = next((here for here in ways if not following(here)), found)
+        return steps_to(self._before, found) + ways.to(rest), rest[0]

@@ -11,7 +11,9 @@ import math
 from collections import deque
 from collections.abc import Callable, Collection, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field
+from itertools import islice
 
+from alula.common.graphs import ShortestWays
 from alula.prove.limits import Deadline
 from alula.prove.mission.oracle import Answer, Question
 from alula.prove.mission.state import Event, Kind, State
@@ -350,30 +352,14 @@ class Regions:
         started, interrupted, choices, touched = outcome[1:]
         events.append(Event(Kind.TICK, started=started, interrupted=interrupted, choices=choices, touched=touched))
         first = State(outcome.memory, tuple(self.after(place, one, outcome) for place, one in enumerate(goal)))
-        before: dict[State, tuple[State, Event] | None] = {first: None}
-        todo = deque([first])
-        while todo and len(before) < most:
-            state = todo.popleft()
-            if system.outcome(state) is not None:
-                return events + _way(before, state), state
-            for event, after in system.steps(state):
-                if after not in before and event.kind is not Kind.ABORT:
-                    before[after] = (state, event)
-                    todo.append(after)
-        return events, first
+        ways = ShortestWays([first], lambda state: (one for one in system.steps(state) if one[0].kind is not Kind.ABORT))
+        end = next((state for state in islice(ways, most) if system.outcome(state) is not None), first)
+        return events + ways.to(end), end
 
     def _before(self, ticked: Ticked, region: Region, place: int, root: int) -> int:
         """Return managers, the soonest there are, that a tick takes to these."""
         depth = region.closures[place].depth
         return min((one for one in ticked.sets[place] if self.after(place, one, ticked.outcome) == root), key=depth.__getitem__)
-
-
-def _way(before: Mapping[State, tuple[State, Event] | None], state: State) -> list[Event]:
-    events: list[Event] = []
-    while (step := before[state]) is not None:
-        state, event = step
-        events.append(event)
-    return events[::-1]
 
 
 def _differ(one: Sets, other: Sets) -> int:

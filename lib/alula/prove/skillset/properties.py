@@ -10,9 +10,9 @@ step of the loop: then the execution that has run longest can be the one that en
 
 from __future__ import annotations
 
-from collections import deque
 from collections.abc import Callable, Collection, Iterator
 
+from alula.common.graphs import ShortestWays, components
 from alula.language.counterexamples import Counterexample
 from alula.language.errors import Diagnostic, Severity
 from alula.model.expressions import And, Constant, Expression, Implies, Not, Or, ResourceIs, SkillRuns
@@ -82,34 +82,26 @@ def _found(graph: Graph, wanted: Property, number: int | None) -> Diagnostic | N
 def lasso(graph: Graph, wanted: Property, begins: list[int], goal: list[bool]) -> Diagnostic | None:
     """Search from each beginning, within the situations that are not the goal, for a loop or an end."""
     begins = [number for number in begins if not goal[number]]
-    ways = _ways(graph, begins, goal)
-    for component in _components(graph, list(ways), goal):
+    following = _avoiding(graph, goal)
+    ways = ShortestWays(begins, following)
+    for component in components(list(ways), lambda number: (after for _, after in following(number))):
         if _goes_on(graph, component, goal) and (not wanted.fair or _fair(graph, component)):
             loop = _loop(graph, component, fair=wanted.fair)
-            prefix = _way_to(graph, ways, loop[0].source if loop else component[0])
-            return failed(wanted, "a run never gets there", counterexample.lasso(graph, prefix, loop))
+            end = loop[0].source if loop else component[0]
+            way = ways.to(end)
+            begin = way[0].source if way else end
+            return failed(wanted, "a run never gets there", counterexample.lasso(graph, [*graph.path(begin), *way], loop))
     return None
 
 
-def _ways(graph: Graph, begins: list[int], goal: list[bool]) -> dict[int, Edge | None]:
-    """Return the situations that are reached from the beginnings without the goal, each with the step to it."""
-    ways: dict[int, Edge | None] = dict.fromkeys(begins)
-    todo = deque(begins)
-    while todo:
+def _avoiding(graph: Graph, goal: list[bool]) -> Callable[[int], Iterator[tuple[Edge, int]]]:
+    """Return what follows a situation without the goal."""
+
+    def following(number: int) -> Iterator[tuple[Edge, int]]:
         graph.deadline.check()
-        for edge in graph.edges[todo.popleft()]:
-            if edge.target not in ways and not goal[edge.target]:
-                ways[edge.target] = edge
-                todo.append(edge.target)
-    return ways
+        return ((edge, edge.target) for edge in graph.edges[number] if not goal[edge.target])
 
-
-def _way_to(graph: Graph, ways: dict[int, Edge | None], number: int) -> list[Edge]:
-    way: list[Edge] = []
-    while (edge := ways[number]) is not None:
-        way.append(edge)
-        number = edge.source
-    return [*graph.path(number), *way[::-1]]
+    return following
 
 
 def _goes_on(graph: Graph, component: list[int], goal: list[bool]) -> bool:
@@ -154,56 +146,9 @@ def _unfair(graph: Graph, begin: int, way: list[Edge]) -> str | None:
 
 def _search(graph: Graph, inside: set[int], begin: int, wanted: Callable[[Edge], bool]) -> list[Edge]:
     """Return a shortest way within a component whose last step is wanted."""
-    ways: dict[int, list[Edge]] = {begin: []}
-    todo = deque([begin])
-    while todo:
-        number = todo.popleft()
+    ways = ShortestWays([begin], lambda number: ((edge, edge.target) for edge in graph.edges[number] if edge.target in inside))
+    for number in ways:
         for edge in graph.edges[number]:
-            if edge.target not in inside:
-                continue
-            if wanted(edge):
-                return [*ways[number], edge]
-            if edge.target not in ways:
-                ways[edge.target] = [*ways[number], edge]
-                todo.append(edge.target)
+            if edge.target in inside and wanted(edge):
+                return [*ways.to(number), edge]
     raise LookupError(begin)
-
-
-def _components(graph: Graph, numbers: list[int], goal: list[bool]) -> Iterator[list[int]]:
-    """Yield the strongly connected components among these situations (Tarjan, without recursion)."""
-    index: dict[int, int] = {}
-    low: dict[int, int] = {}
-    stack: list[int] = []
-    waiting: set[int] = set()
-    for root in numbers:
-        if root in index:
-            continue
-        work = [(root, iter(graph.edges[root]))]
-        index[root] = low[root] = len(index)
-        stack.append(root)
-        waiting.add(root)
-        graph.deadline.check()
-        while work:
-            number, edges = work[-1]
-            following = next((edge.target for edge in edges if not goal[edge.target]), None)
-            if following is None:
-                work.pop()
-                if work:
-                    low[work[-1][0]] = min(low[work[-1][0]], low[number])
-                if low[number] == index[number]:
-                    yield _popped(stack, waiting, number)
-            elif following not in index:
-                index[following] = low[following] = len(index)
-                stack.append(following)
-                waiting.add(following)
-                work.append((following, iter(graph.edges[following])))
-            elif following in waiting:
-                low[number] = min(low[number], index[following])
-
-
-def _popped(stack: list[int], waiting: set[int], number: int) -> list[int]:
-    component: list[int] = []
-    while not component or component[-1] != number:
-        component.append(stack.pop())
-        waiting.discard(component[-1])
-    return component[::-1]
