@@ -59,7 +59,7 @@ class Blackboard:
         self.reason = self.what_went_wrong
 
     def note(self, what: str) -> None:
-        """Keep what went wrong that no skill tells, once."""
+        """Keep a reason for failure that no skill reports, once."""
         if what not in self.notes:
             self.notes.append(what)
 

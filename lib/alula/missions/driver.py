@@ -1,4 +1,4 @@
-"""Drives a mission's director and keeps the record of it; the host only says when: rclpy's timers, virtual time, or a recorded clock."""
+"""Drive a mission's director and record it; the host only schedules it: rclpy's timers, virtual time, or a recorded clock."""
 
 from __future__ import annotations
 
@@ -64,7 +64,7 @@ class MissionDriver:
     ) -> None:
         self.due = False
         self.woken_by_events = True
-        """False: the host alone says when the tree is ticked."""
+        """False: only the host schedules ticks of the tree."""
         self.remembers = False
         """Views of the tree are wanted although there is no record."""
         self.record = record

@@ -30,7 +30,7 @@ P = ParamSpec("P")
 
 
 def _kept(method: Callable[Concatenate[MissionRecord, P], None]) -> Callable[Concatenate[MissionRecord, P], None]:
-    """Have a method of a record note what it raises: whoever tells of an event or a decision has to go on."""
+    """Make a method of a record log what it raises, so that its caller goes on."""
 
     @wraps(method)
     def kept(self: MissionRecord, /, *args: P.args, **kwargs: P.kwargs) -> None:
@@ -77,7 +77,7 @@ class MissionRecord:
 
     @property
     def unended(self) -> bool:
-        """Tell whether executions are open as far as the events have told: a result may be here before its event."""
+        """Return whether executions are open by the events so far: a result may arrive before its event."""
         return bool(self._unended)
 
     @property
@@ -113,7 +113,7 @@ class MissionRecord:
 
     @_kept
     def report(self, skillset: str, handle: SkillHandle) -> None:
-        """Write what the tree is told of an execution."""
+        """Record a report of an execution to the tree."""
         told = {"skillset": skillset, "skill": handle.skill, "id": handle.id, "state": handle.state.value, "progress": handle.progress}
         told |= {"result": handle.result, "message": handle.message, "outputs": to_plain(handle.outputs)}
         self._write(REPORTS, told)
@@ -133,7 +133,7 @@ class MissionRecord:
             self.problems.append(f"{name} could not be written: {error.strerror or error}")
 
     def abort(self, reason: str) -> None:
-        """Write that the mission is told from outside to stop; to be called before it does."""
+        """Record that the operator stops the mission; call it before the mission stops."""
         self.told("abort", reason)
 
     @_kept

@@ -1,4 +1,4 @@
-"""A run without a mission: the robot's skills are served, to whoever calls them, until the run is told to end."""
+"""Run without a mission: serve the robot's skills to any client until the run is ended."""
 
 from __future__ import annotations
 
@@ -16,7 +16,7 @@ from alula.missions.skillset import Client, Clock
 
 
 class Serving:
-    """In the place of a mission: it waits until all skillsets answer, and then decides nothing."""
+    """Stand in for a mission: wait until all skillsets are up, then decide nothing."""
 
     degraded = False
     stopping = False

@@ -54,7 +54,7 @@ class Recorder(Protocol):
     """What is written down of what passes between a tree and its skillsets."""
 
     def report(self, skillset: str, handle: SkillHandle) -> None:
-        """Take what the tree is told of an execution."""
+        """Take a report of an execution to the tree."""
         ...
 
     def sample(self, skillset: str, data: str, value: object, stamp_ns: int | None) -> None:

@@ -137,13 +137,13 @@ class Figures:
     skills: Mapping[str, SkillFigures] = field(default_factory=dict)
 
     def fault(self, name: str) -> FaultFigures:
-        """Return those of a fault, or of an end ``skillset.skill END``; one of which nothing is said may come at any time."""
+        """Return those of a fault, or of an end ``skillset.skill END``; one without figures may come at any time."""
         skill, _, end = name.partition(" ")
         fails = self.skill(skill).fails
         return self.faults.get(name) or (FaultFigures(rate=fails[end], lasts=None) if end in fails else FaultFigures())
 
     def skill(self, name: str) -> SkillFigures:
-        """Return those of a skill; one of which nothing is said may end at any time, in any way."""
+        """Return those of a skill; one without figures may end at any time, in any way."""
         return self.skills.get(name, SkillFigures())
 
     @property

@@ -76,7 +76,7 @@ class _Search(Generic[State]):
         self._looked: dict[int, tuple[Outcome | None, tuple[Step[int], ...]]] = {}
 
     def run(self, most: int, unlikely: float, tell: Tell | None) -> None:
-        """Look at them; a situation to which a likelier way is found than the first keeps its place."""
+        """Explore the situations; one to which a likelier path is found than the first keeps its number."""
         todo = [(-1.0, number) for number in self._initial]
         while todo and len(self._looked) < most:
             chance, number = heappop(todo)
@@ -117,14 +117,14 @@ class _Search(Generic[State]):
 
 
 def likelihoods(steps: Sequence[Step[int]], figures: Figures) -> list[float]:
-    """Return how likely each step out of a situation is, at most; where no figure says it, 1."""
+    """Return the greatest probability of each step out of a situation; 1 where there is no figure."""
     rates = [_rate(step, figures) for step in steps]
     sure = sum(rate or 0.0 for step, rate in zip(steps, rates, strict=True) if step.kind in {Kind.END, Kind.WAIT})
     return [1.0 if rate is None or not sure else min(1.0, rate / sure) for rate in rates]
 
 
 def _rate(step: Step[int], figures: Figures) -> float | None:
-    """Return the greatest rate with which a step is taken, per second; None: nothing says it."""
+    """Return the greatest rate with which a step is taken, per second; None: there is no figure."""
     match step.kind:
         case Kind.FAULT:
             found = figures.fault(step.name)

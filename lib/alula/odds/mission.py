@@ -1,4 +1,4 @@
-"""The transition system of a mission, told as what odds need: what the software does at once, what takes time, and which faults come.
+"""Label the transition system of a mission for its odds: what the software does at once, what takes time, which faults come.
 
 The system takes each step that only an unlucky robot takes. Here a step is taken by whatever the robot's files say takes it:
 
@@ -216,7 +216,7 @@ def _touches(fault: FaultEffects, system: System) -> bool:
 
 
 def _waited(choices: Sequence[Asked]) -> tuple[list[Asked], list[Asked]]:
-    """Return what a tick says is over or far enough, and its choices of another kind."""
+    """Return what has elapsed or progressed far enough by a tick, and its other choices."""
     timed = [asked for asked in choices if asked.question[0] == TIME or str(asked.question[1]).startswith(PROGRESS)]
     return [asked for asked in timed if asked.answer is True], [asked for asked in choices if asked not in timed]
 

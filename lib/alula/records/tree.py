@@ -10,7 +10,7 @@ from alula.common.record import DECISIONS, TREE, Entry
 
 Path = tuple[str, ...]
 View = Mapping[str, Any]
-"""A tree as ``NodeView.as_dict`` tells of it."""
+"""A tree as ``NodeView.as_dict`` returns it."""
 
 
 @dataclass(frozen=True)
@@ -36,7 +36,7 @@ class Places:
 
 
 def places_in(entries: Iterable[Entry]) -> Places:
-    """Return the places that a record tells of: the first view of the tree after a decision shows the leaf at work."""
+    """Return the places of executions in the tree: the first view after a decision shows the leaf at work."""
     found: dict[str, Path] = {}
     waiting: dict[str, str] = {}
     tree: View = {}

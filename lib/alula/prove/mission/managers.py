@@ -1,4 +1,4 @@
-"""The steps of ``alula.model.steps`` between the managers of a mission's search, with what the tree still hangs on."""
+"""List the steps of one skillset's managers in a mission's search: those of ``alula.model.steps``, deaths and restarts."""
 
 from __future__ import annotations
 

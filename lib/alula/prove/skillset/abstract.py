@@ -1,4 +1,4 @@
-"""The over-approximation that proofs search, where a solver tells what some data fulfil together.
+"""Over-approximate a skillset for its proofs: a solver decides which conditions some data fulfil together.
 
 The preconditions of a skill become what they ask of resources if some data fulfil the rest of all of them at once.
 """
@@ -105,7 +105,7 @@ def _with_data(condition: Expression, values: Mapping[DataIs, bool]) -> Expressi
 
 
 def _replaced(condition: Expression, new: Callable[[Atom], Expression]) -> Expression:
-    """Return a condition with something else in the place of each atom."""
+    """Return a condition with each atom replaced."""
     match condition:
         case Not(operand=operand):
             return Not(_replaced(operand, new))

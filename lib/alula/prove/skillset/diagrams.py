@@ -138,10 +138,10 @@ def bits(skillset: Skillset, resource: str) -> list[str]:
 
 
 def runs_name(skill: str, count: int) -> str:
-    """Return the variable that tells that at least ``count`` executions run."""
+    """Return the variable that is true while at least ``count`` executions run."""
     return f"runs {skill} {count}"
 
 
 def broken_name(skill: str, invariant: str) -> str:
-    """Return the variable that tells that an invariant was found false and its executions are yet to end."""
+    """Return the variable that is true while an invariant is broken and its executions have not ended yet."""
     return f"broken {skill} {invariant}"

@@ -1,4 +1,4 @@
-"""Every reachable situation, one by one: breadth first, so that the first way found to one is a shortest."""
+"""Explore the reachable situations one by one, breadth first, so that the first path to each is a shortest one."""
 
 from __future__ import annotations
 
@@ -7,7 +7,7 @@ from dataclasses import dataclass, field
 
 from alula.language.counterexamples import StepKind
 from alula.prove.limits import Deadline
-from alula.prove.skillset.steps import Key, Move, State, World
+from alula.prove.skillset.steps import Key, Move, State, TransitionSystem
 
 
 @dataclass(frozen=True)
@@ -25,7 +25,7 @@ class Edge:
 class Graph:
     """The reachable situations; number 0 is the initial one. ``faults`` has for each fault the first step that shows it."""
 
-    world: World
+    system: TransitionSystem
     deadline: Deadline
     states: list[State] = field(default_factory=list)
     numbers: dict[State, int] = field(default_factory=dict)
@@ -53,14 +53,14 @@ class Graph:
         return sources
 
 
-def explore(world: World, deadline: Deadline, *, most: int) -> Graph:
+def explore(system: TransitionSystem, deadline: Deadline, *, most: int) -> Graph:
     """Return the graph, not ``complete`` when there are more than ``most`` situations; raise OutOfTimeError."""
-    graph = Graph(world, deadline, started={skill.name: set() for skill in world.skillset.skills})
-    todo = deque([_number(graph, world.initial(), None)])
+    graph = Graph(system, deadline, started={skill.name: set() for skill in system.skillset.skills})
+    todo = deque([_number(graph, system.initial(), None)])
     while todo:
         deadline.check()
         number = todo.popleft()
-        for move in world.moves(graph.states[number]):
+        for move in system.moves(graph.states[number]):
             for fault in move.faults:
                 graph.faults.setdefault(fault, (number, move))
             if move.step is None:

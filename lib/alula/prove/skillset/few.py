@@ -1,4 +1,4 @@
-"""Counterexamples of properties that a few skills make: looked for one situation at a time, where all skills together are too many.
+"""Search counterexamples of properties among runs of a few skills, where all skills together have too many situations.
 
 A run in which only some skills are ever asked for is a run of the whole skillset, so what it shows against a property stands. The skills
 around a property come first: those that it names, and those that change the resources that it names; then, again and again, those that
@@ -17,7 +17,7 @@ from alula.prove.limits import Deadline, OutOfTimeError
 from alula.prove.skillset.abstract import Abstraction
 from alula.prove.skillset.explore import Graph, explore
 from alula.prove.skillset.properties import check_property
-from alula.prove.skillset.steps import Part, World
+from alula.prove.skillset.steps import Part, TransitionSystem
 
 MOST = 3000
 """Situations that are looked at with each number of skills."""
@@ -25,12 +25,12 @@ MOST = 3000
 
 def refuted(abstraction: Abstraction, properties: Iterable[Property], deadline: Deadline, *, copies: int) -> dict[str, Diagnostic]:
     """Return the properties, by name, that a run of a few skills is against; others may hold or not."""
-    whole = World(abstraction, copies=copies)
+    whole = TransitionSystem(abstraction, copies=copies)
     found: dict[str, Diagnostic] = {}
     for wanted in properties:
         try:
             for part in parts_around(abstraction.skillset, wanted):
-                graph = explore(World(abstraction, copies=copies, part=part), deadline, most=MOST)
+                graph = explore(TransitionSystem(abstraction, copies=copies, part=part), deadline, most=MOST)
                 finding = check_property(graph, wanted, _unknown(graph, whole))
                 if finding is not None:
                     found[wanted.name] = finding
@@ -41,7 +41,7 @@ def refuted(abstraction: Abstraction, properties: Iterable[Property], deadline: 
     return found
 
 
-def _unknown(graph: Graph, whole: World) -> set[int]:
+def _unknown(graph: Graph, whole: TransitionSystem) -> set[int]:
     """Return the situations without a step, which are no ends of runs of the whole skillset."""
     without = [number for number, edges in enumerate(graph.edges) if not edges]
     return {n for n in without if any(move.step is not None and move.target != graph.states[n] for move in whole.moves(graph.states[n]))}

@@ -99,7 +99,7 @@ class _Player:
         self._tick_s = min(periods_s, default=2 * TICK_S) / 2
 
     def take(self, step: CounterexampleStep) -> Iterable[str]:
-        """Do what a step says, let the managers come to rest, and yield each difference from the counterexample."""
+        """Take a step, let the managers come to rest, and yield each difference from the counterexample."""
         refusal = self._do(step)
         if refusal:
             yield refusal
@@ -132,7 +132,7 @@ class _Player:
                 yield f"{execution.skill} (execution {execution.number}) is {managers} in the managers, {expected} in the counterexample"
 
     def _do(self, step: CounterexampleStep) -> str:
-        """Do what a step says; return why the managers refuse it, or nothing."""
+        """Take a step; return why the managers refuse it, or an empty text."""
         match step.kind:
             case Kind.EXTERN | Kind.OUTSIDE:
                 return self._refusal(self._client.transition(*step.subject))

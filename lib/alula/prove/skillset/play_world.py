@@ -27,7 +27,7 @@ class PlayManagers(Protocol):
 
 
 class PlayWorld(Protocol):
-    """Managers of one skillset, a client of theirs, and a mission clock that stands still unless it is told to go on."""
+    """Managers of one skillset, a client of theirs, and a mission clock that moves only on request."""
 
     @property
     def managers(self) -> PlayManagers:
@@ -71,7 +71,7 @@ class VirtualWorld:
         return self._world.clock.now_ns
 
     def pass_time(self, seconds: float) -> None:
-        """Run the world for so much mission time; it takes none of the wall clock."""
+        """Advance the mission clock; it takes no wall clock time."""
         self._world.run_for(seconds)
 
     def settle(self, condition: Callable[[], bool]) -> None:  # noqa: ARG002 - nothing more happens at this moment, whatever holds

@@ -19,13 +19,13 @@ from alula.model.expressions import And, Constant, Expression, Implies, Not, Or,
 from alula.model.model import Property, PropertyKind
 from alula.prove.skillset import counterexample
 from alula.prove.skillset.explore import Edge, Graph
-from alula.prove.skillset.steps import State, World
+from alula.prove.skillset.steps import State, TransitionSystem
 
 
 def check_property(graph: Graph, wanted: Property, unknown: Collection[int] = ()) -> Diagnostic | None:
     """Return why a property does not hold, or None when it does; what comes after the ``unknown`` situations was not looked at."""
     graph.deadline.check()
-    holds = [true_in(graph.world, wanted.condition, state) for state in graph.states]
+    holds = [true_in(graph.system, wanted.condition, state) for state in graph.states]
     match wanted.kind:
         case PropertyKind.NEVER:
             return _found(graph, wanted, next((n for n, value in enumerate(holds) if value), None))
@@ -34,7 +34,7 @@ def check_property(graph: Graph, wanted: Property, unknown: Collection[int] = ()
         case PropertyKind.EVENTUALLY:
             return lasso(graph, wanted, [0], _with(holds, unknown))
         case PropertyKind.LEADS_TO:
-            then = [true_in(graph.world, wanted.consequence or Constant(value=False), state) for state in graph.states]
+            then = [true_in(graph.system, wanted.consequence or Constant(value=False), state) for state in graph.states]
             return lasso(graph, wanted, [n for n, value in enumerate(holds) if value], _with(then, unknown))
 
 
@@ -42,24 +42,24 @@ def _with(values: list[bool], true: Collection[int]) -> list[bool]:
     return [value or number in true for number, value in enumerate(values)] if true else values
 
 
-def true_in(world: World, condition: Expression, state: State) -> bool:
+def true_in(system: TransitionSystem, condition: Expression, state: State) -> bool:
     """Tell whether a condition over resources and executions is true in a situation."""
     match condition:
         case ResourceIs(resource=resource, state=value, negated=negated):
-            index = next(i for i, r in enumerate(world.skillset.resources) if r.name == resource)
+            index = next(i for i, r in enumerate(system.skillset.resources) if r.name == resource)
             return (state.resources[index] == value) != negated
         case SkillRuns(skill=skill):
             return skill in state.running
         case Constant(value=value):
             return value
         case Not(operand=operand):
-            return not true_in(world, operand, state)
+            return not true_in(system, operand, state)
         case And(operands=operands):
-            return all(true_in(world, operand, state) for operand in operands)
+            return all(true_in(system, operand, state) for operand in operands)
         case Or(operands=operands):
-            return any(true_in(world, operand, state) for operand in operands)
+            return any(true_in(system, operand, state) for operand in operands)
         case Implies(premise=premise, conclusion=conclusion):
-            return not true_in(world, premise, state) or true_in(world, conclusion, state)
+            return not true_in(system, premise, state) or true_in(system, conclusion, state)
         case _:
             raise ValueError(f"a property can't ask data: {condition}")
 
@@ -73,7 +73,7 @@ def failed(wanted: Property, what: str, run: Counterexample) -> Diagnostic:
 def _found(graph: Graph, wanted: Property, number: int | None) -> Diagnostic | None:
     if number is None:
         return None
-    return failed(wanted, counterexample.situation(graph.world, graph.states[number]), counterexample.to(graph, number))
+    return failed(wanted, counterexample.situation(graph.system, graph.states[number]), counterexample.to(graph, number))
 
 
 # --- runs that never get there ----------------------------------------------------------------------------------------

@@ -1,4 +1,4 @@
-"""Takes the steps of a counterexample again on the skillset as it is written: with data, time, and executions that have numbers."""
+"""Replay a counterexample on the skillset as it is written: with data, time, and numbered executions."""
 
 from __future__ import annotations
 
@@ -26,7 +26,7 @@ from alula.model.model import Invariant, Skill
 from alula.model.situation import Change, Entered, Running, Situation, Step
 from alula.model.steps import take
 from alula.prove.skillset import words
-from alula.prove.skillset.steps import Key, Move, State, World
+from alula.prove.skillset.steps import Key, Move, State, TransitionSystem
 from alula.prove.skillset.witness import States, Wish, Witness, data_atoms, fallen
 
 
@@ -41,17 +41,17 @@ class Replay:
     Steps are taken with data as long as values are found that take them as the search did, and as the search did from then on.
     """
 
-    def __init__(self, world: World, first: State) -> None:
-        self._world = world
-        self._skillset = world.abstraction.original
-        self._witness = Witness(self._skillset, world.abstraction.solver)
+    def __init__(self, system: TransitionSystem, first: State) -> None:
+        self._system = system
+        self._skillset = system.abstraction.original
+        self._witness = Witness(self._skillset, system.abstraction.solver)
         self._numbers: Counter[str] = Counter()
         self._running: list[Running] = []
         """In the order of the search's state."""
         self._values: Mapping[Path, Value] = {}
         self._situation = semantics.initial(self._skillset)
         self._with_data = True
-        self._states: States = world.situation(first).states
+        self._states: States = system.situation(first).states
         told = ", ".join(f"{name} == {state}" for name, state in self._states.items())
         self.steps: list[CounterexampleStep] = []
         self._add(StepKind.INITIALLY, f"initially {told or 'nothing runs'}")
@@ -71,8 +71,8 @@ class Replay:
         if move.step is not None:
             left = [names[one.id] for one in move.step.situation.running]
             alive = set(self._situation.running) if self._with_data else set(left)
-            self._running = self._world.in_order([one for one in left if one in alive])
-            self._states = self._situation.states if self._with_data else self._world.situation(move.target).states
+            self._running = self._system.in_order([one for one in left if one in alive])
+            self._states = self._situation.states if self._with_data else self._system.situation(move.target).states
         self._finish(begun, loop=loop)
 
     def _names(self, move: Move) -> dict[str, Running]:
@@ -122,7 +122,7 @@ class Replay:
         return take(self._skillset, self._situation, stimulus._replace(execution=acting))
 
     def _differs(self, move: Move, situation: Situation) -> bool:
-        states = self._world.situation(move.target).states
+        states = self._system.situation(move.target).states
         running = sorted(execution.skill for execution in situation.running)
         return dict(situation.states) != dict(states) or running != sorted(move.target.running)
 
@@ -217,7 +217,7 @@ class Replay:
 
         Those that may be false for a while (``for 2 s``) are left out unless ``waiting``.
         """
-        after = self._world.situation(move.target).states
+        after = self._system.situation(move.target).states
         left = [names[one.id] for one in move.step.situation.running] if move.step is not None else self._running
         wishes: list[Wish] = []
         for execution in (one for one in left if one != but):

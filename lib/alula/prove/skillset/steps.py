@@ -1,4 +1,4 @@
-"""The steps of ``alula.model.steps`` between the states of a search, and the faults that they show.
+"""Represent a skillset as a transition system: the steps of ``alula.model.steps`` between states, and the faults that they show.
 
 A situation is kept as small as its future needs: the states of the resources and the names of the running skills.
 Executions of one skill differ in nothing but their age. The order of the start decides in which order violations take
@@ -59,8 +59,8 @@ class Part:
     events: frozenset[str]
 
 
-class World:
-    """The steps of one skillset. ``copies`` is how many executions of one skill are looked at, at most.
+class TransitionSystem:
+    """The transition system of a skillset; at most ``copies`` executions of one skill run at once.
 
     With a ``part`` of it, nothing else is asked for: each run of it is a run of the skillset.
     """

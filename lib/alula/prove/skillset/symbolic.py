@@ -18,7 +18,7 @@ from alula.prove.skillset.encoding import encode
 from alula.prove.skillset.local import Suspect
 from alula.prove.skillset.properties import failed, lasso, true_in
 from alula.prove.skillset.sets import Sets
-from alula.prove.skillset.steps import Key, World
+from alula.prove.skillset.steps import Key, TransitionSystem
 from alula.prove.skillset.walk import MOST_IN_A_LOOP, Walker
 
 
@@ -44,10 +44,10 @@ class _Search:
     def __init__(self, skillset: Skillset, abstraction: Abstraction, deadline: Deadline, copies: int) -> None:
         self.skillset = skillset
         self.copies = copies
-        self.world = World(abstraction, copies=copies)
+        self.system = TransitionSystem(abstraction, copies=copies)
         self.model: Encoded = encode(abstraction, copies, deadline)
         self.sets = Sets(self.model, deadline)
-        self.walker = Walker(self.world, self.sets)
+        self.walker = Walker(self.system, self.sets)
 
     def findings(self, suspects: list[Suspect]) -> list[Diagnostic]:
         """Return the findings of all checks."""
@@ -72,7 +72,7 @@ class _Search:
                 continue
             moves = self.walker.fault(fault, goal)
             if moves is not None:
-                counterexamples[fault] = counterexample.walked(self.world, self.world.initial(), moves, fault)
+                counterexamples[fault] = counterexample.walked(self.system, self.system.initial(), moves, fault)
         return counterexamples
 
     def _shown(self) -> Iterator[tuple[Key, Any]]:
@@ -100,7 +100,7 @@ class _Search:
         return not self._reaches(self.model.startable[skill.name]) and not self._reaches(asked_in_vain)
 
     def _crowded(self) -> set[str]:
-        changing = {s.name for s in self.skillset.skills if s.name not in self.world.idle}
+        changing = {s.name for s in self.skillset.skills if s.name not in self.system.idle}
         return {name for name in changing if self._reaches(self.model.crowded[name])}
 
     def _held_twice(self) -> list[Diagnostic]:
@@ -115,7 +115,7 @@ class _Search:
                 both = here & (self.model.runs(first, 2) if first == second else self.model.runs(first) & self.model.runs(second))
                 moves = self.walker.to(both)
                 if moves is not None:
-                    run = counterexample.walked(self.world, self.world.initial(), moves)
+                    run = counterexample.walked(self.system, self.system.initial(), moves)
                     findings.append(reachable.held_twice(self.skillset, resource, state, (first, second), run))
         return findings
 
@@ -130,7 +130,7 @@ class _Search:
                 continue
             moves = self.walker.to(self.sets.reached & ~self.sets.can_come_to(starts))
             if moves is not None:
-                groups.setdefault(counterexample.walked(self.world, self.world.initial(), moves), []).append(skill.name)
+                groups.setdefault(counterexample.walked(self.system, self.system.initial(), moves), []).append(skill.name)
         return [reachable.lost(self.skillset, names, run) for run, names in groups.items()]
 
     # --- properties -----------------------------------------------------------------------------------------------
@@ -153,8 +153,8 @@ class _Search:
         moves = self.walker.to(bad)
         if moves is None:
             return _unsure(wanted)
-        run = counterexample.walked(self.world, self.world.initial(), moves)
-        return failed(wanted, counterexample.situation(self.world, self.walker.end(moves)), run)
+        run = counterexample.walked(self.system, self.system.initial(), moves)
+        return failed(wanted, counterexample.situation(self.system, self.walker.end(moves)), run)
 
     def _run(self, wanted: Property, begins: Any, goal: Any) -> Diagnostic | None:
         """Look for a run that avoids the goal for ever; a set that allows one is walked before it is believed."""
@@ -171,7 +171,7 @@ class _Search:
             if moves is None:
                 return _unsure(wanted)
             graph, looked = self.walker.graph(moves, avoiding)
-            closed = [n not in looked or true_in(self.world, condition, state) for n, state in enumerate(graph.states)]
+            closed = [n not in looked or true_in(self.system, condition, state) for n, state in enumerate(graph.states)]
             refuted = lasso(graph, wanted, [len(moves)], closed)
             if refuted is not None or len(looked) >= MOST_IN_A_LOOP:
                 return refuted or _unsure(wanted)

@@ -1,4 +1,4 @@
-"""Real runs out of sets: a way found backwards through sets is walked forwards by the runtime's own steps.
+"""Concretise a path: one that is found backwards through sets is walked forwards by steps of the semantics.
 
 Sets may be wider than what can happen (see ``encoding``); a way that can't be walked is no counterexample.
 """
@@ -11,7 +11,7 @@ from typing import Any
 
 from alula.prove.skillset.explore import Edge, Graph
 from alula.prove.skillset.sets import Sets
-from alula.prove.skillset.steps import Key, Move, State, World
+from alula.prove.skillset.steps import Key, Move, State, TransitionSystem
 
 MOST_IN_A_LOOP = 500
 
@@ -19,8 +19,8 @@ MOST_IN_A_LOOP = 500
 class Walker:
     """Walks from the initial situation to sets."""
 
-    def __init__(self, world: World, sets: Sets) -> None:
-        self.world = world
+    def __init__(self, system: TransitionSystem, sets: Sets) -> None:
+        self.system = system
         self.sets = sets
 
     def reaches(self, goal: Any) -> bool:
@@ -30,7 +30,7 @@ class Walker:
     def to(self, goal: Any) -> list[Move] | None:
         """Return the steps of a short run to the goal, or None when there is no such set or none was found to walk."""
         rings = self._rings(goal)
-        state = self.world.initial()
+        state = self.system.initial()
         moves: list[Move] = []
         for ring in rings[::-1][1:]:
             move = next((m for m in self._real_moves(state) if self.sets.contains(ring, m.target)), None)
@@ -45,15 +45,15 @@ class Walker:
         moves = self.to(goal)
         if moves is None:
             return None
-        last = next((m for m in self.world.moves(self.end(moves)) if fault in m.faults), None)
+        last = next((m for m in self.system.moves(self.end(moves)) if fault in m.faults), None)
         return None if last is None else [*moves, last]
 
     def end(self, moves: list[Move]) -> State:
         """Return where a run gets to."""
-        return moves[-1].target if moves else self.world.initial()
+        return moves[-1].target if moves else self.system.initial()
 
     def _real_moves(self, state: State) -> Iterator[Move]:
-        return (move for move in self.world.moves(state) if move.step is not None)
+        return (move for move in self.system.moves(state) if move.step is not None)
 
     def _rings(self, goal: Any) -> list[Any]:
         """Return the goal, what is one step before it, and so on up to the initial situation; nothing when it is out of reach."""
@@ -76,8 +76,8 @@ class Walker:
 
         The last situation of the run is number ``len(moves)``.
         """
-        graph = Graph(self.world, self.sets.deadline)
-        path = [self.world.initial(), *(move.target for move in moves)]
+        graph = Graph(self.system, self.sets.deadline)
+        path = [self.system.initial(), *(move.target for move in moves)]
         for number, state in enumerate(path):
             edge = _edge(number - 1, number, moves[number - 1]) if number else None
             graph.states.append(state)

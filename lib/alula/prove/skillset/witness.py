@@ -1,4 +1,4 @@
-"""Values of data that show a step: the search knows that there are some, a counterexample has to name them."""
+"""Find values of data that make a step possible: the search knows that there are some, a counterexample has to name them."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""The words of a counterexample: what was done, what it changed, what it ended, what failed."""
+"""Format the steps of a counterexample: what was done, what it changed, what it ended, what failed."""
 
 from __future__ import annotations
 

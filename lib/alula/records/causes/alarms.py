@@ -1,4 +1,4 @@
-"""Which states of resources are bad news, by the robot's models and its file of faults; no name of a state says it.
+"""Decide which states of resources are alarms, by the robot's models and its file of faults, never by a state's name.
 
 A state is an alarm that the functional layer reports, and that a fault of the robot shows (``faults.yaml``) or that breaks an invariant
 of a skill, whatever the other resources are. In the state in which a resource begins, nothing has gone wrong yet, and a skill whose
@@ -20,7 +20,7 @@ from alula.model.expressions import Expression, ResourceIs, atoms
 from alula.model.model import Resource, Skillset
 
 ANY = "*"
-"""In a file of faults: any state, which says of none that it is bad."""
+"""In a file of faults: any state; it makes none of them an alarm."""
 
 
 class Alarm(Enum):

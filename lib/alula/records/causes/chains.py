@@ -1,4 +1,4 @@
-"""A failure's chain of causes: from the fault over what told of it to what the mission did, step by step."""
+"""Build a failure's chain of causes: the fault, its detection, the broken conditions, and the mission's reaction."""
 
 from __future__ import annotations
 
@@ -23,7 +23,7 @@ REPORTED = "reported by the functional layer"
 
 @dataclass(frozen=True)
 class Step:
-    """One step; ``told``: the text of a reaction for a sentence, where it is another."""
+    """One step of the chain; ``told``: its text within a sentence, where that differs."""
 
     step: str
     t_s: float
@@ -103,7 +103,7 @@ def _causes(failure: SkillFailure, fault: KnownFault | None, scene: Scene) -> It
 
 
 def _measurement(end: ExecutionEvent, fault: KnownFault | None, change: EngineEvent | None, scene: Scene) -> Iterator[Step]:
-    """Yield what a watch said of the sensor, else the value that an unmet condition asks."""
+    """Yield the judgement of a sensor's health check, else the value that an unmet condition tests."""
     sensors = [] if fault is None else [fault.name]
     if isinstance(change, TransitionEvent):
         sensors += [name for name in scene.judgements if scene.effects.of(name).shows(change)]

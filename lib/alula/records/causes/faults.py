@@ -1,4 +1,4 @@
-"""Faults of a run, and what followed from each: which resource told of it, which skills failed because of it."""
+"""Trace the faults of a run: which resource changes show each, and which executions failed because of it."""
 
 from __future__ import annotations
 
@@ -38,7 +38,7 @@ class Fault:
 
 @dataclass(frozen=True)
 class Traced:
-    """A fault and what followed from it, in the order of the events; ``changes`` are those of resources that told of it."""
+    """A fault and its consequences, in the order of the events; ``changes`` are the resource changes that show it."""
 
     fault: Fault
     changes: tuple[TransitionEvent, ...] = ()
@@ -46,18 +46,18 @@ class Traced:
 
     @property
     def first(self) -> EngineEvent | None:
-        """What told of it first; None: nothing."""
+        """The first event that shows it; None: there is none."""
         events: list[EngineEvent] = [*self.changes, *(one.end for one in self.failures)]
         return min(events, key=lambda event: event.stamp_s, default=None)
 
     @property
     def detected_s(self) -> float | None:
-        """When the skill layer first told of it, seconds of mission clock; None: never."""
+        """When the skill layer detected it, seconds of mission clock; None: never."""
         return None if self.first is None else self.first.stamp_s
 
     @property
     def detected_by(self) -> str:
-        """The change of a resource, or the end of a skill, that told of it first; empty: nothing did."""
+        """The change of a resource, or the end of a skill, that shows it first; empty: there is none."""
         event = self.first
         if event is None:
             return ""
@@ -127,7 +127,7 @@ def trace(faults: Sequence[Fault], events: Sequence[EngineEvent]) -> list[Traced
 
 
 def _cause(faults: Sequence[Fault], event: EngineEvent) -> int | None:
-    """Return the place of the last fault that can have brought about an event by itself."""
+    """Return the index of the last fault that can have caused an event by itself."""
     holding = [at for at, fault in enumerate(faults) if fault.holds(event.stamp_s)]
     if isinstance(event, TransitionEvent):
         suspects = [at for at in holding if faults[at].effects.shows(event)] or [at for at in holding if faults[at].effects.leads_to(event)]

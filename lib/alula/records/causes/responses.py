@@ -16,7 +16,7 @@ NO_SKILL = "no skill"
 NO_FAILURE = "nothing failed"
 """No skill failed because of it."""
 NOT_DETECTED = "not detected"
-"""No resource told of it, and no skill failed because of it."""
+"""No resource shows the fault, and no skill failed because of it."""
 
 
 @dataclass(frozen=True)

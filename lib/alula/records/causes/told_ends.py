@@ -1,4 +1,4 @@
-"""Ends of executions that only the mission was told of: managers that have gone tell of no event any more."""
+"""Complete a run's events by the ends that only the mission's record has: managers that died publish no event."""
 
 from __future__ import annotations
 
@@ -13,7 +13,7 @@ ENDS = frozenset(state.value for state in ExecutionState if state.terminal)
 
 
 def with_told_ends(events: Sequence[EngineEvent], entries: Iterable[Entry]) -> list[EngineEvent]:
-    """Return a run's events, and the ends that no event tells but the reports to the mission do, in the order of time.
+    """Return a run's events in the order of time, with the ends that only reports to the mission show.
 
     Kinds of results that are not told are those of the robot's model.
 

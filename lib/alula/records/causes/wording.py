@@ -47,7 +47,7 @@ def reason_in_words(text: str) -> str:
 
 
 def why_of(event: ExecutionEvent) -> str:
-    """Return why an execution ended, in words, without the name of the condition or the result; empty where nothing is said."""
+    """Return why an execution ended, in words, without the name of the condition or the result; empty where the event has no reason."""
     return in_words(event.message.removeprefix(f"{event.result}: "))
 
 

@@ -18,7 +18,7 @@ from alula.records.run import RecordedRun, load_recorded_run
 from alula.runtime.core.events import EngineEvent, ExecutionEvent
 
 TOGETHER_S = 0.05
-"""Decisions about several skillsets that are no farther apart have no order: each skillset tells of them by itself."""
+"""Seconds within which decisions about several skillsets have no order: each skillset publishes by itself."""
 FIGURES: Mapping[str, tuple[tuple[str, ...], str]] = {
     "duration": (("duration_s",), "s"),
     "detected after": (("recovery", "detected_s"), "s"),

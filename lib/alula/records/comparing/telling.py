@@ -8,7 +8,7 @@ from statistics import median
 from alula.records.comparing.sides import Compared, Side
 
 SIDE_BY_SIDE = 6
-"""More runs than these are told as distributions."""
+"""More runs than these are shown as distributions."""
 
 
 def spread(values: Sequence[float]) -> dict[str, float]:

@@ -1,4 +1,4 @@
-"""What an event log says to be the case in a skillset, and the rest of the step that is under way."""
+"""Represent what an event log allows to be the case in a skillset, with the rest of the step that is under way."""
 
 from __future__ import annotations
 
@@ -30,7 +30,7 @@ class Belief:
     stimulus: Stimulus | None = None
 
     def same_future(self, other: Belief) -> bool:
-        """Tell whether both allow the same from now on."""
+        """Return whether both allow the same events from now on."""
         mine, theirs = self.situation, other.situation
         same = mine.states == theirs.states and mine.running == theirs.running and self.open == other.open
         return same and self.since_ns == other.since_ns and self.expected == other.expected
@@ -49,7 +49,7 @@ def after_happening(states: Mapping[Running, ExecutionState], happening: Happeni
 
 
 def agrees(event: EngineEvent, happening: Happening) -> bool:
-    """Tell whether an event is what happens; texts for people are not compared."""
+    """Return whether an event records this happening; texts for people are not compared."""
     if isinstance(event, TransitionEvent):
         return happening == Change(event.resource, event.from_state, event.to_state, event.cause)
     return isinstance(happening, Entered) and _key(happening) == (Running(event.id, event.skill), event.state, event.result)
@@ -60,14 +60,14 @@ def _key(entered: Entered) -> tuple[Running, ExecutionState, str]:
 
 
 def told(happening: Happening) -> str:
-    """Say a happening as one would an event."""
+    """Format a happening as an event."""
     if isinstance(happening, Change):
         return f"{happening.resource} {happening.source} -> {happening.target} ({happening.cause})"
     return f"{happening.execution.skill} {happening.execution.id} {happening.state.value} {happening.result}".rstrip()
 
 
 def event_told(event: EngineEvent) -> str:
-    """Say what an event tells."""
+    """Format an event of the log."""
     if isinstance(event, TransitionEvent):
         return told(Change(event.resource, event.from_state, event.to_state, event.cause))
     return told(Entered(Running(event.id, event.skill), event.state, event.result))

@@ -1,4 +1,4 @@
-"""Says why an event is not allowed, and what would have been."""
+"""Explain why no step of the model has an event, and which events would have been allowed."""
 
 from __future__ import annotations
 
@@ -77,7 +77,7 @@ def _refused_state(skillset: Skillset, belief: Belief, execution: Running, event
 
 
 def _out_of_step(steps: LoggedSteps, belief: Belief, event: EngineEvent) -> str:
-    """Say what has to come before, where a step has this event further on; otherwise that no step has it."""
+    """Return which event has to come first, where a step has this event further on; otherwise that no step has it."""
     for step in steps.of(belief, event):
         if any(agrees(event, happening) for happening in step.happenings[1:]):
             return f"in the step that this belongs to ({step.stimulus}), {told(step.happenings[0])} comes first"
@@ -96,7 +96,7 @@ def allowed(steps: LoggedSteps, beliefs: Sequence[Belief]) -> tuple[str, ...]:
 
 
 def _beginning(step: Possible) -> str:
-    """Say the first event of a step, and what asks for the step if the event does not say it."""
+    """Return the first event of a step, and its stimulus where the event does not show it."""
     first = step.happenings[0]
     says_it = isinstance(first, Entered) or step.stimulus.cause in {Cause.EXTERN, Cause.EVENT}
     return told(first) + ("" if says_it else f" ({step.stimulus})")

@@ -1,4 +1,4 @@
-"""Holds the events of one skillset against its model, one after another, up to the first that the semantics does not allow.
+"""Check the events of one skillset against its model, one after another, up to the first that the semantics does not allow.
 
 A log does not say where a step begins, nor what data and time have decided. So the monitor keeps every belief that explains the log
 so far, most of the time one; an event that no belief allows is a finding.
@@ -19,7 +19,7 @@ from alula.runtime.core.events import EngineEvent, ExecutionEvent
 
 @dataclass(frozen=True)
 class Finding:
-    """The first event of a skillset that does not conform; ``allowed`` says what would have."""
+    """The first event of a skillset that does not conform; ``allowed`` lists the events that would have."""
 
     skillset: str
     sequence: int
@@ -90,13 +90,13 @@ class SkillsetMonitor:
 
     @property
     def owed(self) -> tuple[str, ...]:
-        """Return what has to follow in the step that is under way, by the likeliest belief; none where one sees nothing missing."""
+        """Return the events still missing of the step under way, by the first belief; none where some belief misses nothing."""
         if any(not belief.expected for belief in self._beliefs):
             return ()
         return tuple(told(happening) for happening in self._beliefs[0].expected)
 
     def _restarted(self, event: EngineEvent) -> bool:
-        """Tell whether an event is of managers that were restarted; in older logs: it is number 1 again, and time has passed."""
+        """Return whether managers were restarted before an event; in older logs: it is number 1 again, and time has passed."""
         if self._last is None:
             return False
         if event.instance_id and self._last.instance_id:

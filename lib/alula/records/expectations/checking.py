@@ -49,7 +49,7 @@ def _outcome(expectations: Expectations, run: RecordedRun) -> Iterator[Checked]:
 
 
 def _order(expectations: Expectations, run: RecordedRun) -> Iterator[Checked]:
-    """Look for each group behind the one before; a missing event does not move the search on, so that each is told by itself."""
+    """Search each group after the one before; a missing event does not move the search on, so that each is reported by itself."""
     matched: set[int] = set()
     since = -1
     for group in expectations.order:
@@ -111,7 +111,7 @@ def starts_or_ends(event: EngineEvent) -> bool:
 
 
 def told(event: EngineEvent) -> str:
-    """Say an event as a pattern says it."""
+    """Format an event in the notation of patterns."""
     if isinstance(event, TransitionEvent):
         return f"{event.skillset}.{event.resource} {event.to_state}"
     return f"{event.skillset}.{event.skill} {event.state.value} {event.result}".rstrip()

@@ -1,1 +1,1 @@
-"""Makes the decisions of a recorded mission again, and tells where they differ."""
+"""Replay the decisions of a recorded mission, and report where they differ."""

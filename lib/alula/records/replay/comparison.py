@@ -91,7 +91,7 @@ class Comparison:
             self.difference = self._made(self._below[0], None, None, self._below[1])
 
     def told(self, why: str, now_s: float) -> None:
-        """Take a difference below the decisions; it counts unless a decision differs soon, which tells more."""
+        """Add a difference below the decisions; it counts unless a decision differs soon after, which shows more."""
         if self._below is None:
             self._below = now_s, why
 

@@ -34,7 +34,7 @@ class RecordedMission:
 
 
 Answers = tuple[ReplayedRobot, Iterable[Entry]]
-"""What answers the tree, and what it is told, in the order of time."""
+"""The entries that are inputs of the tree, in the order of time."""
 MakeAnswers = Callable[[RecordedMission], Answers]
 
 

@@ -13,7 +13,7 @@ from alula.records.replay.recorded import Recorded, RecordedEnd
 
 
 def fitted(recorded: Recorded) -> Behaviour:
-    """Return the rules of a record; of several answers to the same inputs the last one counts."""
+    """Return the mock rules of a record; of several outcomes for the same inputs the last one counts."""
     rules: dict[tuple[str, str], list[Rule]] = defaultdict(list)
     for answer in reversed(list(recorded.answers.values())):
         if answer.state is ExecutionState.TERMINATED and answer.duration_s is not None:

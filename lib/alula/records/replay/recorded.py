@@ -124,7 +124,7 @@ class Recorded:
 
     @property
     def reported(self) -> bool:
-        """Tell whether it says what the tree was told, and not only what happened."""
+        """Return whether the record has the reports to the tree, and not only the events."""
         return any(entry.topic == REPORTS for entry in self.entries)
 
     def knowledge(self, decision: RecordedDecision) -> Knowledge:
@@ -177,7 +177,7 @@ def event_of(entry: Entry) -> EngineEvent:
 
 @contextlib.contextmanager
 def _of(file: Path, entry: Entry) -> Iterator[None]:
-    """Raise ReplayError, with the place, where an entry has not what a replay reads of it."""
+    """Raise ReplayError, naming the entry, where one lacks a field that a replay reads."""
     place = f"{file}: the message on {entry.topic} at {entry.stamp_s:.3f} s of mission clock"
     try:
         yield

@@ -1,4 +1,4 @@
-"""A recorded mission again, in virtual time and without ROS: its own tree, or another, is ticked when it was and told what it was told.
+"""Replay a recorded mission in virtual time, without ROS: its tree, or another, gets the recorded inputs at the recorded ticks.
 
 1. What the record says of the vehicle happens under real managers in virtual time (``vehicle``, ``functional``).
 2. The tree is ticked when it was ticked.
@@ -165,7 +165,7 @@ class Replay:
             self.vehicle.take(entry, diverged=self._comparison.difference is not None)
 
     def _obey(self, command: str, reason: str) -> None:
-        """Have the mission do what it was told from outside then, where it can now."""
+        """Give the mission the recorded commands of the operator, where it can obey them now."""
         if command == "abort":
             self._driver.abort(reason)
         elif command in {"pause", "resume"}:
@@ -216,7 +216,7 @@ class Replay:
             self._record.decision(kind, skillset, skill, execution_id, inputs)
 
     def report(self, skillset: str, handle: SkillHandle) -> None:
-        """Write what the tree is told of an execution."""
+        """Record a report of an execution to the tree."""
         if self._record is not None:
             self._record.report(skillset, handle)
 

@@ -46,7 +46,7 @@ class ReplayedSkill(MockSkill):
         self._vehicle.dispatched(execution, self)
 
     def progress(self, execution: Execution) -> float:
-        """Return what was told last."""
+        """Return the progress that was reported last."""
         told = self._vehicle.progress_of(execution.id)
         return super().progress(execution) if told is None else told
 
@@ -88,7 +88,7 @@ class ReplayHost(LocalMockHost):
 
 
 class ReplayedRobot:
-    """What there is at every depth: a world, the mock robot, and which execution is which of the record.
+    """Virtual time, the mock robot, and which execution is which of the record: the base of replays of every depth.
 
     Args:
         behaviour: of the mocks; what it has happen by the clock is left out, as the record tells it.
@@ -102,7 +102,7 @@ class ReplayedRobot:
         self.handles: dict[str, SkillHandle] = {}
         self.faults: list[FaultRequest] = []
         self.differs: Callable[[str], None] = lambda _: None
-        """Is told, in words, what was not done then, below the decisions of the tree."""
+        """Called with each difference below the decisions of the tree, in words."""
         rules = [rule for found in behaviour.rules.values() for rule in found]
         self.caused = {place for rule in rules for change in rule.changes or () for place in change.states}
         """The resources that skills have change."""
@@ -119,7 +119,7 @@ class ReplayedRobot:
         raise NotImplementedError
 
     def take(self, entry: Entry, *, diverged: bool) -> None:
-        """Have happen what an entry of the record tells; ``diverged``: the tree has decided otherwise than then."""
+        """Apply an entry of the record; ``diverged``: the tree has decided otherwise than in the record."""
         raise NotImplementedError
 
     def recorded_id(self, execution_id: str) -> str | None:
@@ -171,7 +171,7 @@ class RecordedSkills(ReplayedRobot):
         self._calls.setdefault(f"{skillset}.{skill}", deque()).append(answer)
 
     def next_answer(self, name: str) -> RecordedEnd | None:
-        """Return the record's answer to the next call of a skill; None where a mock answers."""
+        """Return the recorded outcome of the next call of a skill; None where a mock decides."""
         calls = self._calls.get(name)
         return calls.popleft() if calls else None
 
@@ -184,7 +184,7 @@ class RecordedSkills(ReplayedRobot):
                 self.world.clock.soon(lambda: self._end(recorded_id))
 
     def progress_of(self, execution_id: str) -> float | None:
-        """Return the progress that was told last of a recorded execution."""
+        """Return the last recorded progress of an execution."""
         recorded_id = self._recorded.get(execution_id)
         return None if recorded_id is None else self._progress.get(recorded_id, 0.0)
 
@@ -202,7 +202,7 @@ class RecordedSkills(ReplayedRobot):
     # --- what the record tells ---------------------------------------------------------------------------------------
 
     def report(self, recorded_id: str, progress: float, state: ExecutionState, outputs: Mapping[str, object]) -> None:
-        """Have the tree be told of an execution what it was told."""
+        """Report an execution to the tree as the record has it."""
         self._progress[recorded_id] = progress
         if state.terminal:
             self._passed.add(recorded_id)
@@ -213,7 +213,7 @@ class RecordedSkills(ReplayedRobot):
             handle.run(progress, dict(outputs))
 
     def take(self, entry: Entry, *, diverged: bool) -> None:
-        """Have happen what an entry of the record tells."""
+        """Apply an entry of the record."""
         value = entry.value
         if entry.topic == EVENTS:
             self._take_event(event_of(entry), diverged=diverged)

@@ -23,7 +23,7 @@ from alula.prove.skillset.explicit import search as one_by_one
 from alula.prove.skillset.explore import explore
 from alula.prove.skillset.local import local_checks
 from alula.prove.skillset.sets import Sets
-from alula.prove.skillset.steps import World
+from alula.prove.skillset.steps import TransitionSystem
 from alula.prove.skillset.symbolic import search as by_sets
 from alula.runtime.core import SkillsetEngine
 from alula.runtime.hooks import SkillHooks
@@ -40,7 +40,7 @@ def order_is_irrelevant(skillset):
 
 
 def graph_of(skillset):
-    return explore(World(without_data(skillset, ANY_TIME)), ANY_TIME, most=MOST)
+    return explore(TransitionSystem(without_data(skillset, ANY_TIME)), ANY_TIME, most=MOST)
 
 
 @settings(max_examples=60, **QUIET)
@@ -87,7 +87,7 @@ def test_a_bound_of_what_can_be_reached_finds_the_same_as_all_that_can_be(skills
         sets = Sets(encode(plain, 2, ANY_TIME), ANY_TIME)
         assert by_sets(skillset, plain, suspects, ANY_TIME, copies=2) == exactly
     if not sets.exact:
-        for number, state in enumerate(explore(World(plain), ANY_TIME, most=MOST).states):
+        for number, state in enumerate(explore(TransitionSystem(plain), ANY_TIME, most=MOST).states):
             assert sets.contains(sets.narrowed(sets.reached), state), number
 
 
@@ -204,7 +204,7 @@ def asked(edge, stimulus):
 
 def followed(graph, numbers):
     """Return these situations and what data and time make of them: they break one execution after the other."""
-    stuck = {(StepKind.INTERRUPT, s.name) for s in graph.world.skillset.skills if s.progress is not None}
+    stuck = {(StepKind.INTERRUPT, s.name) for s in graph.system.skillset.skills if s.progress is not None}
     found, todo = set(numbers), list(numbers)
     while todo:
         for edge in graph.edges[todo.pop()]:
@@ -226,7 +226,7 @@ def walk(skillset, seed, steps):
     chance = random.Random(seed)  # noqa: S311 - nothing here is secret
     bench, numbers = Bench(skillset), {0}
     for _ in range(steps):
-        stimuli = bench.stimuli(graph.world.copies)
+        stimuli = bench.stimuli(graph.system.copies)
         if not stimuli:
             return
         (kind,) = chance.choices(list(stimuli), [LIKELY[kind] for kind in stimuli])
