@@ -14,6 +14,8 @@ from alula.missions.part import MissionPart
 from alula.model.json_form import to_json
 from alula.model.model import Skillset
 from alula.prove.mission.conditions import Faults
+from alula.trees.access import takes_script_from_entry
+from alula.trees.palette import Palette
 from alula.trees.reading import TreeFiles, type_name
 
 WORD = re.compile(r"\w+")
@@ -23,7 +25,10 @@ ANYTHING = "*"
 
 def with_asked_resources(files: TreeFiles, models: Sequence[Skillset], part: MissionPart, faults: Faults) -> tuple[Skillset, ...]:
     """Return the models without the resources that nothing names; a state that the trees name keeps a resource that has it."""
-    words = {word for text in _texts(files, models, part) for word in WORD.findall(text)}
+    palette = palette_of(files, models, part)
+    if any(takes_script_from_entry(one, palette.get(type_name(one))) for tree in files.trees.values() for one in tree.iterate()):
+        return tuple(models)  # the script may come from outside, and name any of them
+    words = {word for text in _texts(files, palette) for word in WORD.findall(text)}
     shown = [state for name, states in faults.items() if name in words for state in states]
     if any(ANYTHING in state for state in shown):
         return tuple(models)
@@ -39,11 +44,11 @@ def with_asked_resources(files: TreeFiles, models: Sequence[Skillset], part: Mis
     return tuple(replace(one, resources=tuple(each for each in one.resources if (one.name, each.name) in kept)) for one in models)
 
 
-def _texts(files: TreeFiles, models: Sequence[Skillset], part: MissionPart) -> Iterator[str]:
+def _texts(files: TreeFiles, palette: Palette) -> Iterator[str]:
     """Yield all texts in which a mission can name a resource."""
     for tree in files.trees.values():
         for element in tree.iterate():
             yield type_name(element)
             yield from (one.value for one in element.attributes.values())
-    for kind in palette_of(files, models, part):
+    for kind in palette:
         yield from (port.default for port in kind.ports.values() if port.default)

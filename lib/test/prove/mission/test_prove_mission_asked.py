@@ -39,6 +39,7 @@ def kept(tree: str, faults: dict[str, frozenset[str]] | None = None) -> list[str
         ('<AlwaysSuccess _skipIf="s.door == OPEN || s.light != LIT"/>', ["door", "light", "arm"]),
         ("<Script code=\"why := reason('s.door')\"/>", ["door", "arm"]),
         ('<Script code="lit := LIT"/>', ["light", "arm"]),
+        ('<Script code="{given}"/>', ["door", "light", "arm", "idle"]),
     ],
 )
 def test_what_the_tree_or_the_model_names_is_kept(tree, names):
