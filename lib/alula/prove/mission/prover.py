@@ -163,7 +163,7 @@ class _Search:
             _explore(regions)
             return regions, several
 
-        return look_at(lambda why: self._read(why), look)
+        return look_at(self._read, look)
 
     def also(self, before: _Seen, deadline: Deadline, given: str) -> _Seen:
         """Look at runs in which hooks raise, managers die, or somebody aborts or pauses the mission; of those, what is new."""
