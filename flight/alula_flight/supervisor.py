@@ -175,7 +175,7 @@ class Supervisor:
         if self._part.cameras:
             from alula_flight.thumbnails import Thumbnails  # late: it needs OpenCV
 
-            Thumbnails(self._out).listen(self._part.cameras)
+            Thumbnails(self._out, lambda: self._clock.now_s or 0.0).listen(self._part.cameras)
         return launch
 
     def _end_asked(self, number: signal.Signals) -> None:

@@ -10,7 +10,7 @@ import json
 import logging
 import threading
 import time
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping
 from pathlib import Path
 from queue import Queue
 from typing import Any
@@ -88,19 +88,15 @@ def next_image(topic: str) -> Any:
         subscriber.unregister()
 
 
-def wait_until(due_s: float) -> None:
-    """Wait for a moment of the mission clock, at most ``LOOK_S`` longer; ``rospy.sleep`` would wake at each of its ticks."""
-    import rospy
-
-    while rospy.get_time() < due_s and not rospy.is_shutdown():
-        time.sleep(LOOK_S)
-
-
 class Thumbnails:
-    """Writes ``pictures.jsonl`` into a run's folder: ``{stamp_s, camera, jpeg}``, mission clock and base64. Needs an initialised rospy."""
+    """Writes ``pictures.jsonl`` into a run's folder: ``{stamp_s, camera, jpeg}``, mission clock and base64. Needs an initialised rospy.
 
-    def __init__(self, folder: Path) -> None:
+    ``now_s`` returns the mission clock: what is due is judged by when a picture came, as its stamp may be of another computer.
+    """
+
+    def __init__(self, folder: Path, now_s: Callable[[], float]) -> None:
         self._path = folder / PICTURES_FILE
+        self._now_s = now_s
         self._lock = threading.Lock()
 
     def listen(self, cameras: Mapping[str, str]) -> None:
@@ -115,15 +111,22 @@ class Thumbnails:
         while not rospy.is_shutdown():
             try:
                 message = next_image(topic)
-                stamp_s = message.header.stamp.to_sec()
-                first_s = stamp_s if first_s is None else first_s
-                self.add(camera, stamp_s, message)
-                wait_until(stamp_s + period_s(stamp_s - first_s))
+                came_s = self._now_s()
+                first_s = came_s if first_s is None else first_s
+                self.add(camera, message.header.stamp.to_sec(), message)
+                self._wait_until(came_s + period_s(came_s - first_s))
             except (ValueError, OSError) as error:
                 log.warning("no more pictures of %s: %s", camera, error)
                 return
             except rospy.ROSException:  # ROS shuts down, or its clock was set back
                 continue
+
+    def _wait_until(self, due_s: float) -> None:
+        """Wait for a moment of the mission clock, at most ``LOOK_S`` longer; ``rospy.sleep`` would wake at each of its ticks."""
+        import rospy
+
+        while self._now_s() < due_s and not rospy.is_shutdown():
+            time.sleep(LOOK_S)
 
     def add(self, camera: str, stamp_s: float, message: Any) -> None:
         """Write a picture; raise ValueError and OSError."""

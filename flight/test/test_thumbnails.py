@@ -5,6 +5,7 @@ from __future__ import annotations
 import base64
 import json
 import threading
+import time
 from collections.abc import Callable
 from pathlib import Path
 from queue import Queue
@@ -97,7 +98,7 @@ def test_a_camera_is_subscribed_to_for_one_image_a_second(ros_master: str, tmp_p
             if written.qsize() == 2:
                 raise OSError("the disk is full: no more pictures, and no subscriptions beside the tests that follow")
 
-    Watched(tmp_path).listen({"depth": "/camera/depth"})
+    Watched(tmp_path, time.monotonic).listen({"depth": "/camera/depth"})
     (thread,) = (one for one in threading.enumerate() if one.name == "thumbnails depth")
     camera = Camera("/camera/depth")
     thread.join(60.0)
