@@ -9,16 +9,16 @@ import tempfile
 from collections.abc import Collection, Iterator, Mapping, Sequence
 from contextlib import contextmanager
 from dataclasses import dataclass
-from functools import cached_property
 from pathlib import Path
 
 from alula.check.findings import findings_of
 from alula.check.robot import Warn, models_of, part_of
 from alula.common.robots import FAULTS, RobotFolder, find_robot
-from alula.common.scenarios import load_scenario, scenario_names
+from alula.common.scenarios import Scenario
 from alula.language.errors import Diagnostic
 from alula.language.messages import Messages, messages_of
 from alula.missions.part import MissionPart
+from alula.missions.scenario import by_mission, flown
 from alula.model.model import Skillset
 from alula.prove.mission.accepted import DESCRIPTION
 from alula.prove.mission.wanted import PROPERTY
@@ -26,7 +26,9 @@ from alula.records.causes.effects import FaultEffects
 from alula.records.causes.fault_file import load_effects
 from alula.repair.errors import RepairError
 from alula.trees.document import Document, Element, parse_document, read_source
-from alula.trees.reading import TreeFiles, node_name, read_files
+from alula.trees.library import Library
+from alula.trees.reading import TreeFiles, node_name
+from alula.trees.source import TreeSource
 
 _ACTIVE = re.compile(r"active\(\s*['\"](?P<node>[^'\"]+)['\"]\s*\)")
 _PROPERTY = re.compile(rf"\s*{PROPERTY.pattern};?", re.DOTALL)
@@ -37,11 +39,15 @@ class Subject:
     """A mission's file and what it is read with.
 
     Attributes:
+        flown_as: the mission's file that a scenario has inputs for: this one, else one with a main tree of the same name; else this one.
+        library: that of this scenario.
         faults: what each fault of the robot brings about.
     """
 
     path: Path
+    flown_as: Path
     source: bytes
+    library: Library
     files: TreeFiles
     robot: RobotFolder
     skillsets: tuple[Skillset, ...]
@@ -58,21 +64,19 @@ class Subject:
             raise RepairError(f"{path}: the robot in {robot.root} has no skills to repair it with")
         file = robot.file(FAULTS)
         faults = {} if file is None else load_effects(file, models).known
-        return cls(path, read_source(path), read_files(path), robot, models, part_of(robot, tell), messages_of(robot), faults)
+        source = read_source(path)
+        flown_as, scenario = _flown_as(path, parse_document(source, str(path)).root)
+        tree = TreeSource(path) if scenario is None else flown(path, scenario)
+        return cls(path, flown_as, source, tree.library, tree.read(), robot, models, part_of(robot, tell), messages_of(robot), faults)
+
+    def tree(self, path: Path) -> TreeSource:
+        """Return where the mission, or a copy of it with changes, is read from."""
+        return TreeSource(path, self.library)
 
     @property
     def shown(self) -> Mapping[str, frozenset[str]]:
         """The states in which faults show, as properties ask for them."""
         return {name: one.states for name, one in self.faults.items() if one.states}
-
-    @cached_property
-    def flown_as(self) -> Path:
-        """The mission's file that a scenario has inputs for: this one, else the one with a main tree of the same name; else this one."""
-        missions = [self.robot.root / load_scenario(name).mission for name in scenario_names()]
-        files = [one for one in missions if one.suffix == ".xml" and one.is_file()]
-        if any(one.samefile(self.path) for one in files):
-            return self.path
-        return next((one for one in files if read_files(one).main == self.files.main), self.path)
 
     @property
     def at_rest(self) -> list[tuple[str, str]]:
@@ -87,7 +91,7 @@ class Subject:
 
     def findings(self, text: str) -> list[Diagnostic]:
         """Return what `check` finds in another text of the file without looking at its runs."""
-        return findings_of(str(self.path), text.encode(), self.skillsets, (), self.part, self.messages)
+        return findings_of(str(self.path), text.encode(), self.skillsets, (), self.part, self.messages, self.library)
 
     @contextmanager
     def copy(self, text: str) -> Iterator[Path]:
@@ -111,6 +115,20 @@ class Subject:
         there = {node_name(one) for one in elements}
         asked = (match["node"] for one in elements for match in _ACTIVE.finditer(one.get(DESCRIPTION)))
         return {name: None for name in asked if name not in there}
+
+
+def _flown_as(path: Path, root: Element) -> tuple[Path, Scenario | None]:
+    missions = by_mission()
+    if path.resolve() in missions:
+        return path, missions[path.resolve()]
+    alike = (
+        one for one in missions.items() if one[0].is_file() and _main(parse_document(read_source(one[0]), str(one[0])).root) == _main(root)
+    )
+    return next(alike, (path, None))
+
+
+def _main(root: Element) -> str:
+    return root.get("main_tree_to_execute") or next((one.get("ID") for one in root.children if one.tag == "BehaviorTree"), "")
 
 
 def without_properties_of(root: Element, missing: Collection[str]) -> list[str]:
