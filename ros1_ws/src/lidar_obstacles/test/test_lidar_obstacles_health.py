@@ -74,6 +74,7 @@ BREAKS = {
     "noise of 0.2 m": (lambda points, _: scattered(points, 0.2), FaultKind.RANGE, "m where they are smoothest"),
     "half as far": (lambda points, _: points * 0.5, FaultKind.RANGE, "all ranges became at least"),
     "millimetres": (lambda points, _: points * 1000, FaultKind.RANGE, "are the coordinates in millimetres?"),
+    "bytes in the other order": (lambda points, _: points.astype(np.float32).byteswap(), FaultKind.RANGE, "order of the bytes"),
     "frozen but for a value": (frozen, FaultKind.FROZEN, "the sweep is the same as the one before"),
 }
 

@@ -29,6 +29,7 @@ SECTOR_RETURNS = 50  # of the sample; a sector with fewer can't be missed
 NEAR = 1.5  # of the vehicle's radius: what comes nearer soon is taken for the vehicle, or is too near to be seen
 LEFT_BEHIND_M = 5.0  # from where returns were lost: what was seen there tells nothing of what is to be seen here
 BLIND_RETURNS = 5  # of the sample: with as many, a sector is not blind
+NO_UNIT_M = 1e7  # a range beyond is none in millimetres either
 FROZEN_SHARE = 0.9  # of the points, at the same place to the last bit
 
 
@@ -191,8 +192,11 @@ class CloudJudge:
         if share <= self._limits.far_share:
             return ""
         middle = float(np.median(ranges))
-        unit = ": are the coordinates in millimetres?" if middle > self._limits.max_range_m else ""
-        return f"{share:.0%} of the returns are beyond {self._limits.max_range_m:g} m, half of all beyond {middle:.0f} m{unit}"
+        cause = ": are the coordinates in millimetres?" if middle > self._limits.max_range_m else ""
+        size = f"{middle:.1e}" if middle > NO_UNIT_M else f"{middle:.0f}"
+        if float(ranges.max()) > NO_UNIT_M:
+            cause = ": is the order of the bytes (is_bigendian) right, or are the fields at other places?"
+        return f"{share:.0%} of the returns are beyond {self._limits.max_range_m:g} m, half of all beyond {size} m{cause}"
 
     def _against_the_past(self, sectors: _Sectors, before: Floats, stride: int, stamp_ns: int) -> Finding:
         counts, expected = sectors.counts, self._expected(before)

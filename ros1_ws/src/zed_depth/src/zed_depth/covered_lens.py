@@ -56,7 +56,8 @@ def covered_finding(left: Gray, right: Gray, offset_px: float, gain: float) -> F
             return broken(FaultKind.VIEW, told)
         other_light = max(other_light, float(np.mean(mine_is_darker | mine_is_brighter)))
     if other_light > COVERED_LIGHT:
-        return broken(FaultKind.VIEW, f"a lens is partly covered: {other_light:.0%} of the view is much darker or brighter in one image")
+        told = f"{other_light:.0%} of the view is much darker or brighter in one image"
+        return broken(FaultKind.VIEW, f"{told}: a lens is partly covered, or the cameras expose or convert the light differently")
     return None
 
 

@@ -62,7 +62,8 @@ def fit_of(disparity_px: Pixels, left: Gray, right: Gray, *, last_px: float, noi
     share, known_share = _shares(textured, known, alike)
     if share < FIT or known_share < KNOWN_FIT:
         told = f"{share:.0%} of what has texture looks alike in both, {known_share:.0%} of what has a depth"
-        return Fit(broken(FaultKind.VIEW, f"the images do not fit each other: {told}"))
+        causes = "look at the exposure of both cameras, and at the transfer (compression, lost or old parts)"
+        return Fit(broken(FaultKind.VIEW, f"the images do not fit each other: {told}: {causes}"))
     half = len(pixels) // 2
     for name, rows in (("upper", slice(None, half)), ("lower", slice(half, None))):
         share, known_share = _shares(textured[rows], known[rows], alike[rows])

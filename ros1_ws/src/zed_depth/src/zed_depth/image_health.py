@@ -73,12 +73,11 @@ class ImageJudge:
             return broken(FaultKind.EXPOSURE, f"{side} image is overexposed: {saturated:.0%} of it is white")
         if mean < limits.dark_mean and contrast < 2.0 * limits.min_contrast:
             return broken(FaultKind.EXPOSURE, f"{side} image is dark ({told})")
-        if (
-            previous is not None
-            and previous.shape == sample.shape
-            and np.count_nonzero(previous != sample) < limits.min_changed * sample.size
-        ):
-            return broken(FaultKind.FROZEN, f"{side} image is frozen")
+        if previous is not None and previous.shape == sample.shape:
+            changed = np.count_nonzero(previous != sample) / sample.size
+            if changed < limits.min_changed:
+                causes = "the driver repeats it, or its encoding is another one than it says"
+                return broken(FaultKind.FROZEN, f"{side} image is frozen, {changed:.2%} of its pixels have changed: {causes}")
         if contrast < limits.min_contrast:
             self._blank.add(side)
             return broken(FaultKind.EXPOSURE, f"{side} image is blank ({told})")

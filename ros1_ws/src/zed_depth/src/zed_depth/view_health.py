@@ -176,14 +176,18 @@ def _rows_finding(fit: RowFit, shape: tuple[int, ...], limits: ViewLimits) -> Fi
         f"the images differ in scale by at least {abs(fit.per_row):.1%}": abs(fit.per_row) * height / 4.0,
     }
     told = max(troubles, key=lambda trouble: troubles[trouble])
-    return broken(FaultKind.CALIBRATION, f"{told}: calibrate the pair") if troubles[told] > limits.max_vertical_px else None
+    # Of a vehicle that moves, an image that is late is turned, moved and scaled, too.
+    causes = "a camera has moved (calibrate the pair), or one image is older than the other (look at the synchronisation)"
+    return broken(FaultKind.CALIBRATION, f"{told}: {causes}") if troubles[told] > limits.max_vertical_px else None
 
 
 def _parallax_finding(matched_px: Floats, limits: ViewLimits) -> Finding | None:
     """Judge disparities of matched features (N,), from infinity on."""
     negative = float(np.mean(matched_px < -1.0))
     if negative > limits.max_negative:
-        return broken(FaultKind.CALIBRATION, f"left and right are swapped: {negative:.0%} of the features have a negative disparity")
+        told = f"{negative:.0%} of the features have a negative disparity"
+        causes = "left and right are swapped, or both images are mirrored or upside down"
+        return broken(FaultKind.CALIBRATION, f"{told}: {causes}")
     if float(np.percentile(np.abs(matched_px), 95.0)) < limits.min_parallax_px:
         return unsure(FaultKind.VIEW, "no parallax: everything is far away, or both cameras show the same")
     return None
