@@ -17,7 +17,7 @@ from alula.common.faults import FaultError, parse_fault
 from alula.common.network import DOMAINS, NAMESPACE, DomainClaim, free_port
 from alula.common.robots import find_robot, fleet_name
 from alula.common.scenarios import Scenario, ScenarioError, load_scenario
-from alula.common.suggestions import nearest
+from alula.common.suggestions import with_nearest
 from alula.runtime.live import options
 from alula.runtime.live.part import RunPart
 from alula.runtime.live.spec import RequestError, RunSpec
@@ -128,7 +128,7 @@ def member_words(scenario: Scenario, fail: Sequence[str], options: Sequence[str]
     robots, said = find_robot().robots, dict(scenario.robots)
     for name in said:
         if name not in robots:
-            raise RequestError(f"the scenario {scenario.name} names a robot {name}; {nearest(name, robots)}")
+            raise RequestError(with_nearest(f"the scenario {scenario.name} names a robot {name}", name, robots))
     if missing := [name for name in robots if name not in said]:
         how = f"add `robots: {{{missing[0]}: standby}}`, or --served"
         raise RequestError(f"the scenario {scenario.name} does not say how {missing[0]} serves its skills; {how}")

@@ -9,7 +9,7 @@ from alula.common.errors import AlulaError
 from alula.common.located_yaml import Located, read_yaml
 from alula.common.public import public
 from alula.common.robots import RobotError, find_robot
-from alula.common.suggestions import nearest
+from alula.common.suggestions import with_nearest
 
 NEEDED = ("about", "skillsets")
 KEYS = ("about", "world", "mission", "skillsets", "launch", "report", "faults", "processes", "fallback", "motion", "robots", "library")
@@ -77,7 +77,7 @@ def load_scenario(name: str, folder: Path | None = None) -> Scenario:
     """Read a scenario; raises ScenarioError."""
     names = scenario_names(folder)
     if name not in names:
-        raise ScenarioError(f"there is no scenario '{name}'; {nearest(name, names)}")
+        raise ScenarioError(with_nearest(f"there is no scenario '{name}'", name, names))
     path = (folder or scenarios_folder()) / f"{name}.yaml"
     document = read_yaml(path, ScenarioError)
     if document is None:

@@ -29,6 +29,12 @@ def nearest(name: str, known: Iterable[str]) -> str:
     return ""
 
 
+def with_nearest(message: str, name: str, known: Iterable[str]) -> str:
+    """Return a message about a name that is not known, with the hint of `nearest` behind it where there is one."""
+    hint = nearest(name, known)
+    return f"{message}; {hint}" if hint else message
+
+
 def quoted(names: Sequence[str]) -> str:
     """Return names in backquotes, comma separated."""
     return ", ".join(f"`{name}`" for name in names)

@@ -10,7 +10,7 @@ from pathlib import Path
 from alula.common.faults import FaultError, FaultRequest, parse_fault
 from alula.common.robots import RobotError, find_robot
 from alula.common.scenarios import ScenarioError, load_scenario
-from alula.common.suggestions import nearest
+from alula.common.suggestions import with_nearest
 from alula.language.errors import LanguageError
 from alula.language.load import load_skillset
 from alula.missions.plan import InputError, Inputs, MissionPlan
@@ -56,7 +56,7 @@ def skillsets_for(plan: MissionPlan, models: Sequence[Path]) -> list[Skillset]:
         except LanguageError as error:
             raise ReplayError(f"--model {path}: {str(error).splitlines()[0]}") from error
         if other.name not in own:
-            raise ReplayError(f"--model {path}: the mission has no skillset {other.name}; {nearest(other.name, list(own))}")
+            raise ReplayError(with_nearest(f"--model {path}: the mission has no skillset {other.name}", other.name, own))
         own[other.name] = other
     return list(own.values())
 
@@ -71,7 +71,7 @@ def parameters_for(recorded: Recorded, plan: MissionPlan, settings: Sequence[str
         name, _, text = setting.partition("=")
         name = name.removeprefix("mission.")
         if name not in values:
-            raise ReplayError(f"--set {setting}: the mission has no parameter {name}; {nearest(name, list(values))}")
+            raise ReplayError(with_nearest(f"--set {setting}: the mission has no parameter {name}", name, values))
         try:
             values[name] = float(text)
         except ValueError:

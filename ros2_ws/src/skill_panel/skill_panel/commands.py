@@ -21,7 +21,7 @@ from alula.common.errors import AlulaError
 from alula.common.record import EVENTS, FILE, RecordFollower
 from alula.common.runs import LATEST, find_run, load_run
 from alula.common.signals import Interrupts, on_end_signal
-from alula.common.suggestions import nearest
+from alula.common.suggestions import nearest, with_nearest
 from alula.runtime.core.events import event_record
 from skill_panel.__main__ import LIST_S, Place, place_of
 from skill_panel.watcher import all_found, skillsets_in
@@ -55,7 +55,7 @@ def find_skill(clients: Clients, name: str) -> tuple[Any, str]:
     known = [f"{n}.{s.name}" for n, c in clients.items() for s in c.model.skills]
     if found:
         raise CommandError(f"several skillsets have a skill {skill}; write {' or '.join(k for k in known if k.endswith(f'.{skill}'))}")
-    raise NotThereError(f"there is no skill {name}; {nearest(name, [*known, *(k.partition('.')[2] for k in known)])}")
+    raise NotThereError(with_nearest(f"there is no skill {name}", name, [*known, *(k.partition(".")[2] for k in known)]))
 
 
 def find_member(clients: Clients, name: str, what: str) -> tuple[Any, str]:
