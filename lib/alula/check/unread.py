@@ -38,7 +38,8 @@ def never_read(whole: Whole) -> Iterator[Problem]:
     for site in whole.root.walk():
         for name, attribute, place in _written(site, whole.scripts):
             key = site.board.key(name)
-            if key not in read and key not in told:
+            included = attribute.place.path != whole.root.element.place.path  # another mission that includes it may read it
+            if key not in read and key not in told and not included:
                 told.add(key)
                 yield _unread(name, attribute, place, names)
 

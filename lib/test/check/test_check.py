@@ -245,6 +245,16 @@ def test_a_default_that_is_no_value_of_its_port_is_told_with_its_place(model, te
     assert cure in finding.hint
 
 
+def test_what_an_included_file_writes_another_mission_may_read(robot, tmp_path):
+    tree = '<BehaviorTree ID="look"><Script code="@seen := 1"/></BehaviorTree>'
+    (tmp_path / "more.xml").write_text(f'<root BTCPP_format="4">{tree}</root>')
+    main = '<BehaviorTree ID="mission"><SubTree ID="look"/></BehaviorTree>'
+    text = f'<root BTCPP_format="4" main_tree_to_execute="mission">{{}}{main}{{}}</root>'
+    path = str(tmp_path / "mission.xml")
+    assert codes(findings_of(path, text.format('<include path="more.xml"/>', "").encode(), robot)) == []
+    assert codes(findings_of(path, text.format("", tree).encode(), robot)) == ["ALU624"]
+
+
 def test_what_may_never_come_at_once_is_a_warning(robot):
     late = '<Sequence><Sleep msec="9"/><drone.turn angle="1"/></Sequence>'
     text = '<ForceSuccess><Parallel><drone.hover duration="1"/>{}</Parallel></ForceSuccess>'
