@@ -65,7 +65,8 @@ def foreign_types(mains: Sequence[TreeFiles]) -> dict[str, NodeType]:
         for attribute in filter(is_port, node.attributes):
             given.setdefault((type_name(node), attribute), []).append(node.get(attribute))
     used = {type_name(node) for tree in trees for node in nodes_of(tree)}
-    models = {one.name: one for one in nav2.palette()} | {name: one for files in reversed(mains) for name, one in files.models.items()}
+    models = {one.name: one for one in nav2.palette() if all(port in one.ports for name, port in given if name == one.name)}
+    models.update((name, one) for files in reversed(mains) for name, one in files.models.items())
     declared = Palette(replace(one, category=_category(one)) for name, one in models.items() if name in used and known.get(name) is None)
     guessed = [_widened(one, given) for one in guessed_types(trees, known)]
     undeclared = [_widened(one, given) for one in guessed_types(trees, known | declared)]

@@ -161,6 +161,12 @@ def test_a_port_with_a_text_that_its_type_is_not_read_from_is_a_text(tmp_path):
     assert skills == {"blink": {"mode": "string"}, "wait": {"for_port": "float64"}}
 
 
+def test_nodes_that_nav2_declares_are_known_unless_their_ports_are_others(tmp_path):
+    skillset = skillset_of(made(tmp_path, main=tree('<GoalReached goal="{g}"/>', '<Wait wait_duration="5"/>', '<Spin turns="2"/>')))
+    assert [one.name for one in skillset.resources] == ["goal_reached"]
+    assert {one.name: shape_of(one)[0] for one in skillset.skills}["spin"] == {"turns": "int32"}
+
+
 def test_an_input_that_a_use_leaves_out_is_given(tmp_path, about):
     robot = about(made(tmp_path, main=tree('<Go a="1" on="true" b="x"/>', "<Go/>")))
     second = elements(robot / "missions/main.xml", "rover.go")[1]
