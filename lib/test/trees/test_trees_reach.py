@@ -73,7 +73,9 @@ def test_no_child_that_the_field_reaches_is_called_unreachable():
 
 
 def codes(node, palette=None):
-    return [one.code for one in check(read_text(ROOT.format(node)), palette or standard_palette(), PlainTraits())]
+    """Return what is found, but for entries that nothing reads, which these trees write to have conditions."""
+    found = check(read_text(ROOT.format(node)), palette or standard_palette(), PlainTraits())
+    return [one.code for one in found if one.code != "ALU624"]
 
 
 REACHED = (
@@ -179,5 +181,6 @@ def test_conditions_that_exclude_each_other_let_two_children_run(one, other):
 
 @pytest.mark.parametrize(("one", "other"), TOGETHER)
 def test_two_children_that_may_run_are_a_warning(one, other):
-    (found,) = check(read_text(TWO.format(one, other).join(ROOT.split("{}"))), standard_palette(), PlainTraits())
+    problems = check(read_text(TWO.format(one, other).join(ROOT.split("{}"))), standard_palette(), PlainTraits())
+    (found,) = (one for one in problems if one.code != "ALU624")
     assert (found.code, found.warning) == ("ALU611", True)
