@@ -138,7 +138,7 @@ def test_without_another_sensor_it_is_impossible_and_says_why(no_lidar: Path, ca
 
 def test_a_branch_may_be_forbidden_to_do_something(no_lidar: Path, capsys: pytest.CaptureFixture[str]) -> None:
     found = answer(capsys, no_lidar, "--fault", "zed", "--most-faults", "1", "--never", "running(navigation.lock_head)", code=1)
-    assert found["answer"] == "unknown"
+    assert (found["answer"], found["stopped"]) == ("unknown", False)
 
 
 def test_a_branch_that_an_abort_or_a_death_breaks_is_no_repair(no_lidar: Path, capsys: pytest.CaptureFixture[str]) -> None:
@@ -273,4 +273,5 @@ def test_ctrl_c_ends_the_search_with_what_it_has(no_lidar: Path) -> None:
                 break
         said, progress = search.stdout.read(), search.stderr.read()
         assert search.wait() == 1, progress
-    assert json.loads(said)["answer"] == "unknown"
+    found = json.loads(said)
+    assert (found["answer"], found["stopped"]) == ("unknown", True)

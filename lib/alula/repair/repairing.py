@@ -102,7 +102,7 @@ class Answer:
     """What came of the search: a repair, or why there is none.
 
     ``impossible``: it can't be accomplished with the fault, as ``reasons`` show; a repair then brings it to a safe end. Else, without a
-    repair, nobody knows.
+    repair, nobody knows; ``stopped``: not all branches were tried, as the time was over, or somebody ended the search.
     """
 
     failing: tuple[Failing, ...]
@@ -111,6 +111,7 @@ class Answer:
     impossible: bool = False
     reasons: tuple[str, ...] = ()
     tried: int = 0
+    stopped: bool = False
 
     @property
     def survives_already(self) -> bool:
@@ -139,6 +140,7 @@ class Search:
         self._judge = Judge(subject, deadline, self._goal, question.most_faults)
         self._patterns = Patterns(subject, question.using, question.most_faults)
         self._refuted: set[frozenset[str]] = set()
+        self._stopped = False
         self._missing = tuple(subject.names_asked())
 
     @cached_property
@@ -167,14 +169,14 @@ class Search:
         fate = self._judge.fate(text, fault) if fault else None
         if fate is not None and fate.survives:
             return Answer(tuple(failing), fate)
-        self._tell(f"{'; '.join(one.words for one in failing)}: {_told(fate)}")
+        self._tell(f"{'; '.join(dict.fromkeys(one.words for one in failing))}: {_told(fate)}")
         reasons = next((lines for one in failing if (lines := self._why_impossible(text, one))), [])
         if reasons and (fate is None or fate.safe):
             return Answer(tuple(failing), fate, None, impossible=True, reasons=tuple(reasons))
         repair, tried = self._first_proved(before, failing, fate, finding)
         if repair is not None:
             repair = self._with_fates(text, repair)
-        return Answer(tuple(failing), fate, repair, bool(reasons), tuple(reasons), tried)
+        return Answer(tuple(failing), fate, repair, bool(reasons), tuple(reasons), tried, self._stopped)
 
     def _can_be_asked(self) -> None:
         """Raise RepairError where a condition that is asked for names what the robot has not."""
@@ -234,6 +236,7 @@ class Search:
             try:
                 found = self._judged(branch, before, fate, finding)
             except OutOfTimeError:
+                self._stopped = True
                 return None, tried
             if isinstance(found, Repair):
                 return replace(found, tried=tried), tried

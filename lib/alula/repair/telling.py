@@ -15,11 +15,12 @@ Both = tuple[Odds, Odds]
 
 def as_text(answer: Answer, odds: Both | None) -> str:
     """Return lines for a terminal."""
-    what = "; ".join(one.words for one in answer.failing)
+    what = "; ".join(dict.fromkeys(one.words for one in answer.failing))
     if answer.survives_already:
         return f"nothing to repair: {what}, and the mission survives it\n"
     if answer.repair is None:
-        head = "impossible" if answer.impossible else "unknown: no branch was proved"
+        when = " before the search was ended" if answer.stopped else ""
+        head = "impossible" if answer.impossible else f"unknown: no branch was proved{when}"
         lines = [f"{head}: {what} ({answer.tried} branches tried)", *(f"  {one}" for one in answer.reasons)]
         return "\n".join(lines) + "\n"
     return "\n".join(_of_repair(answer.repair, what, odds, answer.reasons)) + "\n"
@@ -53,6 +54,7 @@ def as_dict(answer: Answer, odds: Both | None) -> dict[str, object]:
         "answer": kind,
         "failing": [{"skill": one.skill, "node": one.leaf.name, "fault": one.fault} for one in answer.failing],
         "tried": answer.tried,
+        "stopped": answer.stopped,
         "reasons": list(answer.reasons),
     }
     if repair is None:
