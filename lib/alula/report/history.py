@@ -8,11 +8,13 @@ from __future__ import annotations
 
 from collections.abc import Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field, replace
+from functools import cached_property
 from pathlib import Path
 from typing import Any
 
 from alula.common.record import EVENTS, Entry, RecordFollower
 from alula.common.run_log import account
+from alula.records.causes.failures import SkillFailure, skill_failures
 from alula.records.causes.told_ends import with_told_ends
 from alula.records.tree import Places, places_in
 from alula.report.files import Problems, mapping
@@ -33,6 +35,11 @@ class History:
     last_s: float | None = None
     mission: Mapping[str, Any] = field(default_factory=dict)
     """What the mission was to do and how it ended; empty where that is not known."""
+
+    @cached_property
+    def failures(self) -> tuple[SkillFailure, ...]:
+        """The executions that ended badly, in the order of the events."""
+        return tuple(skill_failures(self.events))
 
     def of_skill(self, skill: str) -> list[ExecutionRecord]:
         """Return the executions of a skill, whatever skillset it belongs to."""

@@ -10,7 +10,6 @@ from alula.common.faults import DIED
 from alula.common.scenarios import Scenario
 from alula.model.execution_state import ExecutionState
 from alula.records.causes.alarms import Alarm, Alarms
-from alula.records.causes.failures import skill_failures
 from alula.records.causes.faults import EARLY_S
 from alula.report.history import History
 from alula.report.observed import Observed
@@ -72,7 +71,7 @@ def _recovery(one: FaultResponse, fallback_s: float | None, moving_s: float | No
 def _fallback(skill: str, history: History, one: FaultResponse) -> float | None:
     """Return when the fallback ran in response to a fault: in the branch that took over, or before anything else failed."""
     first = one.traced.failures[0]
-    others = [failure for failure in skill_failures(history.events) if failure.at > first.at and failure not in one.traced.failures]
+    others = [failure for failure in history.failures if failure.at > first.at and failure not in one.traced.failures]
     other_s = min((failure.end.stamp_s for failure in others), default=math.inf)
 
     def responds(execution: ExecutionRecord) -> bool:
@@ -92,7 +91,7 @@ def _unexplained(history: History, responses: Sequence[FaultResponse], alarms: A
         for change in history.transitions
         if alarms.of(f"{change.skillset}.{change.resource}", change.to_state) is Alarm.ALWAYS and change not in changes
     ]
-    ended = [failure for failure in skill_failures(history.events) if failure.end.state in ENDED_BY_ITSELF]
+    ended = [failure for failure in history.failures if failure.end.state in ENDED_BY_ITSELF]
     failed = [failure.end.stamp_s for failure in ended if failure.at not in explained]
     return min([*broken, *failed]) if broken else None
 
