@@ -269,7 +269,7 @@ class Codecs:
         )
 
     def _happened(self, stamp_ns: int) -> int | None:
-        """Return the moment of a stamp; one below 0 says that it has not happened."""
+        """Return the moment of a stamp; one below 0: it has not happened."""
         return None if stamp_ns < 0 else self._clock.moment_ns(stamp_ns)
 
     # --- services ----------------------------------------------------------------------------------------------------

@@ -13,7 +13,7 @@ _VECTOR_FIELDS = ["x", "y", "z"]
 
 @dataclasses.dataclass(frozen=True)
 class FieldTypes:
-    """How one ROS world tells the fields of its messages, and what it calls their types; any other type is a message's."""
+    """How one ROS version describes the fields of its messages, and names their types; any other type is a message's."""
 
     fields_of: Callable[[Any], dict[str, str]]
     """Returns the fields of a message or its class with their types."""

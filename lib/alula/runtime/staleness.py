@@ -1,4 +1,4 @@
-"""When what the functional layer tells is too old to be believed: values of data, and states of resources."""
+"""Decide when reports of the functional layer are too old: values of data, and states of resources."""
 
 from __future__ import annotations
 

@@ -39,7 +39,7 @@ class Acceptance:
 
 
 def acceptances(nodes: Sequence[Node]) -> list[Acceptance]:
-    """Return what the nodes' descriptions accept; a subtree that stands in several places says it once."""
+    """Return what the nodes' descriptions accept; a subtree that is used several times counts once."""
     return list(dict.fromkeys(one for node in nodes for one in _of(node)))
 
 

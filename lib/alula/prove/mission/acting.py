@@ -1,4 +1,4 @@
-"""What acts below a mission that is played: functions that end when the run says so, and requests that arrive when it says so."""
+"""Stand in below a mission that is played: functions end, and requests arrive, when the run of the counterexample has it."""
 
 from __future__ import annotations
 
@@ -43,7 +43,7 @@ class Function(SkillHooks):
         return f"{execution.skill} does not go on, as in the counterexample"
 
     def on_interrupt(self, execution: Execution) -> bool | None:
-        """Wait until the run says that it is done."""
+        """Wait until the run ends it."""
         return execution.done
 
 

@@ -17,7 +17,7 @@ CALM = frozenset({Kind.TICK, Kind.START, Kind.INTERRUPT})
 
 
 def calm_of(system: System, *, terminating: bool) -> Callable[[Event], bool]:
-    """Return what tells whether a step is calm; executions end well some time where they are ``terminating``."""
+    """Return the predicate of calm steps; executions end well some time where they are ``terminating``."""
     good = {
         f"{skillset.name}.{skill.name}": {result.name for result in skill.results if skill.kind_of(result.name) is ResultKind.SUCCESS}
         or {result.name for result in skill.results}

@@ -30,7 +30,7 @@ class Group(NamedTuple):
 
 
 class _Way(NamedTuple):
-    """What a tick can come to: an outcome, or what follows from answers.
+    """The results that a tick can have: an outcome, or a question with what follows each answer.
 
     Of observations all that follow count (``parts``), of what nobody knows any one. Into a target come the managers that each skillset's
     ``must`` holds, and of each of ``either`` one.

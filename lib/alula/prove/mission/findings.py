@@ -131,7 +131,7 @@ def _never(regions: Regions) -> Iterator[Diagnostic]:
 
 
 def _never_ticked(regions: Regions) -> Iterator[Diagnostic]:
-    """Yield ALU703 for nodes that no run ticks; below one of them the others are not told."""
+    """Yield ALU703 for nodes that no run ticks; nodes below one of them are left out."""
     ticked = {number for region in regions.regions for _, one in region.next for outcome, _ in one.ways for number, _ in outcome.touched}
     nodes = regions.system.nodes
     never = {id(node) for number, node in enumerate(nodes) if number not in ticked and node in regions.system.trees[0].nodes}

@@ -39,7 +39,7 @@ def fits(values: Values, question: Question, answer: Answer) -> bool:
 
 
 def agree(values: Values, choices: Iterable[Asked]) -> bool:
-    """Tell whether values give all answers about data among the choices of a tick."""
+    """Return whether values agree with all answers about data among the choices of a tick."""
     return all(fits(values, one.question, one.answer) for one in choices if one.question[0] == DATA)
 
 

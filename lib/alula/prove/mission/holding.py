@@ -74,7 +74,7 @@ def held(regions: Regions, one: Property, faults: Faults, deadline: Deadline, *,
 
 
 def _goal(one: Property) -> Expression:
-    """Return what a property says must come."""
+    """Return the condition that a property requires to become true."""
     return one.condition if one.kind is PropertyKind.EVENTUALLY else one.consequence or Constant(value=False)
 
 

@@ -67,7 +67,7 @@ class Live:
         return cls(found)
 
     def text(self, place: Place, value: str) -> str:
-        """Return the first of the texts that nothing tells apart from a value, ANOTHER where it is none that is asked for."""
+        """Return the first of the texts that no condition distinguishes from a value; ANOTHER where no condition tests for it."""
         asked = self.texts[place]
         if asked is None:
             return value
@@ -304,7 +304,7 @@ class Liveness:
         return NOTHING.union(*(self._script(node, node.wiring.element.get(one), NOTHING) for one in attributes))
 
     def _written(self, node: Node) -> frozenset[Place]:
-        """Return what a leaf writes whenever it answers."""
+        """Return what a leaf writes whenever it returns."""
         return frozenset(_place(node, name) for name in written_entries(node).values())
 
     @staticmethod

@@ -243,7 +243,7 @@ class MeasuredNumber(UnknownNumber):
 
 
 class MeasuredText(UnknownText):
-    """A text that was told; what a tick has asked of it holds for the rest of the tick."""
+    """A text from outside; what a tick has found of it holds for the rest of the tick."""
 
     __slots__ = ()
 

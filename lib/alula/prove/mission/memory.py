@@ -57,7 +57,7 @@ class _Remembered(NamedTuple):
 
     @classmethod
     def of(cls, node: Node) -> _Remembered:
-        """Read what its class tells."""
+        """Read the description of its class."""
         counts = {one.attribute: one for one in node.counts}
         return cls(node, node.remembers, (*node.remembers, *node.remembers_running), counts, frozenset({*counts, *node.watches}))
 
@@ -125,7 +125,7 @@ class Keeper:
     # --- out ---------------------------------------------------------------------------------------------------------
 
     def take(self) -> TreeMemory:
-        """Return the memory: of one that is over how it has ended, else what anything that can still be ticked tells apart."""
+        """Return the memory: the end of a mission that is over, else whatever a node that can still be ticked distinguishes."""
         director, board = self._body.director.memory, self._body.board
         started = director.start_s is not None
         self._left, moments = self._values()

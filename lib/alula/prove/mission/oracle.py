@@ -1,4 +1,4 @@
-"""What one tick of a tree asks of the world around it: observations, which a situation answers, and choices, which nobody knows."""
+"""Answer what one tick of a tree asks of its surroundings: observations, which a situation decides, and choices, which are free."""
 
 from __future__ import annotations
 

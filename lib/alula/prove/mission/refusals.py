@@ -25,7 +25,7 @@ class Refusal:
 
 
 def refusal_of(regions: Regions, row: Row) -> Refusal | None:
-    """Return a refusal of the request of a row that nothing answers, None where it fails in other ways only."""
+    """Return a refusal of a row's request to which the mission has no response, None where it fails in other ways only."""
     place = regions.system.place_of(("execution", row.leaf))
     seen = ((at, *way, _refused(regions, at, way, row.leaf)) for at, way in row.ways)
     found = next((one for one in seen if one[-1]), None)

@@ -207,7 +207,7 @@ class Regions:
                 todo.extendleft(later) if found.in_breadth else todo.extend(later)
 
     def follow(self, memory: int, act: str, answers: Sequence[Answer], sets: Sets) -> Outcome | Fork:
-        """Return what a tick comes to after its first answers, or what is asked next, of managers that have answered so."""
+        """Return the outcome of a tick after its first answers, or its next question, for the managers that give these answers."""
         known = self.system.ticker.known(memory, act, self._view(sets), answers)
         if isinstance(known, Outcome):
             return known

@@ -66,14 +66,14 @@ EXPRESSIONS = (
 PARTS = (ast.arguments, ast.arg, ast.keyword, ast.comprehension, ast.expr_context, ast.operator, ast.boolop, ast.unaryop, ast.cmpop)
 SYNTAX = (*STATEMENTS, *EXPRESSIONS, *PARTS)
 DECLARED = frozenset(name for name, kind in Node.__annotations__.items() if kind.startswith("ClassVar")) | {"may_end", "never_ticked"}
-"""What a class tells of its nodes."""
+"""The description of a class's nodes."""
 WORDS = "feedback_message"
 """What nodes say of themselves, which decides nothing."""
 CONSTANT = (type(None), bool, int, float, str, Status, Skipped)
 
 
 class _RefusedError(Exception):
-    """Code can't be run; the message says why."""
+    """Code can't be run; the message has the reason."""
 
 
 def why_not(real: type[Node]) -> str:

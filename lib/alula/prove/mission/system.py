@@ -274,7 +274,7 @@ class System:
         return self.answer(state.managers[self.place_of(question)], question)
 
     def told_end(self, leaf: int, end: End) -> End:
-        """Return an end (state and result) that is the same to the tree: of those that nothing tells apart always the same one."""
+        """Return the representative of an end (state and result): the same for all ends between which no node of the tree distinguishes."""
         node = self.leaves[leaf]
         state, result = end
         success = state == TERMINATED and result in node.leaf.success

@@ -106,7 +106,7 @@ class Ticker:
         self.initial = self._number(self._keeper.take())
 
     def outcomes(self, memory: int, view: View, act: str = TICK) -> Iterator[Outcome]:
-        """Yield all that a tick (or an abort) can come to where observations are as ``view`` answers."""
+        """Yield all outcomes of a tick (or an abort) where observations are as ``view`` answers."""
         todo: deque[tuple[Answer, ...]] = deque([()])
         while todo:
             answers = todo.pop()
@@ -131,7 +131,7 @@ class Ticker:
         return self._pausing[memory]
 
     def known(self, memory: int, act: str, view: View, answers: Sequence[Answer]) -> Decision | Outcome:
-        """Return what follows from the first answers of a tick; where that is not known yet, it is done with ``view``."""
+        """Return the outcome or next question after the first answers of a tick; tick with ``view`` where it is not known yet."""
         found = self._at(memory, act, answers)
         if found is None:
             self._run(memory, act, view, answers)

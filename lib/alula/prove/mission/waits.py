@@ -28,7 +28,7 @@ from alula.trees.node import Node
 
 @dataclass(frozen=True)
 class _AfterTick:
-    """What is known of a tick's outcome: what it was told of data, and to what it has brought the managers of each skillset."""
+    """The effect of a tick's outcome: the data that it was given, and the managers of each skillset after it."""
 
     ticked: Outcome
     about_data: tuple[Asked, ...]

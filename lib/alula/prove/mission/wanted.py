@@ -30,7 +30,7 @@ OUTCOMES = tuple(one.value for one in Outcome if one is not Outcome.RUNNING)
 
 
 class WantedError(Exception):
-    """A property can't be read; ``finding`` says where, and what to do."""
+    """A property can't be read; ``finding`` has the place and the remedy."""
 
     def __init__(self, finding: Diagnostic) -> None:
         super().__init__(finding.message)

@@ -75,7 +75,7 @@ def _leaf(system: System, leaf: int) -> str:
 
 
 def choice(one: Asked) -> str:
-    """Return what a tick has found, or what its nodes answer; empty where that tells nothing."""
+    """Return what a tick has observed, or what its nodes return; empty where neither explains anything."""
     match one.question:
         case ("time", str(duration)):
             return f"{float(duration) / 1e9:g} s are over" if one.answer and float(duration) >= 1e6 else ""

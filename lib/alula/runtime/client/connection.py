@@ -49,7 +49,7 @@ class Connection:
         self._doubted = False
         self._described = ""
         self._unusable = ""
-        """The managers whose description is of no use here; they are told of once."""
+        """The managers whose description can't be used; each is reported once."""
         self._states_heard = ""
         self._asking = False
         self._looking = False

@@ -14,7 +14,7 @@ from alula.runtime.waiting import Pending
 
 
 class Feed:
-    """Keeps the last sample of ``data/<name>`` and tells of each.
+    """Keep the last sample of ``data/<name>``, and report each.
 
     With ``every_s``, values that come within so many seconds after one are left out. A value is stamped when it arrives; the first one
     may have been latched for long, so its stamp is asked of the managers.

@@ -323,7 +323,7 @@ class SkillsetEngine:
         return True
 
     def _stop(self, entry: Entry) -> None:
-        """Call the decided stop hook; an interruption is done with it unless it says otherwise."""
+        """Call the stop hook; an interruption ends with it unless the hook returns False."""
 
         def returned(answer: HookOutcome) -> None:
             if answer.value is not False:

@@ -37,7 +37,7 @@ def as_short_text(value: object) -> str:
 
 
 def error_line(error: BaseException) -> str:
-    """Return the type of an exception and what it says, in one line."""
+    """Return the type and message of an exception, in one line."""
     said = "; ".join(line.strip() for line in as_text(error, LINE_LIMIT).splitlines() if line.strip())
     return f"{type(error).__name__}: {said}" if said else type(error).__name__
 

@@ -11,7 +11,7 @@ JOBS_AT_ONCE = 100_000
 
 
 class WorldError(SkillRuntimeError):
-    """The world in one process can't go on as it was asked to; the message says why."""
+    """Virtual time can't be advanced as requested; the message has the reason."""
 
 
 class VirtualClock:

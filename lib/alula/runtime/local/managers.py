@@ -81,7 +81,7 @@ class LocalManagers:
         self._managers.close(reason)
 
     def vanish(self) -> None:
-        """Be gone at once, like a process that was killed: nothing is stopped, nothing is told."""
+        """Be gone at once, like a process that was killed: nothing is stopped, nothing is published."""
         self._middleware.close()
         self._middleware.bus.vanish(self.skillset.name)
 

@@ -344,7 +344,7 @@ class VirtualLink:
         return complete(self._model.outputs, copy.deepcopy(dict(plain)), self._bus.types)
 
     def send(self, goal_id: str, goal: Any, on_answer: Callable[[bool], None]) -> None:
-        """Send a goal; ``on_answer(True)`` tells of its arrival, nothing comes where no managers are there."""
+        """Send a goal; ``on_answer(True)`` is called on its arrival, and never where there are no managers."""
 
         def arrive() -> None:
             server = self._server
