@@ -19,6 +19,7 @@ from alula.model.errors import EffectError
 from alula.model.execution_state import ExecutionState as S
 from alula.model.situation import Entered, Situation
 
+pytestmark = pytest.mark.long
 QUIET = {"deadline": None, "suppress_health_check": list(HealthCheck)}
 SEEDS = st.integers(0, 2**32)
 MODELS = skillsets() | skillsets(timed=True) | sparse_skillsets()

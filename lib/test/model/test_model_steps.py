@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from dataclasses import replace
 
+import pytest
 from hypothesis import HealthCheck, given, settings
 from hypothesis import strategies as st
 from model_walks import walk
@@ -15,6 +16,7 @@ from alula.model.overapproximation import over_approximate
 from alula.model.situation import Change, Entered, Running
 from alula.model.steps import Cause, PossibleSteps, Stimulus, ends_of, take
 
+pytestmark = pytest.mark.long
 QUIET = {"deadline": None, "suppress_health_check": list(HealthCheck)}
 SEEDS = st.integers(0, 2**32)
 MODELS = skillsets() | skillsets(timed=True) | sparse_skillsets()
