@@ -98,6 +98,10 @@ class MissionSteps:
         """Tell whether a fault is there that can bring about this end of an execution, ``skillset.skill END``."""
         return any(_any(self._faults[name].ends, end) for name in state.faults)
 
+    def only_ends(self, fault: str) -> bool:
+        """Tell whether a fault is no more than bad ends of skills."""
+        return not self._faults[fault].states
+
     def steps(self, state: Place) -> Iterator[Step[Place]]:
         """Yield what can happen; nothing where the mission was aborted. Before it begins nothing fails, and it waits for all it needs."""
         if self._system.outcome(state.state) is not None:

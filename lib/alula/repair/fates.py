@@ -168,7 +168,7 @@ def _following(steps: MissionSteps, here: Here, faults: Sequence[str], ends: _En
             case Kind.END if step.result not in ends.good[step.name]:
                 pass
             case Kind.NOW if place.coming:
-                struck = step.target.state != place.state
+                struck = steps.only_ends(place.coming) and step.target.state != place.state
                 found.append((step, there._replace(struck=min(here.struck + struck, strikes))))
             case Kind.NOW if step.result and step.name in can_start and not steps.may_end(place, f"{step.name} {step.result}"):
                 pass  # by data, which are as they should be

@@ -118,6 +118,11 @@ def test_what_is_repaired_holds_out_and_what_is_impossible_is(tmp_path: Path, mo
     assert told["with faults"] >= 40
 
 
+def test_a_fault_that_shows_in_a_state_leaves_another_all_its_strikes(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    """Robot 95: a sensor is lost, and then a skill ends badly as often as faults may come."""
+    assert attacked(95, tmp_path, monkeypatch, range(3))["with faults"] > 0
+
+
 @pytest.mark.long
 @pytest.mark.timeout(0)  # minutes of processor time: as long as the machine needs
 def test_two_hundred_more_do(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
