@@ -49,12 +49,21 @@ def left_taken(regions: Regions) -> Iterator[Left]:
         except OutOfTimeError:
             regions.complete = False
             return
-        for managers, _ in _lost_at(regions, later.regions[-1], place):
-            events = [*run, *later.run(len(later.regions) - 1, {place: managers})]
-            one = _left(regions, later.regions[-1], place, managers, events)
+        region = later.regions[-1]
+        depth = region.closures[place].depth
+        several = [
+            (depth[managers], _left(regions, region, place, managers, [*run, *later.run(len(later.regions) - 1, {place: managers})]))
+            for managers, _ in _lost_at(regions, region, place)
+        ]
+        for _, one in sorted(several, key=lambda known: (known[0], _assumed(known[1]))):
             if one.by == by and (place, one.lost, by) not in found:
                 found.add((place, one.lost, by))
                 yield one
+
+
+def _assumed(one: Left) -> int:
+    """Count what a run assumes of numbers that the search does not follow, such as attempts: a flight may need longer for it."""
+    return sum(len(event.choices) for event in one.events)
 
 
 def _left(regions: Regions, region: Region, place: int, managers: int, events: Sequence[Event]) -> Left:

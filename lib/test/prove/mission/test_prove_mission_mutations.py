@@ -108,6 +108,7 @@ class Wishes(SyncAction):
 ROUNDS = """<Sequence>
   <Script code="rounds := 0"/>
   <robot.Wishes rounds="{wanted}"/>
+  <AlwaysSuccess _skipIf="rounds &gt; wanted"/>
   <Until if="rounds &gt;= wanted">
     <Sequence><Fallback><drone.hover/><drone.land/></Fallback><Script code="rounds += 1"/></Sequence>
   </Until>
