@@ -100,7 +100,7 @@ class Patterns:
 
     def all_stand_ins(self, failing: Failing) -> list[Purpose]:
         """Return the skills for the same purpose, that skill itself first, whether or not they can run."""
-        found = [self._purposes.known[failing.skill], *self._purposes.stand_ins(failing.skill)]
+        found = [self._purposes.known[failing.skill], *self._purposes.alike(failing.skill)]
         return [one for one in found if one.name == failing.skill or not self._using or one.name in self._using]
 
     def places(self, leaf: Node) -> Iterator[Node]:

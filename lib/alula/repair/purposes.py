@@ -57,6 +57,11 @@ class Purposes:
         found = [one for one in self.known.values() if one.name != name and _stands_for(one, mine)]
         return sorted(found, key=lambda one: (len(_words(one) ^ _words(mine)), one.name))
 
+    def alike(self, name: str) -> list[Purpose]:
+        """Return the skills that may be for the same, also those that no branch is made of: their inputs and good results are the same."""
+        mine = self.known[name]
+        return [one for one in self._of(mine) if one.name != name and (one.inputs, one.achieves) == (mine.inputs, mine.achieves)]
+
     def holders(self, needed: Purpose, instead: Purpose) -> list[Purpose] | None:
         """Return skills that hold what ``needed`` holds and ``instead`` does not, one for each resource; None: nothing holds one."""
         found: list[Purpose] = []

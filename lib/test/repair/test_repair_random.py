@@ -123,6 +123,12 @@ def test_a_fault_that_shows_in_a_state_leaves_another_all_its_strikes(tmp_path: 
     assert attacked(95, tmp_path, monkeypatch, range(3))["with faults"] > 0
 
 
+def test_a_skill_without_inputs_may_stand_for_another_one(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    """Robot 189: no branch is made of it, but that is not impossible."""
+    (answer,) = [one for _, fault, one in answers(189, tmp_path, monkeypatch) if fault == "motor"]
+    assert not answer.impossible
+
+
 @pytest.mark.long
 @pytest.mark.timeout(0)  # minutes of processor time: as long as the machine needs
 def test_two_hundred_more_do(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
