@@ -9,10 +9,13 @@ import time
 from pathlib import Path
 
 SHARED_MEMORY = Path("/dev/shm")  # noqa: S108  (where POSIX puts it)
+PORTS = "fastrtps_port"
+"""What the names of ports begin with. One is written to by all participants that know its number, also after its reader has died, and is
+read by the next participant that takes that number: where it is removed meanwhile, what those write reaches nobody."""
 
 
 def sweep_shared_memory(*, older_than_s: float = 0.0) -> int:
-    """Remove the segments whose owner is dead; return how many.
+    """Remove the segments whose owner is dead; return how many. Ports stay: Fast DDS makes a dead one anew itself.
 
     Fast DDS holds a lock on ``<segment>_el`` as long as a segment's owner lives; where the lock can be had, the owner is dead. While others
     may be creating segments, ``older_than_s`` spares those whose lock was made but not yet taken.
@@ -20,6 +23,8 @@ def sweep_shared_memory(*, older_than_s: float = 0.0) -> int:
     removed = 0
     for lock in SHARED_MEMORY.glob("fastrtps_*_el"):
         segment = lock.with_name(lock.name.removesuffix("_el"))
+        if segment.name.startswith(PORTS):
+            continue
         with contextlib.suppress(OSError):
             if time.time() - lock.stat().st_mtime < older_than_s:  # noqa: TID251 - a file's age is wall time
                 continue
