@@ -96,7 +96,7 @@ def test_the_page_of_a_deployment(browser: Any, up: Up, tmp_path: Path) -> None:
         page = Page(browser, console.address, SIZES[0])
         page.wait("document.querySelector('#readings div') !== null && alula.live.state === 'live'")
         page.wait("document.querySelector('#manual').open")
-        assert page.text("#headline") == "lab is up, but for 1 of 3 parts"
+        page.wait("document.querySelector('#headline').textContent === 'lab is up, but for 1 of 3 parts'")
         assert page.text("#active") == "no mission"
         assert page.run("getComputedStyle(document.querySelector('#map-card')).display") == "none", "there is nothing on the map"
         tiles = page.text("#readings dt") + " / " + page.text("#readings dd")

@@ -130,13 +130,13 @@ def test_a_skill_without_inputs_may_stand_for_another_one(tmp_path: Path, monkey
 
 
 @pytest.mark.long
-@pytest.mark.timeout(0)  # minutes of processor time: as long as the machine needs
-def test_two_hundred_more_do(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+@pytest.mark.timeout(0)  # 2.3 s of processor time for each: as long as the machine needs
+def test_twenty_more_do(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     told = Counter[str]()
-    for seed in range(len(QUICK), len(QUICK) + 200):
+    for seed in range(len(QUICK), len(QUICK) + 20):
         told += attacked(seed, tmp_path / str(seed), monkeypatch, range(6))
-    assert told["repaired"] >= 40
-    assert told["impossible"] >= 40
+    assert told["repaired"] >= 4
+    assert told["impossible"] >= 4
 
 
 @pytest.mark.parametrize("seed", QUICK)

@@ -16,6 +16,8 @@ from alula.runtime.core.events import EngineEvent, ExecutionEvent, TransitionEve
 
 _SHOWN = 12
 """Steps that are named where many would have been allowed."""
+_AT_ANY_TIME = frozenset({Cause.REJECT, Cause.INTERRUPT, Cause.FAIL})
+"""What an execution may come to in every situation: named last, for it tells a reader least."""
 
 
 def refusal(steps: LoggedSteps, beliefs: Sequence[Belief], ended: Mapping[str, str], event: EngineEvent) -> str:
@@ -90,7 +92,8 @@ def allowed(steps: LoggedSteps, beliefs: Sequence[Belief]) -> tuple[str, ...]:
     if under_way:
         return tuple(dict.fromkeys(under_way))
     belief = beliefs[0]
-    found = list(dict.fromkeys(_beginning(step) for step in steps.possible(belief) if step.happenings))
+    possible = sorted(steps.possible(belief), key=lambda step: step.stimulus.cause in _AT_ANY_TIME)
+    found = list(dict.fromkeys(_beginning(step) for step in possible if step.happenings))
     more = [f"and {len(found) - _SHOWN} more"] if len(found) > _SHOWN else []
     return (*found[:_SHOWN], *more, "a request of any skill")
 
