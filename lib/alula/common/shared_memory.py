@@ -12,13 +12,15 @@ SHARED_MEMORY = Path("/dev/shm")  # noqa: S108  (where POSIX puts it)
 PORTS = "fastrtps_port"
 """What the names of ports begin with. One is written to by all participants that know its number, also after its reader has died, and is
 read by the next participant that takes that number: where it is removed meanwhile, what those write reaches nobody."""
+SWEPT_AFTER_S = 5.0
+"""Others may be creating segments: a lock that is younger may be one that was made and not taken yet."""
 
 
-def sweep_shared_memory(*, older_than_s: float = 0.0) -> int:
+def sweep_shared_memory(*, older_than_s: float = SWEPT_AFTER_S) -> int:
     """Remove the segments whose owner is dead; return how many. Ports stay: Fast DDS makes a dead one anew itself.
 
-    Fast DDS holds a lock on ``<segment>_el`` as long as a segment's owner lives; where the lock can be had, the owner is dead. While others
-    may be creating segments, ``older_than_s`` spares those whose lock was made but not yet taken.
+    Fast DDS holds a lock on ``<segment>_el`` as long as a segment's owner lives; where the lock can be had, the owner is dead. Locks
+    that are not older than ``older_than_s`` are left.
     """
     removed = 0
     for lock in SHARED_MEMORY.glob("fastrtps_*_el"):

@@ -17,9 +17,9 @@ def test_only_what_is_provably_dead_is_removed(tmp_path, monkeypatch):
         os.utime(tmp_path / name, (0, 0))
     with (tmp_path / "fastrtps_alive_el").open() as held:
         fcntl.flock(held, fcntl.LOCK_EX)
-        assert sweep_shared_memory(older_than_s=5.0) == 1
+        assert sweep_shared_memory() == 1
     assert sorted(path.name for path in tmp_path.iterdir()) == ["fastrtps_alive", "fastrtps_alive_el", "fastrtps_new_el", "other_el"]
-    assert sweep_shared_memory() == 2
+    assert sweep_shared_memory(older_than_s=0.0) == 2
 
 
 def test_a_port_stays_for_others_write_to_it(tmp_path, monkeypatch):
@@ -27,5 +27,5 @@ def test_a_port_stays_for_others_write_to_it(tmp_path, monkeypatch):
     monkeypatch.setattr(shared_memory, "SHARED_MEMORY", tmp_path)
     for name in ("fastrtps_port7000", "fastrtps_port7000_el"):
         (tmp_path / name).touch()
-    assert sweep_shared_memory() == 0
+    assert sweep_shared_memory(older_than_s=0.0) == 0
     assert sorted(path.name for path in tmp_path.iterdir()) == ["fastrtps_port7000", "fastrtps_port7000_el"]

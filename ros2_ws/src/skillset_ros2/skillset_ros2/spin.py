@@ -38,7 +38,6 @@ LISTEN_FIRST_S = 0.5
 """How long (wall clock) managers that begin listen for others."""
 PROCESSES_S = 0.5
 REFUSED = 2
-SWEPT_AFTER_S = 5.0
 END_LIMIT_S = 30.0
 """Wall clock; hooks may take some seconds to stop their functions."""
 ALL = "all"
@@ -74,7 +73,7 @@ def run_skillset(
             sys.exit(code)
         return
     # Processes that were killed have left theirs.
-    sweep_shared_memory(older_than_s=SWEPT_AFTER_S)
+    sweep_shared_memory()
     # Our own handlers: rclpy's would shut the context down before the callers were told.
     rclpy.init(args=words, signal_handler_options=SignalHandlerOptions.NO)
     refusals: list[str] = []

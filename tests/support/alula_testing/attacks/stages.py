@@ -24,8 +24,6 @@ from alula_testing.navigation import FLYING
 from alula_testing.ros1 import end_process
 
 LOOK_S = 0.02
-SWEPT_AFTER_S = 5.0
-"""As managers do when they start; so those that were killed last may have left some."""
 TAIL_LINES = 40
 FAILURES = ("the listener raised", "Fatal Python error", "terminate called", "Segmentation fault", "InvalidHandle")
 """What managers log when they could not do their own work, whatever their hooks do."""
@@ -108,7 +106,7 @@ class LiveStage:
         self._log: IO[str] = tempfile.TemporaryFile("w+", encoding="utf-8")  # noqa: SIM115 - closed with the stage
         self._deaths: list[str] = []
         self._threads: list[int] = []
-        sweep_shared_memory(older_than_s=SWEPT_AFTER_S)
+        sweep_shared_memory()
         self._managers = self._serve()
         self.clients = [graph.make_client() for _ in range(clients)]
         self._fly()
@@ -159,7 +157,7 @@ class LiveStage:
             "died": self._deaths,
             "exit code": code,
             "threads of managers": dict(sorted(Counter(self._threads).items())),
-            "dead segments of shared memory": sweep_shared_memory(older_than_s=SWEPT_AFTER_S),
+            "dead segments of shared memory": sweep_shared_memory(),
         }
 
     def end(self) -> None:
