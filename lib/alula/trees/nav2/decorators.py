@@ -124,31 +124,25 @@ class SingleTrigger(Decorator):
         return answer
 
 
-class DistanceController(Decorator):
+class _EndsAsChild(Decorator):
+    """Ends as its child, whenever it ticks that."""
+
+    @classmethod
+    def may_end(cls, given: Given, children: Sequence[Ends]) -> Ends:  # noqa: ARG003
+        """End as the child."""
+        return children[0]
+
+
+class DistanceController(_EndsAsChild):
     """Ticks its child whenever the robot has gone so far."""
 
-    @classmethod
-    def may_end(cls, given: Given, children: Sequence[Ends]) -> Ends:  # noqa: ARG003
-        """End as the child."""
-        return children[0]
 
-
-class SpeedController(Decorator):
+class SpeedController(_EndsAsChild):
     """Ticks its child the more often the faster the robot is, and at once when the goal is another."""
 
-    @classmethod
-    def may_end(cls, given: Given, children: Sequence[Ends]) -> Ends:  # noqa: ARG003
-        """End as the child."""
-        return children[0]
 
-
-class GoalUpdater(Decorator):
+class GoalUpdater(_EndsAsChild):
     """Ticks its child with the newest goal that a topic has."""
-
-    @classmethod
-    def may_end(cls, given: Given, children: Sequence[Ends]) -> Ends:  # noqa: ARG003
-        """End as the child."""
-        return children[0]
 
 
 class PathLongerOnApproach(Decorator):
