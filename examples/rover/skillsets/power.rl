@@ -25,6 +25,7 @@ skillset power {
 
   // Take current from the dock until the battery is full enough.
   skill charge {
+    achieves (battery.percentage > 60 %)
     input level: float64 // 0 to 1
     precondition contact: charger == ON
     invariant contact: charger == ON

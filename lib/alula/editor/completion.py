@@ -30,7 +30,7 @@ class Place:
 
 @dataclass(frozen=True)
 class Completion:
-    """A name that may be put in; ``kind`` is state, resource, skill, effect, data, type or keyword."""
+    """A name that may be put in; ``kind`` is state, resource, skill, effect, data, type, role or keyword."""
 
     label: str
     kind: str
@@ -74,6 +74,8 @@ class _Context:
             yield from self._effects()
             if not self._paper:
                 yield from self._named("resource")
+        elif last in _ROLE_WORDS or self._innermost() in _ROLE_WORDS:
+            yield from self._roles()
         elif self._innermost() == "property":
             yield from self._property_words(last)
         elif last == ":" and self._innermost() == "effect":
@@ -152,6 +154,10 @@ class _Context:
         for name in _effect_names(self._tokens, skill):
             yield Completion(name, "effect", f"effect of {skill}")
 
+    def _roles(self) -> Iterator[Completion]:
+        skills = (skill for skillset in self._file.skillsets for skill in skillset.skills)
+        yield from (Completion(role.name, "role", "role") for skill in skills for role in (*skill.provides, *skill.needs))
+
     def _named(self, kind: str) -> Iterator[Completion]:
         if kind == "resource":
             yield from (Completion(r.name, "resource", " ".join(r.states)) for r in self._resources.values())
@@ -170,6 +176,7 @@ class _Context:
 
 
 _RL_WORDS = ("guard", "postcondition", "interrupting")
+_ROLE_WORDS = frozenset({"provides", "needs"})
 _BLOCK_WORDS = frozenset({*MEMBERS, *paper_skill.BLOCKS, *rl_skill.BLOCKS, "message"})
 
 

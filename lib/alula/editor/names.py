@@ -47,7 +47,7 @@ def definition(file: ModelFile, entity: Entity) -> Span | None:
     return next((one.span for one in references(file, entity) if one.defining), None)
 
 
-SHARED = frozenset({"type", "skillset"})
+SHARED = frozenset({"type", "skillset", "role"})
 """What other files of a robot know by its name; everything else belongs to one skillset."""
 
 
@@ -87,7 +87,9 @@ def _outline(skillset: Skillset) -> Symbol:
 
 
 def description(file: ModelFile, entity: Entity) -> str:
-    """Return a resource with its states and arrows, a skill with its inputs, outputs and results, or another name's definition."""
+    """Return a resource with its states and arrows, a skill with inputs, outputs and results, a role's skills, another's definition."""
+    if entity.kind == "role":
+        return _role(file, entity.name)
     skillset = next((one for one in file.skillsets if entity.owner and one.name == entity.owner[0]), None)
     if skillset is None:
         return ""
@@ -104,6 +106,14 @@ def description(file: ModelFile, entity: Entity) -> str:
             return _of_skill(skillset.skill_index.get(entity.owner[1]), entity)
         case _:
             return ""
+
+
+def _role(file: ModelFile, name: str) -> str:
+    skills = [one for skillset in file.skillsets for one in skillset.skills]
+    provided = ", ".join(one.name for one in skills if any(role.name == name for role in one.provides))
+    needed = ", ".join(one.name for one in skills if any(role.name == name for role in one.needs))
+    lines = (f"  provided by {provided}" if provided else "", f"  needed by {needed}" if needed else "")
+    return "\n".join([f"role {name}", *(line for line in lines if line)])
 
 
 def _of_skill(skill: Skill | None, entity: Entity) -> str:

@@ -122,6 +122,11 @@ class _Finder:
         for invariant in skill.invariants:
             yield from self._name(invariant.span, Entity("invariant", invariant.name, inside), defining=True)
             yield from self._condition(invariant.condition, owner)
+        for role in skill.provides:
+            yield from self._name(role.span, Entity("role", role.name), defining=True)
+        for role in skill.needs:
+            yield from self._name(role.span, Entity("role", role.name))
+        yield from self._condition(skill.achieves, owner)
         for result in skill.results:
             yield from self._name(result.span, Entity("result", result.name, inside), defining=True)
         ends = [(skill.interrupt.effect, skill.interrupt.postcondition), *((r.effect, r.postcondition) for r in skill.results)]

@@ -41,6 +41,7 @@ _COMPLETION_KIND = {
     "resource": lsp.CompletionItemKind.Enum,
     "skill": lsp.CompletionItemKind.Function,
     "effect": lsp.CompletionItemKind.Event,
+    "role": lsp.CompletionItemKind.Interface,
     "data": lsp.CompletionItemKind.Variable,
     "type": lsp.CompletionItemKind.Class,
     "keyword": lsp.CompletionItemKind.Keyword,
@@ -135,6 +136,11 @@ def _asked(ls: SkillLanguageServer, document: lsp.TextDocumentIdentifier, positi
     place = _place(file, position)
     found = names.occurrence_at(file, place.line, place.column)
     return None if found is None else _Asked(document.uri, file, found)
+
+
+def _files_that_know(ls: SkillLanguageServer, asked: _Asked) -> dict[str, ModelFile]:
+    """Return the files in which a name stands for the same, by their URI: of what a robot's files share, all models of its folder."""
+    return ls.robot(asked.uri) if asked.name.entity.kind in names.SHARED else {asked.uri: asked.file}
 
 
 def _asked_in_trees(
@@ -255,8 +261,10 @@ def go_to_definition(ls: SkillLanguageServer, params: lsp.DefinitionParams) -> l
         place = in_trees[0].definition(in_trees[1])
         return None if place is None else _location(ls, place)
     asked = _asked(ls, params.text_document, params.position)
-    span = names.definition(asked.file, asked.name.entity) if asked else None
-    return lsp.Location(uri=asked.uri, range=_range(asked.file, span)) if asked and span else None
+    if asked is None:
+        return None
+    found = ((uri, file, names.definition(file, asked.name.entity)) for uri, file in _files_that_know(ls, asked).items())
+    return next((lsp.Location(uri=uri, range=_range(file, span)) for uri, file, span in found if span is not None), None)
 
 
 @server.feature(lsp.TEXT_DOCUMENT_REFERENCES)
@@ -268,9 +276,10 @@ def find_references(ls: SkillLanguageServer, params: lsp.ReferenceParams) -> lis
     asked = _asked(ls, params.text_document, params.position)
     if asked is None:
         return []
-    found = names.references(asked.file, asked.name.entity)
-    wanted = [one for one in found if params.context.include_declaration or not one.defining]
-    return [lsp.Location(uri=asked.uri, range=_range(asked.file, one.span)) for one in wanted]
+    several = _files_that_know(ls, asked).items()
+    found = [(uri, file, one) for uri, file in several for one in names.references(file, asked.name.entity)]
+    wanted = [one for one in found if params.context.include_declaration or not one[2].defining]
+    return [lsp.Location(uri=uri, range=_range(file, one.span)) for uri, file, one in wanted]
 
 
 @server.feature(lsp.TEXT_DOCUMENT_RENAME)
@@ -282,7 +291,7 @@ def rename(ls: SkillLanguageServer, params: lsp.RenameParams) -> lsp.WorkspaceEd
     if asked is None:
         return None
     entity, name = asked.name.entity, params.new_name
-    files = ls.robot(asked.uri) if entity.kind in names.SHARED else {asked.uri: asked.file}
+    files = _files_that_know(ls, asked)
     try:
         places = names.renamed(list(files.values()), entity, name)
     except names.RenameError as error:

@@ -8,6 +8,7 @@ from __future__ import annotations
 
 import stat
 from collections.abc import Iterable, Iterator, Mapping, Sequence
+from contextlib import suppress
 from dataclasses import dataclass, field, replace
 from functools import cached_property
 from itertools import islice
@@ -19,6 +20,7 @@ from alula.language.check import MAX_FINDINGS, check
 from alula.language.errors import Diagnostic, LanguageError, Severity
 from alula.language.lexer import MAX_CHARACTERS, Source, tokenize
 from alula.language.notation import SUFFIXES, Notation, read
+from alula.language.roles import role_findings
 from alula.language.syntax.document import Document, typed_elements, with_known_types
 from alula.model.model import Skillset
 from alula.model.span import Span
@@ -88,6 +90,7 @@ def check_texts(files: Sequence[ModelFile], notation: Notation | None = None) ->
     _report_duplicates(files)
     for file in files:
         file.add(_meaning(file))
+        file.add(_roles(file, files))
     return list(files)
 
 
@@ -185,6 +188,21 @@ def _defined_before(file: ModelFile, first: dict[str, tuple[ModelFile, Span]]) -
         severity = Severity.ERROR if Path(other.path).parent == Path(file.path).parent else Severity.WARNING
         message = f"skillset `{skillset.name}` is defined in {span.file or other.path}, line {span.line}, already"
         yield Diagnostic("ALU404", message, skillset.span, severity, "name one of them otherwise")
+
+
+def _roles(file: ModelFile, files: Sequence[ModelFile]) -> Iterator[Diagnostic]:
+    """Yield what is wrong with a file's roles among all models of its folder, which make one robot; those not given are read."""
+    named = [one for one in file.skillsets if any(skill.provides or skill.needs for skill in one.skills)]
+    if not named or file.damaged:
+        return
+    folder = Path(file.path).parent
+    given = {Path(one.path).name: one for one in files if Path(one.path).parent == folder}
+    robot = [skillset for one in given.values() for skillset in one.skillsets]
+    for path in sorted(one for one in folder.glob("*") if one.suffix in SUFFIXES and one.name not in given):
+        with suppress(LanguageError):
+            robot += read(read_text(path), str(path))[0].skillsets
+    for skillset in named:
+        yield from role_findings(skillset, robot)
 
 
 def _resolved(file: ModelFile, skillset: Skillset, known: Mapping[str, Skillset]) -> Skillset:

@@ -224,8 +224,20 @@ class Result:
 
 
 @dataclass(frozen=True)
+class Role:
+    """What skills are for, by a name that all skillsets of a robot share: skills of one role can take each other's place."""
+
+    name: str
+    span: Span = field(default=NOWHERE, compare=False)
+
+
+@dataclass(frozen=True)
 class Skill:
-    """A capability. ``effects`` are the named ones of the paper's notation; start, invariants and results refer to them."""
+    """A capability. ``effects`` are the named ones of the paper's notation; start, invariants and results refer to them.
+
+    ``provides``: its roles, filled while it runs, or, of a skill that can succeed, once it has. ``needs``: roles that others have to fill
+    while it runs. ``achieves``: what is true after a success, besides what its effects say. Managers do not look at these: plans do.
+    """
 
     name: str
     parameters: tuple[Parameter, ...] = ()
@@ -238,7 +250,15 @@ class Skill:
     progress: Progress | None = None
     interrupt: Interrupt = Interrupt()
     results: tuple[Result, ...] = ()
+    provides: tuple[Role, ...] = ()
+    needs: tuple[Role, ...] = ()
+    achieves: Expression = TRUE
     span: Span = field(default=NOWHERE, compare=False)
+
+    @property
+    def successes(self) -> tuple[Result, ...]:
+        """The results that are successes; none: the skill is there to run."""
+        return tuple(one for one in self.results if self.kind_of(one.name) is ResultKind.SUCCESS)
 
     def result(self, name: str) -> Result:
         """Return the result of this name; raise KeyError with the names there are."""

@@ -74,14 +74,15 @@ def test_states_types_and_words_of_properties(text):
 
 
 def test_every_name_of_the_vehicle_leads_to_its_definition():
-    for path in sorted((MODELS / "uav").glob("*.skill")):
-        (file,) = check_texts([ModelFile(str(path), path.read_text())])
+    files = check_texts([ModelFile(str(path), path.read_text()) for path in sorted((MODELS / "uav").glob("*.skill"))])
+    for file in files:
         found = occurrences(file)
         lines = file.text.split("\n")
         assert len(found) > 20
         for one in found:
             assert lines[one.span.line - 1][one.span.column - 1 : one.span.end_column - 1] == one.entity.name
-            assert names.definition(file, one.entity) is not None, one
+            places = files if one.entity.kind in names.SHARED else [file]
+            assert any(names.definition(place, one.entity) for place in places), one
 
 
 def test_a_new_name_changes_nothing_else():
@@ -100,6 +101,23 @@ def test_a_new_name_changes_nothing_else():
         assert again.findings == file.findings
     with pytest.raises(names.RenameError, match="is there already"):
         names.renamed([file], Entity("state", "FREE", ("s", "axes")), "USED")
+
+
+ROLES = """skillset s {
+  skill watch { provides eyes failure lost }
+  skill go { needs eyes success ok }
+}
+"""
+
+
+def test_a_role_is_completed_told_and_renamed():
+    assert complete(ROLES.replace("needs eyes", "needs @"), "s.rl") == ["eyes"]
+    assert complete(ROLES.replace("provides eyes", "provides { @ }"), "s.rl") == ["eyes"]
+    (file,) = check_texts([ModelFile("s.rl", ROLES)])
+    role = Entity("role", "eyes")
+    assert names.description(file, role) == "role eyes\n  provided by watch\n  needed by go"
+    assert names.definition(file, role).line == 2
+    assert [(one.line, one.column) for one in names.renamed([file], role, "sight")["s.rl"]] == [(2, 26), (3, 20)]
 
 
 def test_indentation_keeps_comments_and_the_model():

@@ -29,6 +29,7 @@ from alula.model.model import (
     Resource,
     Result,
     ResultKind,
+    Role,
     Skill,
     Skillset,
     Transition,
@@ -105,6 +106,9 @@ def resources(draw):
     return Resource(name, states, initial, arrows, all_transitions=every, silence_s=silence_s)
 
 
+roles = st.lists(st.builds(Role, names), max_size=2).map(tuple)
+
+
 def results(used):
     return st.builds(Result, names, st.sampled_from(ResultKind), used, postconditions, comments)
 
@@ -125,6 +129,9 @@ def skills(draw):
         progress=draw(st.none() | progresses),
         interrupt=draw(st.builds(Interrupt, st.booleans(), used, postconditions, st.none() | floats)),
         results=tuple(draw(st.lists(results(used), max_size=3))),
+        provides=draw(roles),
+        needs=draw(roles),
+        achieves=draw(st.just(TRUE) | any_condition),
     )
 
 

@@ -157,6 +157,15 @@ SEMANTICS = [
         "holds while nothing is heard of `eye`, which is `UNKNOWN` then",
         "`eye == UNKNOWN` or `!= UNKNOWN`",
     ),
+    (
+        "ALU227",
+        AXES + "skill f { achieves resource = (^axes == USED) result { failure R } }",
+        "with its success, and has none",
+        "`provides name`",
+    ),
+    ("ALU228", AXES + "skill f { achieves resource = (^axes == USED) result { R: apply = { axes -> FREE } } }", "effect of `R` undoes", ""),
+    ("ALU202", AXES + "skill f { achieves resource = (^axis == USED) result { R } }", "no resource `axis`", "`axes`?"),
+    ("ALU201", "skill f { provides { a ^a } result { R } }", "role `a` is defined twice", ""),
     ("ALU222", "property p: never ^takeof running " + asks("").replace("skill f", "skill takeoff"), "no skill `takeof`", "`takeoff`?"),
     ("ALU214", "data d: bool skill f { precondition { p: data = (^d > true) } result { R } }", "doesn't compare a truth value", ""),
     ("ALU214", 'data d: string skill f { precondition { p: data = (^d < "a") } result { R } }', "doesn't compare a text", ""),
@@ -250,5 +259,5 @@ def test_the_name_of_a_package():
 def test_every_code_has_a_test():
     tested = {row[0] for row in SYNTAX + SEMANTICS}
     elsewhere = {"ALU001", "ALU002", "ALU003", "ALU005", "ALU006", "ALU107", "ALU401", "ALU402", "ALU403", "ALU404", "ALU405"}
-    elsewhere |= {"ALU109", "ALU110", "ALU223", "ALU224", "ALU225", "ALU305"}
+    elsewhere |= {"ALU109", "ALU110", "ALU223", "ALU224", "ALU225", "ALU229", "ALU305", "ALU307"}
     assert tested | elsewhere == set(CODES) - set(PROOF_CODES) - set(MISSION_CODES) - set(RUN_CODES)

@@ -2,9 +2,11 @@
 
 from __future__ import annotations
 
+from pathlib import Path
+
 import pytest
 
-from alula.language.errors import LanguageError
+from alula.language.errors import LanguageError, Severity
 from alula.language.load import check_file, load_robot, load_skillset
 from alula.language.models import read_text
 from alula.language.side_files import load_types
@@ -80,6 +82,22 @@ def test_a_robot_with_all_that_can_be_wrong_tells_all(tmp_path):
         load_robot(tmp_path)
     assert sorted(codes(caught)) == ["ALU005", "ALU005", "ALU401", "ALU402", "ALU403", "ALU404"]
     assert "did you mean `s.d`?" in str(caught.value)
+
+
+def test_roles_are_those_of_all_skillsets_of_a_folder(tmp_path):
+    (tmp_path / "s.skill").write_text("skillset s { skill go { needs eyes result { DONE } } }")
+    (finding,) = check_file(tmp_path / "s.skill")[1]
+    assert (finding.code, finding.severity, finding.span.column) == ("ALU307", Severity.WARNING, 31)
+    (tmp_path / "t.rl").write_text("skillset t { skill watch { provides eyes failure lost } }")
+    assert check_file(tmp_path / "s.skill")[1] == []  # also when that one is not named
+    (tmp_path / "u.rl").write_text("skillset u { skill look { provides eyes success seen } }")
+    with pytest.raises(LanguageError) as caught:
+        load_robot(tmp_path)
+    found = [(Path(one.span.file).name, one.code, one.message) for one in caught.value.diagnostics]
+    assert found == [
+        ("t.rl", "ALU229", "`watch` provides `eyes` while it runs, and `look` once it has succeeded"),
+        ("u.rl", "ALU229", "`look` provides `eyes` once it has succeeded, and `watch` while it runs"),
+    ]
 
 
 def test_data_that_no_topic_can_carry(tmp_path):

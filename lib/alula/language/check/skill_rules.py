@@ -21,7 +21,8 @@ from alula.language.check.references import (
     warning,
 )
 from alula.language.errors import Diagnostic
-from alula.model.expressions import And, Comparison, DataIs, Expression, Implies, Not, Or, ResourceIs, atoms
+from alula.model.conditions import NO_DATA, judge
+from alula.model.expressions import TRUE, And, Comparison, DataIs, Expression, Implies, Not, Or, ResourceIs, atoms
 from alula.model.model import NO_EFFECT, Effect, Hold, Invariant, Skill, Skillset
 from alula.model.ros_types import camel
 from alula.model.units import UNIT_IN_SI
@@ -35,6 +36,8 @@ def _skill_names(skillset: Skillset, skill: Skill) -> Iterator[Diagnostic]:
     yield from duplicates("parameter", skill.parameters)
     yield from duplicates("input", skill.inputs)
     yield from duplicates("output", skill.outputs)
+    yield from duplicates("role", skill.provides)
+    yield from duplicates("role", skill.needs)
     named: tuple[Named, ...] = (*skill.preconditions, *skill.invariants, *skill.results, *skill.parameters, *skill.inputs, *skill.outputs)
     yield from names_of_types(skillset, named)
     shared = {resource.name: "resource" for resource in skillset.resources} | {data.name: "data" for data in skillset.data}
@@ -65,6 +68,7 @@ def _conditions(skillset: Skillset, skill: Skill) -> Iterator[Diagnostic]:
     for invariant in skill.invariants:
         yield from condition_findings(skillset, invariant.condition, f"invariant `{invariant.name}`", data_allowed=True)
     yield from condition_findings(skillset, skill.interrupt.postcondition, "the interruption's postcondition", data_allowed=False)
+    yield from condition_findings(skillset, skill.achieves, f"what `{skill.name}` achieves", data_allowed=True)
     for result in skill.results:
         yield from condition_findings(skillset, result.postcondition, f"the postcondition of `{result.name}`", data_allowed=False)
 
@@ -159,6 +163,18 @@ def _ends(_skillset: Skillset, skill: Skill) -> Iterator[Diagnostic]:
         yield for_generator("ALU218", f"skill `{skill.name}` has no result", skill.span, hint=hint)
 
 
+def _achievements(_skillset: Skillset, skill: Skill) -> Iterator[Diagnostic]:
+    span = next((atom.span for atom in atoms(skill.achieves)), skill.span)
+    if skill.achieves != TRUE and skill.results and not skill.successes:
+        message = f"`{skill.name}` achieves something with its success, and has none"
+        yield error("ALU227", message, span, hint="what is so while it runs is a role: `provides name`")
+    for result in skill.successes:
+        states = {one.resource: one.target for one in result.effect.assignments}
+        if states and judge(skill.achieves, states, NO_DATA) is False:
+            message = f"`{skill.name}` achieves what the effect of `{result.name}` undoes"
+            yield error("ALU228", message, span, hint="effects say by themselves what they achieve: leave it out, or mend one of the two")
+
+
 SKILL_RULES: Sequence[Callable[[Skillset, Skill], Iterable[Diagnostic]]] = (
     _skill_names,
     _interface_names,
@@ -168,6 +184,7 @@ SKILL_RULES: Sequence[Callable[[Skillset, Skill], Iterable[Diagnostic]]] = (
     _effects,
     _ends,
     _stops,
+    _achievements,
 )
 
 

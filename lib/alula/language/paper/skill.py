@@ -10,11 +10,11 @@ from alula.language.syntax.conditions import paper_condition
 from alula.language.syntax.cursor import Cursor, starts_block, starts_member
 from alula.language.syntax.elements import read_parameter
 from alula.language.syntax.quantities import duration, hold, setting
-from alula.language.syntax.skill_reader import SkillReader
+from alula.language.syntax.skill_reader import PURPOSES, SkillReader
 from alula.model.expressions import TRUE, Expression
 from alula.model.model import NO_EFFECT, Effect, Interrupt, Invariant, Parameter, Precondition, Progress, Result, ResultKind, Skill
 
-BLOCKS = ("progress", "parameter", "input", "output", "effect", "precondition", "invariant", "interrupt", "result")
+BLOCKS = ("progress", "parameter", "input", "output", "effect", "precondition", "invariant", "interrupt", "result", *PURPOSES)
 _OUTSIDE = ("resource", "event", "skill", "property")
 
 
@@ -43,16 +43,11 @@ class _SkillReader(SkillReader):
         word = self.cursor.here
         if word.text in BLOCKS and word.kind is Kind.NAME:
             self.once(word)
-        parts = self.parts
         match word.text:
             case "progress":
                 self._progress()
-            case "parameter":
-                self._block(lambda: parts.parameters.append(read_parameter(self.cursor, "a parameter")))
-            case "input":
-                self._block(lambda: parts.inputs.append(read_parameter(self.cursor, "an input")))
-            case "output":
-                self._block(lambda: parts.outputs.append(read_parameter(self.cursor, "an output")))
+            case "parameter" | "input" | "output":
+                self._block(self.value(word.text))
             case "effect":
                 self.named_effects(self._block)
             case "precondition":
@@ -63,6 +58,8 @@ class _SkillReader(SkillReader):
                 self._block(self._interrupt)
             case "result":
                 self._block(self._result)
+            case "provides" | "needs" | "achieves":
+                self.purpose(paper_condition)
             case _:
                 raise self.unknown(word, BLOCKS)
 

@@ -12,6 +12,7 @@ from alula.language.printing.text import (
     effect_text,
     hold_text,
     parameter_text,
+    purpose_lines,
 )
 from alula.model.condition_text import AND, IMPLIES, NOT, OR, atom_text, bare_text
 from alula.model.expressions import TRUE, And, Constant, DataIs, Expression, Implies, Not, Or, ResourceIs, atoms
@@ -24,6 +25,7 @@ _WORDS_OF_RESULTS = frozenset({"success", "failure", "apply", "post"})
 def skill_lines(skill: Skill) -> Iterator[str]:
     """Yield the lines of a skill."""
     yield f"skill {skill.name} {{"
+    yield from purpose_lines(skill, condition_text)
     if skill.progress:
         yield f"  {_progress(skill.progress)}"
     yield from block("parameter", (parameter_text(p) for p in skill.parameters))

@@ -12,6 +12,7 @@ from alula.language.printing.text import (
     effect_text,
     hold_text,
     parameter_text,
+    purpose_lines,
 )
 from alula.model.condition_text import bare_text
 from alula.model.expressions import TRUE, DataIs, Expression, atoms
@@ -21,6 +22,7 @@ from alula.model.model import NO_EFFECT, Effect, Interrupt, Invariant, Progress,
 def skill_lines(skill: Skill) -> Iterator[str]:
     """Yield the lines of a skill."""
     yield f"skill {skill.name} {{"
+    yield from purpose_lines(skill, condition_text)
     yield from block("parameter", (parameter_text(p) for p in skill.parameters))
     yield from block("input", (parameter_text(p) for p in skill.inputs))
     yield from block("output", (parameter_text(p) for p in skill.outputs))

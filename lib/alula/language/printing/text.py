@@ -2,13 +2,13 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterable, Iterator
+from collections.abc import Callable, Iterable, Iterator, Sequence
 from dataclasses import dataclass
 
 from alula.language.syntax.resources import every_arrow, is_of_silence, occurring
 from alula.model.condition_text import bare_text
 from alula.model.expressions import TRUE, Expression
-from alula.model.model import NO_EFFECT, Data, Effect, Event, Hold, Parameter, Property, PropertyKind, Resource, Skill, Skillset
+from alula.model.model import NO_EFFECT, Data, Effect, Event, Hold, Parameter, Property, PropertyKind, Resource, Role, Skill, Skillset
 from alula.model.units import UNIT_IN_SI
 
 ConditionText = Callable[[Expression], str]
@@ -83,6 +83,21 @@ def hold_text(hold: Hold | None) -> str:
         value = f"{hold.hysteresis!r} {hold.unit}".strip()
         parts.append(f"recovers at {value if hold.unit in UNIT_IN_SI else f'({value})'}")
     return f" {' '.join(parts)}"
+
+
+def purpose_lines(skill: Skill, condition: ConditionText) -> Iterator[str]:
+    """Yield the lines that say what a skill is for."""
+    yield from _roles("provides", skill.provides)
+    yield from _roles("needs", skill.needs)
+    if skill.achieves != TRUE:
+        yield f"  achieves {condition(skill.achieves)}"
+
+
+def _roles(word: str, roles: Sequence[Role]) -> Iterator[str]:
+    if len(roles) == 1:
+        yield f"  {word} {roles[0].name}"
+    elif roles:
+        yield f"  {word} {{ {' '.join(one.name for one in roles)} }}"
 
 
 # --- elements --------------------------------------------------------------------------------------------------------

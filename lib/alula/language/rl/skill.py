@@ -11,7 +11,7 @@ from alula.language.syntax.conditions import bare_condition
 from alula.language.syntax.cursor import Cursor
 from alula.language.syntax.elements import one_or_block, read_parameter
 from alula.language.syntax.quantities import duration, hold, setting
-from alula.language.syntax.skill_reader import SkillReader
+from alula.language.syntax.skill_reader import PURPOSES, SkillReader
 from alula.model.model import (
     NO_EFFECT,
     Assignment,
@@ -39,6 +39,7 @@ BLOCKS = (
     "success",
     "failure",
     "result",
+    *PURPOSES,
 )
 
 
@@ -65,16 +66,12 @@ class _SkillReader(SkillReader):
 
     def member(self) -> None:
         """Read one block, or one entry without braces."""
-        word, parts = self.cursor.here, self.parts
-        if word.text in {"start", "progress", "interrupt"} and word.kind is Kind.NAME:
+        word = self.cursor.here
+        if word.text in {"start", "progress", "interrupt", "achieves"} and word.kind is Kind.NAME:
             self.once(word)
         match word.text:
-            case "parameter":
-                self._several(lambda: parts.parameters.append(read_parameter(self.cursor, "a parameter")))
-            case "input":
-                self._several(lambda: parts.inputs.append(read_parameter(self.cursor, "an input")))
-            case "output":
-                self._several(lambda: parts.outputs.append(read_parameter(self.cursor, "an output")))
+            case "parameter" | "input" | "output":
+                self._several(self.value(word.text))
             case "effect":
                 self.named_effects(self._several)
             case "precondition":
@@ -90,6 +87,8 @@ class _SkillReader(SkillReader):
             case "success" | "failure" | "result":
                 kind = ResultKind(word.text)
                 self._several(lambda: self._result(kind))
+            case "provides" | "needs" | "achieves":
+                self.purpose(bare_condition)
             case _:
                 raise self.unknown(word, BLOCKS)
 

@@ -7,7 +7,7 @@ from collections.abc import Callable
 from alula.language.lexer import Kind
 from alula.language.syntax.cursor import Cursor
 from alula.language.syntax.quantities import quantity, setting
-from alula.model.model import Assignment, Data, Parameter
+from alula.model.model import Assignment, Data, Parameter, Role
 from alula.model.units import told_unit
 
 
@@ -42,6 +42,12 @@ def _literal(cursor: Cursor) -> str:
     if cursor.here.kind is Kind.NAME:
         return cursor.name("a value").text
     raise cursor.fail("a number", 'a string in `"`', "`true`", "`false`", "a name")
+
+
+def read_role(cursor: Cursor) -> Role:
+    """Read the name of a role, as behind `provides` and `needs`."""
+    name = cursor.name("the name of a role")
+    return Role(name.text, span=cursor.span(name))
 
 
 def read_data(cursor: Cursor) -> Data:

@@ -6,7 +6,8 @@ from dataclasses import dataclass, field, replace
 
 from alula.common.suggestions import nearest
 from alula.language.lexer import Source, Token
-from alula.model.model import NO_EFFECT, Effect, Interrupt, Invariant, Parameter, Precondition, Progress, Result, Skill
+from alula.model.expressions import TRUE, Expression
+from alula.model.model import NO_EFFECT, Effect, Interrupt, Invariant, Parameter, Precondition, Progress, Result, Role, Skill
 
 
 @dataclass
@@ -23,6 +24,9 @@ class SkillParts:
     progress: Progress | None = None
     interrupt: Interrupt = field(default_factory=Interrupt)
     results: list[Result] = field(default_factory=list)
+    provides: list[Role] = field(default_factory=list)
+    needs: list[Role] = field(default_factory=list)
+    achieves: Expression = TRUE
     effects_complete: bool = True
     """False after an error in the `effect` block: an effect that is missed may have been in the part that was not read."""
 
@@ -54,5 +58,8 @@ class SkillParts:
             progress=self.progress,
             interrupt=replace(self.interrupt, effect=resolve(self.interrupt.effect)),
             results=tuple(replace(r, effect=resolve(r.effect)) for r in self.results),
+            provides=tuple(self.provides),
+            needs=tuple(self.needs),
+            achieves=self.achieves,
             span=source.span(name),
         )

@@ -7,9 +7,13 @@ from collections.abc import Callable
 from alula.common.suggestions import nearest
 from alula.language.lexer import Kind, Token
 from alula.language.syntax.cursor import Cursor, SyntaxFault
-from alula.language.syntax.elements import read_change
+from alula.language.syntax.elements import one_or_block, read_change, read_parameter, read_role
 from alula.language.syntax.skill_parts import SkillParts
-from alula.model.model import Assignment, Effect
+from alula.model.expressions import Expression
+from alula.model.model import Assignment, Effect, Role
+
+PURPOSES = ("provides", "needs", "achieves")
+"""The words by which a skill says what it is for."""
 
 
 class SkillReader:
@@ -32,6 +36,23 @@ class SkillReader:
         """Return the error about a word that begins no block."""
         hint = nearest(word.text, blocks) if word.kind is Kind.NAME else ""
         return self.cursor.fail(*(f"`{block}`" for block in blocks), "`}`", hint=hint if hint.startswith("did") else "")
+
+    def value(self, word: str) -> Callable[[], None]:
+        """Return what reads one entry of `parameter`, `input` or `output`."""
+        parts = self.parts
+        several = {"parameter": parts.parameters, "input": parts.inputs, "output": parts.outputs}
+        return lambda: several[word].append(read_parameter(self.cursor, f"{'a' if word == 'parameter' else 'an'} {word}"))
+
+    def purpose(self, condition: Callable[[Cursor], Expression]) -> None:
+        """Read `provides role`, `needs { role role }` or `achieves condition`."""
+        word, parts = self.cursor.here.text, self.parts
+        if word == "achieves":
+            self.cursor.advance()
+            self.cursor.accept(":")
+            parts.achieves = condition(self.cursor)
+            return
+        roles: list[Role] = parts.provides if word == "provides" else parts.needs
+        one_or_block(self.cursor, lambda: roles.append(read_role(self.cursor)), self.outside)
 
     def named_effects(self, read_all: Callable[[Callable[[], None]], None]) -> None:
         """Read the entries of an `effect` block by ``read_all``; know if one of them could not be read."""

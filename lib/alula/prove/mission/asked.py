@@ -11,6 +11,7 @@ from dataclasses import replace
 
 from alula.missions.palette import palette_of
 from alula.missions.part import MissionPart
+from alula.model.expressions import TRUE
 from alula.model.json_form import to_json
 from alula.model.model import Skillset
 from alula.prove.mission.conditions import Faults
@@ -33,7 +34,7 @@ def with_asked_resources(files: TreeFiles, models: Sequence[Skillset], part: Mis
     if any(ANYTHING in state for state in shown):
         return tuple(models)
     words |= {word for state in shown for word in WORD.findall(state)}
-    asked = {one.name: words | set(WORD.findall(to_json(replace(one, resources=())))) for one in models}
+    asked = {one.name: words | set(WORD.findall(to_json(_steps_of(one)))) for one in models}
     kept = {(one.name, resource.name) for one in models for resource in one.resources if resource.name in asked[one.name]}
     states = {state for one in models for resource in one.resources if (one.name, resource.name) in kept for state in resource.states}
     for one in models:
@@ -42,6 +43,11 @@ def with_asked_resources(files: TreeFiles, models: Sequence[Skillset], part: Mis
                 kept.add((one.name, resource.name))
                 states.update(resource.states)
     return tuple(replace(one, resources=tuple(each for each in one.resources if (one.name, each.name) in kept)) for one in models)
+
+
+def _steps_of(model: Skillset) -> Skillset:
+    """Return what steps are taken by: what a skill is for changes none."""
+    return replace(model, resources=(), skills=tuple(replace(one, provides=(), needs=(), achieves=TRUE) for one in model.skills))
 
 
 def _texts(files: TreeFiles, palette: Palette) -> Iterator[str]:

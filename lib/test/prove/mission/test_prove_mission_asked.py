@@ -20,7 +20,8 @@ RESOURCES = """
   resource idle { initial OFF extern OFF -> LIT }
 """
 MODEL = f"""skillset s {{{RESOURCES}
-  skill go {{ effect {{ take: arm -> USED give: arm -> FREE }} precondition {{ success take }} result {{ success DONE: apply = give }} }}
+  skill go {{ provides light achieves resource = (door == OPEN)
+    effect {{ take: arm -> USED give: arm -> FREE }} precondition {{ success take }} result {{ success DONE: apply = give }} }}
 }}"""
 
 
