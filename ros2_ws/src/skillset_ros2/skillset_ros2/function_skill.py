@@ -2,7 +2,9 @@
 
 from __future__ import annotations
 
+import math
 import threading
+import time
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field
 from typing import Any, ClassVar, Generic, TypeVar
@@ -17,6 +19,8 @@ from skillset_ros2.watch import Watch
 _TERMINATED = "terminated_"
 FOUND_S = 1.0
 """Wall clock; so long a server that runs may take to be found when the managers start."""
+AGAIN_S = 1.0
+"""How often a service is asked to stop what ran before until it answers: DDS loses answers to clients that it has just discovered."""
 
 
 @dataclass(frozen=True)
@@ -45,7 +49,8 @@ class LateStop:
 
     client: Any
     request: Any
-    asked: bool = False
+    asked_s: float = -math.inf
+    """When it was asked last, mission clock."""
 
 
 CallT = TypeVar("CallT", bound=Call)
@@ -76,7 +81,7 @@ class FunctionSkill(SkillHooks, Generic[CallT]):
         watch.every(self._look)
 
     def call_at_start(self, kind: Any, server: str, request: Any) -> None:
-        """Call a service that stops what runs, and wait for its answer, wall clock; one that is not there is called when it comes.
+        """Call a service that stops what runs until it answers, wall clock; one that is not there is called when it comes.
 
         Raises:
             SkillRuntimeError: it does not answer.
@@ -86,10 +91,12 @@ class FunctionSkill(SkillHooks, Generic[CallT]):
             self._late = LateStop(client, request)
             return
         try:
-            answered = threading.Event()
-            client.call_async(request).add_done_callback(lambda _: answered.set())
-            if not answered.wait(self.answer_s):
-                raise SkillRuntimeError(f"{server} does not answer for {self.answer_s:g} s")
+            answered, end_s = threading.Event(), time.monotonic() + self.answer_s
+            while (left_s := end_s - time.monotonic()) > 0.0:
+                client.call_async(request).add_done_callback(lambda _: answered.set())
+                if answered.wait(min(AGAIN_S, left_s)):
+                    return
+            raise SkillRuntimeError(f"{server} does not answer for {self.answer_s:g} s")
         finally:
             self.watch.node.destroy_client(client)
 
@@ -162,13 +169,15 @@ class FunctionSkill(SkillHooks, Generic[CallT]):
             call.execution.fail(message)
 
     def _stop_late(self) -> None:
-        """Call what stops what ran before, as soon as its server is there."""
+        """Call what stops what ran before, as soon as its server is there, until it answers."""
         with self._lock:
-            late, ready = self._late, self.stops_first
-            if late is None or late.asked is ready:
+            late = self._late
+            if late is None:
                 return
-            late.asked = ready  # not ready: it has gone again without an answer
-            if ready:
+            if not self.stops_first:
+                late.asked_s = -math.inf  # it is not there yet, or has gone again without an answer
+            elif self.watch.now_s - late.asked_s >= AGAIN_S:
+                late.asked_s = self.watch.now_s
                 late.client.call_async(late.request).add_done_callback(lambda _: self.forget_late_stop())
 
     def _look(self) -> None:

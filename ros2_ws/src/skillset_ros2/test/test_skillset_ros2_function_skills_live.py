@@ -69,6 +69,12 @@ class Ask(ServiceSkill, AbstractGotoStraightSkill):
         return SetBool.Request(data=inputs.speed > 0.0)
 
 
+class Patient(Ask):
+    """Waits for longer than it takes to ask again."""
+
+    answer_s = 10.0
+
+
 class Awaited:
     """What a coroutine of a node awaits, and the test sets."""
 
@@ -259,12 +265,13 @@ def test_a_hook_that_raises_on_the_executor_ends_its_execution_only(flying, rig)
 
 
 class AskServer:
-    """A service that answers when the test says, and the one that stops it."""
+    """A service that answers when the test says, and the one that stops it; of this, the first answers are lost."""
 
-    def __init__(self, spinning) -> None:
+    def __init__(self, spinning, loses_stops=0) -> None:
         self.node = spinning.spin(Node(f"asked_{next(NUMBERS)}"))
         self.answers: list = []
         self.stops = 0
+        self.loses_stops = loses_stops
         group = ReentrantCallbackGroup()
         self.service = self.node.create_service(SetBool, "ask", self._ask, callback_group=group)
         self.stop = self.node.create_service(Trigger, "ask/stop", self._stop, callback_group=group)
@@ -275,8 +282,10 @@ class AskServer:
         response.success, response.message = request.data, await answer.future
         return response
 
-    def _stop(self, _request, response):
+    async def _stop(self, _request, response):
         self.stops += 1
+        if self.stops <= self.loses_stops:
+            await Future()
         response.success = True
         return response
 
@@ -328,6 +337,21 @@ def test_managers_that_start_call_the_stop_of_a_service(spinning):
     asked = AskServer(spinning)
     Rig(spinning, Ask)
     assert asked.stops == 1
+
+
+def test_a_service_whose_first_answer_is_lost_is_asked_to_stop_again(spinning):
+    asked = AskServer(spinning, loses_stops=1)
+    Rig(spinning, Patient)
+    assert asked.stops == 2
+
+
+def test_a_late_service_whose_first_answer_is_lost_is_asked_to_stop_again(spinning):
+    rig = Rig(spinning, Patient)
+    asked = AskServer(spinning, loses_stops=1)
+    handle = rig.start()
+    asked.asked()("there")
+    assert rig.ended(handle)[:2] == (S.TERMINATED, "ARRIVED")
+    assert asked.stops == 2
 
 
 def test_a_stop_whose_server_comes_after_the_managers_is_called_before_anything_is_asked(spinning):
