@@ -184,6 +184,28 @@ def test_what_hangs_delays_nothing_else_and_what_refuses_is_asked_again(robot, s
     assert (calls["long"]["done"], calls["long"]["said"]) == (False, "sleep was killed after 0.2 s")
 
 
+def test_a_second_step_is_called_only_where_the_silence_lasts(robot, start_dead_man, start_heart):
+    first = {"zero": f"{robot.name}/cmd_vel", "rate_hz": 50.0, "for_s": 0.2}
+    second = {"service": f"{robot.name}/brake", "type": "std_srvs/SetBool", "request": {"data": True}, "after_s": SILENT_AFTER_S}
+    robot.configure(stop={"hover": first, "land": second})
+    start_dead_man()
+    heart = start_heart()
+    robot.until_state(state="heard")
+    heart.send_signal(signal.SIGSTOP)
+    robot.until_state(state="silent")
+    until(lambda: robot.states[-1]["calls"]["hover"]["done"], what="it hovers")
+    heart.send_signal(signal.SIGCONT)
+    not_called = f"was not called: heard again within {SILENT_AFTER_S:g} s"
+    until(lambda: robot.states[-1]["calls"]["land"]["said"] == not_called, what="it is said that it need not land")
+    assert robot.told.count("brake True") == 0
+    heart.kill()
+    silent_s = rospy.get_time()
+    until(lambda: robot.states[-1]["calls"]["land"]["done"], what="it lands")
+    assert robot.states[-1]["calls"]["hover"]["done"]
+    assert robot.states[-1]["stops"] == 2
+    assert rospy.get_time() - silent_s >= 2 * SILENT_AFTER_S - 1.0, "s: of silence, then of hovering; the heart beats every 0.1 s"
+
+
 class Skillset:
     """A resource manager with one resource, that can be out of reach."""
 

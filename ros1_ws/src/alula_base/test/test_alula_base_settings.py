@@ -21,7 +21,7 @@ def test_all_that_can_be_configured():
             "stop": {
                 "wheels": {"zero": "/cmd_vel", "rate_hz": 20, "for_s": 3.5},
                 "brake": {"service": "/brake/set", "type": "std_srvs/SetBool", "request": {"data": True}, "within_s": 1.5},
-                "navigation": {"cancel": "/move_base"},
+                "navigation": {"cancel": "/move_base", "after_s": 8},
                 "tell": {"script": ["logger", "stopped"]},
             },
             "report": {"skillset": "rover", "resource": "link", "heard": "UP", "silent": "DOWN"},
@@ -31,7 +31,7 @@ def test_all_that_can_be_configured():
     assert settings.stop == {
         "wheels": ZeroSettings("/cmd_vel", 20.0, 3.5),
         "brake": ServiceSettings("/brake/set", "std_srvs/SetBool", {"data": True}, 1.5),
-        "navigation": CancelSettings("/move_base", 5.0),
+        "navigation": CancelSettings("/move_base", 5.0, after_s=8.0),
         "tell": ScriptSettings(("logger", "stopped"), 10.0),
     }
     assert settings.report == ReportSettings("rover", "link", "UP", "DOWN")
@@ -64,11 +64,15 @@ def test_what_need_not_be_said():
         ({"stop": {}}, "~stop is empty, expected what is called when nothing is heard, by name"),
         ({"stop": {"a": {}}}, "~stop/a has nothing to call, expected one of service, zero, cancel, script"),
         ({"stop": {"a": {"zero": "/a", "cancel": "/b"}}}, "~stop/a has zero and cancel, expected one of service, zero, cancel, script"),
-        ({"stop": {"a": {"zero": "/a", "within_s": 1}}}, "unknown parameter ~stop/a/within_s; known: zero, rate_hz, for_s"),
+        ({"stop": {"a": {"zero": "/a", "within_s": 1}}}, "unknown parameter ~stop/a/within_s; known: zero, rate_hz, for_s, after_s"),
         ({"stop": {"a": {"service": "/a"}}}, "parameter ~stop/a/type is missing"),
         (
             {"stop": {"a": {"service": "/a", "type": "SetBool"}}},
             "~stop/a/type is 'SetBool', expected a service's type, as std_srvs/SetBool",
+        ),
+        (
+            {"stop": {"a": {"zero": "/a", "after_s": -1}}},
+            "~stop/a/after_s is -1, expected a number above 0, of at most 3600",
         ),
         (
             {"stop": {"a": {"service": "/a", "type": "a/B", "request": [1]}}},

@@ -53,7 +53,7 @@ class ServiceCall:
         self._within_s = settings.within_s
 
     def run(self, silent: Silent) -> str:
-        """Call; an answer whose ``success`` is false counts as none."""
+        """Call; an answer whose ``success`` or ``accepted`` is false counts as none."""
         end_s = time.monotonic() + self._within_s
         while True:
             try:
@@ -61,9 +61,10 @@ class ServiceCall:
             except CallFailedError as error:
                 problem = str(error)
             else:
-                if getattr(answer, "success", True):
+                if getattr(answer, "success", True) and getattr(answer, "accepted", True):
                     return f"{self._caller.name} has answered"
-                problem = f"{self._caller.name} has refused: {getattr(answer, 'message', '')}"
+                why = getattr(answer, "message", "") or getattr(answer, "reason", "")
+                problem = f"{self._caller.name} has refused: {why}"
             if time.monotonic() + AGAIN_S > end_s or not silent():
                 raise CallFailedError(problem)
             time.sleep(AGAIN_S)

@@ -64,8 +64,8 @@ class DeadMan:
         self._stops = 0
         self._stopped_s: float | None = None
         self._state = rospy.Publisher("~state", String, queue_size=5, latch=True)
-        calls = {name: make_call(name, one) for name, one in settings.stop.items()}
-        self._workers = {name: Worker(name, call, self._is_silent, self._show) for name, call in calls.items()}
+        calls = {name: (make_call(name, one), one.after_s) for name, one in settings.stop.items()}
+        self._workers = {name: Worker(name, call, after_s, self._is_silent, self._show) for name, (call, after_s) in calls.items()}
         self._supervision = Supervision(settings.report) if settings.report else None
         self._owes_heard = False
         self._show()
@@ -109,7 +109,7 @@ class DeadMan:
         for worker in self._workers.values():
             worker.want()
         reason = ", ".join(f"nothing heard of {change.topic} for {change.silence_s:.2f} s" for change in silent)
-        rospy.logerr("%s: %s", reason, ", ".join(f"calling {name}" for name in self._workers))
+        rospy.logerr("%s: calling %s", reason, ", ".join(f"{name}{worker.when}" for name, worker in self._workers.items()))
         if self._supervision is not None:
             self._supervision.silent(f"{reason}: the robot was stopped")
 

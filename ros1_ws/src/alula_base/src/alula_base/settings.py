@@ -42,6 +42,10 @@ def _positive(where: str, value: object) -> float:
     return number
 
 
+def _from_zero(where: str, value: object) -> float:
+    return 0.0 if value == 0 and not isinstance(value, bool) else _positive(where, value)
+
+
 def _mapping(where: str, value: object) -> dict[str, Any]:
     if not isinstance(value, dict):
         raise ConfigError(f"{where} is {value!r}, expected keys and values")
@@ -62,14 +66,19 @@ def _key(check: Check, default: Any = MISSING) -> Any:
     return field(metadata={"check": check}) if default is MISSING else field(default=default, metadata={"check": check})
 
 
+AFTER_S = 0.0
+"""For so long must the silence last on before a call is made; by default it is made at once."""
+
+
 @dataclass(frozen=True)
 class ServiceSettings:
-    """Call a service, again until it answers, for ``within_s``; an answer whose ``success`` is false is none."""
+    """Call a service, again until it answers, for ``within_s``; an answer whose ``success`` or ``accepted`` is false is none."""
 
     service: str = _key(_name)
     type: str = _key(_type)
     request: Mapping[str, Any] = field(default_factory=dict, metadata={"check": _mapping})
     within_s: float = _key(_positive, 2.0)
+    after_s: float = _key(_from_zero, AFTER_S)
 
 
 @dataclass(frozen=True)
@@ -79,6 +88,7 @@ class ZeroSettings:
     zero: str = _key(_name)
     rate_hz: float = _key(_positive, 10.0)
     for_s: float = _key(_positive, 5.0)
+    after_s: float = _key(_from_zero, AFTER_S)
 
 
 @dataclass(frozen=True)
@@ -87,6 +97,7 @@ class CancelSettings:
 
     cancel: str = _key(_name)
     within_s: float = _key(_positive, 5.0)
+    after_s: float = _key(_from_zero, AFTER_S)
 
 
 @dataclass(frozen=True)
@@ -95,6 +106,7 @@ class ScriptSettings:
 
     script: tuple[str, ...] = _key(_list_of(_word))
     within_s: float = _key(_positive, 10.0)
+    after_s: float = _key(_from_zero, AFTER_S)
 
 
 CallSettings = Union[ServiceSettings, ZeroSettings, CancelSettings, ScriptSettings]

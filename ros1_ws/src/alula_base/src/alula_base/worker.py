@@ -1,4 +1,4 @@
-"""A thread for each call: one that hangs delays no other."""
+"""A thread for each call: one that hangs, or waits for its time, delays no other."""
 
 from __future__ import annotations
 
@@ -28,18 +28,32 @@ class Outcome:
     took_s: float = 0.0
 
 
+LOOK_S = 0.05
+"""How often a call that waits looks whether there is a heartbeat again."""
+
+
 class Worker:
     """Runs a call when it is wanted; when it is wanted while it runs, once more afterwards.
 
-    ``on_change`` is called from the worker's thread.
+    Args:
+        name: of the call.
+        call: what is called.
+        after_s: the silence has to last for so long after the call was wanted.
+        silent: tells whether it lasts.
+        on_change: called from the worker's thread when the outcome is known.
     """
 
-    def __init__(self, name: str, call: StopCall, silent: Silent, on_change: Callable[[], None]) -> None:
+    def __init__(self, name: str, call: StopCall, after_s: float, silent: Silent, on_change: Callable[[], None]) -> None:
         self.outcome = Outcome()
-        self._name, self._call = name, call
+        self._name, self._call, self._after_s = name, call, after_s
         self._silent, self._on_change = silent, on_change
         self._wanted = threading.Event()
         threading.Thread(target=self._work, name=f"stop_{name}", daemon=True).start()
+
+    @property
+    def when(self) -> str:
+        """Return when it calls, in words; "": at once."""
+        return f" after {self._after_s:g} s more" if self._after_s else ""
 
     def want(self) -> None:
         """Have the call made; returns at once."""
@@ -49,10 +63,27 @@ class Worker:
         while True:
             self._wanted.wait()
             self._wanted.clear()
+            if not self._is_due():
+                self.outcome = Outcome(None, f"was not called: heard again within {self._after_s:g} s")
+                self._on_change()
+                continue
             self.outcome = Outcome(None, "is called")
             self.outcome = self._made()
             (rospy.logwarn if self.outcome.done else rospy.logerr)("%s: %s", self._name, self.outcome.said)
             self._on_change()
+
+    def _is_due(self) -> bool:
+        """Wait for the time of the call; return whether the silence has lasted until then."""
+        if not self._after_s:
+            return True
+        self.outcome = Outcome(None, f"is called if nothing is heard for {self._after_s:g} s more")
+        end_s = time.monotonic() + self._after_s
+        while self._silent():
+            left_s = end_s - time.monotonic()
+            if left_s <= 0.0:
+                return True
+            time.sleep(min(left_s, LOOK_S))
+        return False
 
     def _made(self) -> Outcome:
         begin_s = time.monotonic()
