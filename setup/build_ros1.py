@@ -106,6 +106,7 @@ def build(workspace: Workspace) -> int:
     sys.stdout.write(f"to build: {' '.join(changed) or 'nothing'}\n")
     sys.stdout.flush()
     link_sources(workspace)
+    built.without(changed).write(record)
     code = run_catkin(workspace, changed if built.packages else ()) if changed else 0
     code = code or generate_messages(workspace, changed)
     if code == 0:

@@ -10,7 +10,7 @@ import hashlib
 import json
 import os
 import shutil
-from collections.abc import Iterable, Iterator, Mapping
+from collections.abc import Collection, Iterable, Iterator, Mapping
 from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING
@@ -184,6 +184,10 @@ class Built:
     def write(self, path: Path) -> None:
         """Write the record."""
         path.write_text(json.dumps({"tools": self.tools, "packages": self.packages}, indent=1) + "\n", encoding="utf-8")
+
+    def without(self, names: Collection[str]) -> Built:
+        """Return what holds while these packages are built: of them nothing, however that ends."""
+        return Built(self.tools, {name: state for name, state in self.packages.items() if name not in names})
 
     def gone(self, states: Mapping[str, str]) -> set[str]:
         """Return the packages that were built and are there no more."""

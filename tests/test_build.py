@@ -4,11 +4,14 @@ from __future__ import annotations
 
 import importlib
 import os
+import signal
 import subprocess
 from pathlib import Path
 from types import ModuleType
 
 import pytest
+
+from alula_testing.waits import until
 
 ALULA_ROOT = Path(__file__).resolve().parents[1]
 
@@ -169,6 +172,48 @@ def python_package(folder: Path) -> None:
         '<maintainer email="developers@alula.example.org">Alula</maintainer><license>Apache-2.0</license>'
         "<export><build_type>ament_python</build_type></export></package>"
     )
+
+
+INTERFACES_CMAKE = """cmake_minimum_required(VERSION 3.16)
+project(counts)
+find_package(ament_cmake REQUIRED)
+find_package(rosidl_default_generators REQUIRED)
+rosidl_generate_interfaces(counts "msg/Count.msg")
+ament_package()
+"""
+
+
+@pytest.mark.timeout(0)  # builds a package of messages twice: as long as the machine needs
+def test_messages_whose_build_was_killed_are_built_anew(tmp_path):
+    folder, build = tmp_path / "ros2_ws/src/counts", tmp_path / ".alula/ros2/build/counts"
+    (folder / "msg").mkdir(parents=True)
+    (tmp_path / "robot.yaml").write_text("name: killed\n")
+    (folder / "msg/Count.msg").write_text("int32 number\n")
+    (folder / "CMakeLists.txt").write_text(INTERFACES_CMAKE)
+    (folder / "package.xml").write_text(
+        '<package format="3"><name>counts</name><version>0.1.0</version><description>A number.</description>'
+        '<maintainer email="developers@alula.example.org">Alula</maintainer><license>Apache-2.0</license>'
+        "<buildtool_depend>ament_cmake</buildtool_depend><buildtool_depend>rosidl_default_generators</buildtool_depend>"
+        "<member_of_group>rosidl_interface_packages</member_of_group><export><build_type>ament_cmake</build_type></export></package>"
+    )
+    command = ["env", f"ALULA_ROBOT={tmp_path}", f"{ALULA_ROOT}/setup/in_ros2", "python3", f"{ALULA_ROOT}/setup/build_ros2.py", "robot"]
+    killed = subprocess.Popen(command, stdout=subprocess.DEVNULL, stderr=subprocess.DEVNULL, start_new_session=True)
+    header = build / "rosidl_generator_c/counts/msg/detail/count__struct.h"
+    until(lambda: header.exists() or killed.poll() is not None, "code is generated", timeout_s=300.0)
+    os.killpg(killed.pid, signal.SIGKILL)
+    assert killed.wait() == -signal.SIGKILL
+    header.write_text("")  # as far as it had come
+    again = subprocess.run(command, capture_output=True, text=True, check=False)
+    assert again.returncode == 0, again.stdout[-3000:] + again.stderr[-3000:]
+    assert "to build: counts" in again.stdout
+    assert "to build: nothing" in subprocess.run(command, capture_output=True, text=True, check=True).stdout
+
+
+def test_what_is_being_built_counts_as_not_built(workspace, tmp_path):
+    before = workspace.Built("gcc 12", {"interfaces": "1", "robot": "1"})
+    before.without(["interfaces"]).write(tmp_path / "built.json")
+    # Also where its sources become again what they were before the build that was killed.
+    assert workspace.Built.read(tmp_path / "built.json").changed({"interfaces": "1", "robot": "1"}) == ["interfaces"]
 
 
 @pytest.mark.timeout(0)  # builds three packages: as long as the machine needs

@@ -286,6 +286,11 @@ def test_completion_knows_the_options_of_a_command(command: str) -> None:
     assert set(completed(f"alula {command} --")) - {"--robot"} == known - {"--help"}
 
 
+@pytest.mark.usefixtures("unbuilt")
+def test_the_drones_own_options_are_completed_where_no_ros_world_could_be_asked() -> None:
+    assert completed("alula fly mapping --autop") == ["--autopilot"]
+
+
 def test_the_page_of_commands_is_the_tables() -> None:
     here = checkout()
     assert here is not None
