@@ -123,3 +123,58 @@ def test_a_motor_that_stops_brings_the_vehicle_down_and_the_autopilot_leaves_the
     simulation.tick()
     simulation.tick()
     assert (flown.autopilot.armed, flown.landed_state) == (False, LandedState.ON_GROUND)
+
+
+def flown_with(fault):
+    """Take off with a fault, and hold for 15 s; return the simulation and what the body did from 3 s after lift-off on."""
+    flown = SimulatedAutopilotVehicle(seed=0)
+    simulation = Simulation(CONFIG, flown, seed=0, faults=parse_faults(fault))
+    Client(simulation).take_off()
+    return simulation, flown
+
+
+def lean_rad(flown):
+    _, x, y, _ = flown.body.attitude
+    return 2.0 * math.hypot(x, y)
+
+
+def test_a_wind_that_rises_is_leant_against_and_calms_down():
+    simulation, flown = flown_with("wind@4-14")
+
+    def mean_lean_rad(begin_s, end_s):
+        leans = []
+        while simulation.now_s < simulation.lift_off_s + end_s:
+            simulation.tick()
+            leans += [lean_rad(flown)] if simulation.now_s >= simulation.lift_off_s + begin_s else []
+        return sum(leans) / len(leans)
+
+    strong, calm = mean_lean_rad(8.0, 14.0), mean_lean_rad(20.0, 24.0)
+    assert 3.0 * calm < strong < math.radians(25.0)
+    assert [(one["mode"], round(one["t_s"] - simulation.lift_off_s, 1)) for one in simulation.state.faults] == [
+        ("strong", 4.0),
+        ("ok", 14.0),
+    ]
+
+
+def test_a_pilot_takes_the_vehicle_and_gives_it_back():
+    simulation, flown = flown_with("pilot@4-6")
+    modes = []
+    while simulation.now_s < simulation.lift_off_s + 8.0:
+        simulation.tick()
+        modes += [flown.autopilot.mode.name] if modes[-1:] != [flown.autopilot.mode.name] else []
+    assert modes == ["GUIDED", "LOITER", "GUIDED"]
+
+
+def test_a_pilots_stick_turns_the_nose_while_it_is_moved():
+    simulation, flown = flown_with("pilot:stick@4-6")
+
+    def yaw_rad_at(since_s):
+        while simulation.now_s < simulation.lift_off_s + since_s:
+            simulation.tick()
+        w, x, y, z = flown.body.attitude
+        return math.atan2(2.0 * (w * z + x * y), 1.0 - 2.0 * (y * y + z * z))
+
+    before, moved, later = (yaw_rad_at(since_s) for since_s in (4.0, 6.0, 10.0))
+    assert moved - before == pytest.approx(1.0, abs=0.25)
+    assert later == pytest.approx(before, abs=0.05), "in GUIDED it looks again where it was told to"
+    assert flown.autopilot.mode.name == "GUIDED"

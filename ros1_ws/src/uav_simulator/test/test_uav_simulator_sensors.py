@@ -10,7 +10,7 @@ import pytest
 from alula.common.faults import parse_faults
 from uav_simulator.errors import ConfigError
 from uav_simulator.sensors import degradation
-from uav_simulator.sensors.faults import FAULTS, SensorBoard, SensorMode
+from uav_simulator.sensors.faults import AUTOPILOTS, FAULTS, SensorBoard, SensorMode
 from uav_simulator.sensors.imu import Imu, ImuReading
 from uav_simulator.sensors.lidar import Lidar
 from uav_simulator.sensors.mounts import LIDAR, ZED_LEFT, rotation_matrix
@@ -266,19 +266,20 @@ def test_a_wrong_mode_is_refused(sensor, mode, said):
         SensorBoard([]).set(sensor, mode, 0.0)
 
 
-def test_the_barometer_of_an_autopilot_that_is_not_simulated_can_not_be_broken():
-    faults = parse_faults("barometer@3", FAULTS)
-    assert SensorBoard(faults).modes["barometer"] == "ok"
-    with pytest.raises(ConfigError, match="no fault of the barometer: it is the autopilot's"):
-        SensorBoard(faults, absent=("barometer",))
-    with pytest.raises(ConfigError, match="no fault of the barometer: it is the autopilot's"):
-        SensorBoard([], absent=("barometer",)).set("barometer", "drifting", 0.0)
+@pytest.mark.parametrize("what", AUTOPILOTS)
+def test_what_belongs_to_an_autopilot_that_is_not_simulated_can_not_be_broken(what):
+    faults = parse_faults(f"{what}@3", FAULTS)
+    assert SensorBoard(faults).modes[what] == "ok"
+    with pytest.raises(ConfigError, match=f"no fault of the {what}: it is the autopilot's, which is not simulated; "):
+        SensorBoard(faults, absent=AUTOPILOTS)
+    with pytest.raises(ConfigError, match=f"no fault of the {what}: it is the autopilot's"):
+        SensorBoard([], absent=AUTOPILOTS).set(what, FAULTS[what][0], 0.0)
 
 
 def test_scheduled_faults_happen_at_their_moment_after_lift_off():
     board = SensorBoard(parse_faults("zed@3,imu", FAULTS))
     assert board.apply_due(0.0, None)
-    assert board.modes == {"zed": "ok", "lidar": "ok", "camera": "ok", "imu": "dead", "barometer": "ok", "gps": "ok", "motor": "ok"}
+    assert board.modes == {**dict.fromkeys(FAULTS, "ok"), "imu": "dead"}
     assert not board.apply_due(100.0, None), "not lifted off yet"
     assert not board.apply_due(12.9, 10.0)
     assert board.apply_due(13.0, 10.0)

@@ -8,13 +8,17 @@ from typing import Protocol
 from uav_simulator.autopilot.core import Autopilot
 from uav_simulator.autopilot.endpoint import Endpoint
 from uav_simulator.autopilot.estimator import PERFECT, Estimator
-from uav_simulator.autopilot.types import LandedState
+from uav_simulator.autopilot.types import LandedState, Mode
 from uav_simulator.frames import Vec3
 from uav_simulator.imperfections import Imperfections
+from uav_simulator.sensors.faults import SensorMode
 from uav_simulator.vehicle.airframe import Airframe
 from uav_simulator.vehicle.hexacopter import Hexacopter
 from uav_simulator.vehicle.noise import Wind
 from uav_simulator.vehicle.rigid_body import ZERO, RigidBody
+
+STICK_RAD_S = 0.5
+"""How fast the pilot turns the nose where the stick is moved."""
 
 
 class Flown(Protocol):
@@ -38,6 +42,9 @@ class Flown(Protocol):
     def late_s(self, now_s: float) -> float:
         """Return how far its autopilot has gone on beyond this moment; 0 where it waits for the simulation."""
 
+    def expose(self, wind: SensorMode, pilot: SensorMode) -> None:
+        """Let wind and pilot do what their faults say; called each tick. Nothing happens where another autopilot flies."""
+
 
 class SimulatedAutopilotVehicle:
     """The hexacopter, flown by the simulator's own autopilot behind MAVLink."""
@@ -54,7 +61,9 @@ class SimulatedAutopilotVehicle:
     ) -> None:
         """``params`` of the autopilot; ``ground_link``: a ground station speaks over a link of its own, so none is made up."""
         airframe = Airframe()
-        self.vehicle = Hexacopter(airframe, Wind.of(imperfections, seed), home, yaw_rad=0.0)
+        self._wind = Wind.of(imperfections, seed)
+        self._pilot = SensorMode.OK
+        self.vehicle = Hexacopter(airframe, self._wind, home, yaw_rad=0.0)
         self.autopilot = Autopilot(
             self.vehicle, airframe, seed=seed, boot_before_s=boot_before_s, params=params, imperfections=imperfections
         )
@@ -81,6 +90,17 @@ class SimulatedAutopilotVehicle:
     def late_s(self, now_s: float) -> float:  # noqa: ARG002
         """Return 0: this autopilot runs in the simulator's own time."""
         return 0.0
+
+    def expose(self, wind: SensorMode, pilot: SensorMode) -> None:
+        """Let the wind rise or calm down; have the pilot take the vehicle, turn it by the stick, or leave it again."""
+        self._wind.strong = wind is SensorMode.STRONG
+        if pilot is self._pilot:
+            return
+        before, self._pilot = self._pilot, pilot
+        if SensorMode.TAKES in {before, pilot}:
+            self.autopilot.set_mode(Mode.LOITER if pilot is SensorMode.TAKES else Mode.GUIDED)
+        if SensorMode.STICK in {before, pilot}:
+            self.autopilot.yaw_stick(STICK_RAD_S if pilot is SensorMode.STICK else 0.0)
 
     def tick(self, now_s: float, dt_s: float) -> bool:
         """Move the body, then let the autopilot decide and speak."""

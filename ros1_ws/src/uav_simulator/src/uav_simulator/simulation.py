@@ -99,6 +99,7 @@ class Simulation:
             self.flown.estimator.barometer.broken = self.sensors.mode("barometer") is SensorMode.DRIFTING
             satellites, gps = self.flown.estimator.satellites, self.sensors.mode("gps")
             satellites.silent, satellites.jammed = gps is SensorMode.DEAD, gps is SensorMode.JAMMED
+        self.flown.expose(self.sensors.mode("wind"), self.sensors.mode("pilot"))
         body.stopped_rotor = STOPPED_ROTOR if self.sensors.mode("motor") is SensorMode.STOPPED else None
         self.track.add(self.pose)
         return True

@@ -19,6 +19,7 @@ from uav_simulator.autopilot.types import LandedState
 from uav_simulator.contacts import CRUISE_HEIGHT_M
 from uav_simulator.errors import SimulatorError
 from uav_simulator.frames import Vec3, frd_from_flu, ned_from_enu, quat_ned_frd_from_enu_flu
+from uav_simulator.sensors.faults import SensorMode
 from uav_simulator.vehicle.airframe import GRAVITY_M_S2
 from uav_simulator.vehicle.hexacopter import STEP_S
 from uav_simulator.vehicle.noise import Wind
@@ -99,6 +100,9 @@ class ArduPilotVehicle:
     def estimator(self) -> None:
         """Return None: it is not the simulator's."""
         return None
+
+    def expose(self, wind: SensorMode, pilot: SensorMode) -> None:
+        """Do nothing: wind and pilot are those of the autopilot that flies."""
 
     def late_s(self, now_s: float) -> float:  # noqa: ARG002
         """ArduPilot waits for each answer."""

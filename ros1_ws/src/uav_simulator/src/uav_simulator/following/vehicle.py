@@ -10,6 +10,7 @@ from uav_simulator.autopilot.types import LandedState
 from uav_simulator.following.link import ListeningLink
 from uav_simulator.following.track import LinkTrack
 from uav_simulator.frames import Vec3
+from uav_simulator.sensors.faults import SensorMode
 from uav_simulator.vehicle.airframe import GRAVITY_M_S2, Airframe
 from uav_simulator.vehicle.quaternion import rotate
 from uav_simulator.vehicle.rigid_body import ZERO, RigidBody
@@ -66,6 +67,9 @@ class FollowedVehicle:
     def estimator(self) -> None:
         """Return None: it is not the simulator's."""
         return None
+
+    def expose(self, wind: SensorMode, pilot: SensorMode) -> None:
+        """Do nothing: wind and pilot are those of the autopilot that flies."""
 
     def late_s(self, now_s: float) -> float:
         """Return how much newer the autopilot's last word is."""

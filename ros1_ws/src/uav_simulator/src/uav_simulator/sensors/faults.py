@@ -35,6 +35,9 @@ class SensorMode(Enum):
     DRIFTING = "drifting"  # the height that is measured runs away
     JAMMED = "jammed"  # a GPS that says that it has no fix
     STOPPED = "stopped"  # a motor of six
+    STRONG = "strong"  # a wind of 8 m/s, gusts 1.5
+    TAKES = "takes"  # the pilot flips the switch to LOITER, and back to GUIDED in the end
+    STICK = "stick"  # the pilot turns the nose by the stick, at 0.5 rad/s
 
 
 _ALWAYS = (SensorMode.DEAD, SensorMode.FROZEN, SensorMode.FLICKERING, SensorMode.BLACK, SensorMode.LATE, SensorMode.FUTURE)
@@ -55,11 +58,18 @@ FAULTS: dict[str, tuple[str, ...]] = {
     "barometer": (SensorMode.DRIFTING.value,),
     "gps": (SensorMode.DEAD.value, SensorMode.JAMMED.value),
     "motor": (SensorMode.STOPPED.value,),
+    "wind": (SensorMode.STRONG.value,),
+    "pilot": (SensorMode.TAKES.value, SensorMode.STICK.value),
 }
-"""The sensors, each with the ways in which it can fail; the first one counts where none is named. Barometer and GPS are the autopilot's. A
-motor is no sensor, but fails alike."""
-AUTOPILOTS = {"barometer": "SIM_BARO_DRIFT", "gps": "SIM_GPS1_ENABLE (SIM_GPS_DISABLE in older ones)"}
-"""Those of the autopilot, each with the parameter that breaks it in ArduPilot's own simulator."""
+"""The sensors, each with the ways in which it can fail; the first one counts where none is named. Barometer and GPS are the autopilot's.
+Motor, wind and pilot are no sensors, but come and go alike."""
+AUTOPILOTS = {
+    "barometer": "set ArduPilot's SIM_BARO_DRIFT",
+    "gps": "set ArduPilot's SIM_GPS1_ENABLE (SIM_GPS_DISABLE in older ones)",
+    "wind": "set ArduPilot's SIM_WIND_SPD, or --imperfections wind_m_s=8",
+    "pilot": "use its remote control, or a ground station",
+}
+"""Those of the autopilot and around it, each with what to do where ArduPilot flies."""
 
 
 @dataclass(frozen=True)
@@ -122,9 +132,7 @@ class SensorBoard:
 
     def _check(self, sensor: str) -> None:
         if sensor in self._absent:
-            raise ConfigError(
-                f"no fault of the {sensor}: it is the autopilot's, which is not simulated; set ArduPilot's {AUTOPILOTS[sensor]}"
-            )
+            raise ConfigError(f"no fault of the {sensor}: it is the autopilot's, which is not simulated; {AUTOPILOTS[sensor]}")
 
     def apply_due(self, now_s: float, lift_off_s: float | None) -> bool:
         """Let the scheduled changes happen that are due; return whether one did."""
