@@ -69,7 +69,7 @@ def parse(arguments: Sequence[str], part: RunPart) -> RunSpec:
         out_dir=str(run_folder(given.out, given.scenario)),
         run_id=uuid.uuid4().hex,
         seed=seed,
-        faults=read_faults(given.fail, None if robots else {**part.faults, **dict(scenario.faults)}),
+        faults=read_faults(given.fail, None if robots else {**options.offer_of(part).faults, **dict(scenario.faults)}),
         world=world,
         master_port=free_port(),
         domain=read_domain(given.domain),

@@ -21,11 +21,11 @@ from typing import Any
 from alula.common.processes import end_run
 from alula.common.scenarios import load_scenario
 from alula.common.signals import on_end_signal
+from alula.records.departure import Departure
 from alula.report.deaths import Death, describe_exit, note_again, note_death
 from alula.report.ends import SIGNAL, SUPERVISOR, ReportedEnd, note_end
 from alula.runtime.live.part import DEAD_S, Consequence, RunPart, part_of_robot
 from alula.runtime.live.spec import RunSpec
-from alula_flight.departure import Departure
 from alula_flight.launch import launch_arguments, launch_file
 from alula_flight.mission_clock import MissionClock
 from alula_flight.outcome import GIVEN_UP, finish

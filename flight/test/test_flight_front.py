@@ -52,7 +52,7 @@ def test_the_robots_own_options_are_told_as_data(tmp_path, capsys):
         RunOption("gently", "slow in curves", takes_value=False),
         RunOption("gear", "of the drive", choices=("1", "2")),
     ]
-    offer = RunOffer(tuple(options), Delivering.faults)
+    offer = RunOffer(tuple(options), {**Delivering.faults, "operator": ("pause", "abort")})
     assert read_offer(capsys.readouterr().out) == offer
     words = words_of({"to": "lab 3", "gently": "", "gear": "2"}, options)
     assert words == ["--to=lab 3", "--gently", "--gear=2"]

@@ -9,6 +9,7 @@ from pathlib import Path
 
 from alula.campaign.mocked_scenarios import load_mocked_scenario
 from alula.common.faults import MOCKED, FaultError, FaultRequest, changes_of, parse_fault, spans_of
+from alula.common.operator import acts_of, is_operator
 from alula.common.public import public
 from alula.common.robots import RobotFolder, find_robot, load_robot_folder, meaning
 from alula.common.run_log import note_mocked
@@ -166,8 +167,10 @@ class Mission:
         """
         requests = _requests(faults)
         try:
+            acts_of(requests)
             for fault in requests:
-                self.behaviour.fault(fault)
+                if not is_operator(fault):
+                    self.behaviour.fault(fault)
         except SkillRuntimeError as error:
             raise FaultError(str(error)) from None
         folder = None if out is None else Path(out).expanduser().absolute()
@@ -224,7 +227,7 @@ class Mission:
 def note_account(out: Path, mission: MockedMission, faults: Sequence[FaultRequest]) -> None:
     """Note in a run's folder what failed and when, and how fast the mocks were."""
     simulated_s = mission.world.now_s
-    spans = spans_of(faults, begun_s=0.0, lift_off_s=mission.departure_s, ended_s=simulated_s, first_s=mission.robot.faults)
+    spans = spans_of(faults, begun_s=0.0, lift_off_s=mission.departure_s, ended_s=simulated_s, first_s=mission.faults)
     note_mocked(out, simulated_s, mission.wall_s, changes_of(spans, simulated_s, MOCKED), mission.notes)
 
 

@@ -9,6 +9,7 @@ from pathlib import Path
 
 from alula.campaign.flown import FlownAnswer, Ticks
 from alula.common.faults import FaultError, FaultRequest
+from alula.common.operator import acts_of, is_operator
 from alula.common.robots import RobotError, find_robot
 from alula.common.scenarios import Scenario, ScenarioError, load_scenario
 from alula.missions.director import End
@@ -63,8 +64,10 @@ class MockedScenario:
             AnalysisError: there is none of this name.
         """
         try:
+            acts_of(faults)
             for fault in faults:
-                self.behaviour.fault(fault)
+                if not is_operator(fault):
+                    self.behaviour.fault(fault)
         except (FaultError, SkillRuntimeError) as error:
             raise AnalysisError(str(error)) from None
 
@@ -77,7 +80,7 @@ class MockedScenario:
         end = mission.run()
         places = Places(mission.places, tip_of(mission.director.view().as_dict()))
         answers = ticks.answers(mission.places)
-        return MockedRun(mission.events, end, mission.notes, mission.open_executions, dict(mission.robot.faults), places, answers)
+        return MockedRun(mission.events, end, mission.notes, mission.open_executions, mission.faults, places, answers)
 
 
 def load_mocked_scenario(name: str, behaviour: Sequence[Path] = (), *, world: str = "", inputs: Inputs | None = None) -> MockedScenario:

@@ -11,10 +11,11 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
-from alula.campaign.failures import FAULT, PROCESS, Way, as_dict, failures_by, failures_in, name_of, ways_to_fail
+from alula.campaign.failures import FAULT, PROCESS, Failure, Way, as_dict, failures_by, failures_in, name_of, ways_to_fail
 from alula.campaign.flown import FlownAnswer
 from alula.campaign.mocked_scenarios import MockedScenario, load_mocked_scenario
 from alula.campaign.plan import SIMULATOR, PlannedRun
+from alula.common.operator import is_operator
 from alula.common.record import RecordError, read_record
 from alula.common.robots import find_robot
 from alula.mock import Behaviour
@@ -31,6 +32,8 @@ from alula.runtime.core.events import EngineEvent, ExecutionEvent, TransitionEve
 from alula.runtime.live.options import entry
 
 Row = dict[str, Any]
+OBEYED = "the operator's act"
+"""The response to what is no failure: the operator pauses or aborts the mission."""
 
 
 def rows_of(runs: Sequence[PlannedRun], over: str, behaviour: tuple[str, ...], out: str, options: tuple[str, ...] = ()) -> list[Row]:
@@ -107,9 +110,10 @@ def _row(planned: PlannedRun, found: Mapping[str, Any], left: _Evidence, monitor
     asked = faults_asked(
         planned.requests, events, lift_off_of(events, departure()), effects, first_s=left.first_s, behaviour=left.behaviour
     )
-    begun = [(Way(FAULT, name_of(request)), fault) for request, fault in asked]
+    begun = [(Way(FAULT, name_of(request)), fault) for request, fault in asked if not is_operator(request)]
     died = [(Way(PROCESS, one["name"]), _ended(one, events, effects)) for one in found["died"]]
     every = [failure for causes in (begun, died) for failure in failures_by(causes, events, left.places)]
+    every += [Failure(Way(FAULT, name_of(request)), fault.at_s, OBEYED) for request, fault in asked if is_operator(request)]
     every += failures_in(events, ways, left.places)
     return {
         "run": planned.number,

@@ -2,22 +2,26 @@
 
 from __future__ import annotations
 
+import contextlib
 import time
 from collections.abc import Mapping, Sequence
+from functools import partial
 from pathlib import Path
 from typing import Protocol
 
 from alula.common.faults import FaultRequest
+from alula.common.operator import ABORT, PAUSE, acts_of, is_operator, on_time
 from alula.common.public import public
 from alula.missions.director import Director, End, Outcome
 from alula.missions.driver import TICK_PERIOD_S, Job, MissionDriver
+from alula.missions.pausing import PauseRefusedError
 from alula.missions.plan import MissionPlan
-from alula.missions.record import MissionRecord
+from alula.missions.record import MissionRecord, departure_of_robot
 from alula.missions.skillset import MissionClient, Recorder
 from alula.mock import Behaviour, MockRobot, mock_world
 from alula.model.execution_state import ExecutionState
 from alula.model.model import Skillset
-from alula.runtime.core.events import EngineEvent, ExecutionEvent
+from alula.runtime.core.events import EngineEvent, ExecutionEvent, TransitionEvent
 from alula.runtime.core.records import ExecutionRecord, executions_of
 from alula.runtime.local import LocalWorld
 
@@ -78,8 +82,13 @@ class MockedMission:
         self.end: End | None = None
         """How it ended; None before."""
         self.wall_s = 0.0
+        self._acts = acts_of(faults)
+        self._faults = tuple(faults)
+        self._departure = departure_of_robot()
+        self._departed_s: float | None = None
         for fault in faults:
-            self.robot.fail(fault)
+            if not is_operator(fault):
+                self.robot.fail(fault)
         self._tick_period_s = tick_period_s
         self._limit_s = limit_s
         self._facts = plan.facts
@@ -160,12 +169,31 @@ class MockedMission:
         return None if self._record is None else self._record.departure_s
 
     @property
+    def faults(self) -> dict[str, float]:
+        """When each fault came first, and the operator acted, seconds of mission clock; those that came to nothing are missing."""
+        return {**self.robot.faults, **on_time(self._faults, self._departed_s)}
+
+    @property
     def notes(self) -> list[str]:
         """Return what went wrong in the mocks themselves."""
         return [*self.world.errors, *self.robot.host.notes]
 
+    def _act(self, command: str) -> None:
+        """Do what the operator does; a mission that can't be paused now goes on."""
+        if self._driver.end is not None:
+            return
+        if command == ABORT:
+            self._driver.abort("aborted by the operator")
+            return
+        with contextlib.suppress(PauseRefusedError):
+            self._driver.set_paused(paused=command == PAUSE)
+
     def _on_event(self, _skillset: str, event: EngineEvent) -> None:
         self.events.append(event)
+        if self._departed_s is None and isinstance(event, TransitionEvent) and self._departure == (event.resource, event.from_state):
+            self._departed_s = event.stamp_s
+            for act in self._acts:
+                self.world.clock.after(act.since_s, partial(self._act, act.command))
         if isinstance(event, ExecutionEvent) and event.state is ExecutionState.REQUESTED:
             self.places[event.id] = next((path for leaf, path in self._leaves if leaf.handle and leaf.handle.id == event.id), ())
         self._driver.event(event)

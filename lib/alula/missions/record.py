@@ -65,7 +65,7 @@ class MissionRecord:
         self._joined: dict[str, int] = {}
         """The number of the last event of a skillset that was left out."""
         self._joined_told = True
-        self._departure = _departure()
+        self._departure = departure_of_robot()
         self._departure_s: float | None = None
         self._unended: set[str] = set()
         self._decisions = 0
@@ -221,7 +221,8 @@ class MissionRecord:
             run_log.note(self._out, run_log.MISSION, {**content, "problems": list(dict.fromkeys([*self.problems, self._writer.error]))})
 
 
-def _departure() -> tuple[str, str] | None:
+def departure_of_robot() -> tuple[str, str] | None:
+    """Return resource and state that the robot of this process leaves at its departure; None: there is no robot, or it has none."""
     try:
         return find_robot().departure
     except RobotError:

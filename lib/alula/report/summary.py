@@ -7,7 +7,9 @@ from dataclasses import asdict
 from typing import Any, TypedDict
 
 from alula.common.faults import parse_fault
+from alula.common.operator import PAUSE, is_operator
 from alula.common.robots import page_words, robots_of_fleet
+from alula.common.run_log import ACT, read
 from alula.common.scenarios import load_scenario
 from alula.report.ends import read_end, true_reason
 from alula.report.facts import Death, RunFacts
@@ -111,11 +113,14 @@ def note_doubts(facts: RunFacts, history: History, observed: Observed, phases: P
     broken = {fault.sensor for fault in injected(observed)}
     # What scenarios add is in no bag, as the radio's; mocks tell all.
     untold = set() if facts.mock else dict(scenario.faults).keys() - dict(scenario.processes).keys()
+    acts = {act.get("command") for act in read(facts.out_dir, ACT)}
     ends = [end_s for end_s in (history.last_s, observed.last_s) if end_s is not None]
     for text in facts.faults:
         fault = parse_fault(text)
         if fault.begin_s is not None and phases.departed and ends and (over_s := max(ends) - phases.zero_s) < fault.begin_s:
             problems.note(f"the fault {text} never happened: the run was over {over_s:.1f} s after the {page_words()['departure']}")
+        elif is_operator(fault) and (fault.how or PAUSE) in acts:
+            continue
         elif observed.tells_faults and fault.what not in untold | broken:
             problems.note(f"the fault {text} never happened")
 

@@ -13,6 +13,7 @@ from collections.abc import Mapping, Sequence
 from dataclasses import asdict, dataclass, field
 from pathlib import Path
 
+from alula.common.operator import FAULTS
 from alula.runtime.live.part import RunPart
 from alula.runtime.live.spec import RequestError
 
@@ -50,11 +51,11 @@ class RunOffer:
 
 
 def offer_of(part: RunPart) -> RunOffer:
-    """Return what a part declares."""
+    """Return what a part declares, and the operator of every robot."""
     parser = argparse.ArgumentParser(add_help=False)
     part.add_options(parser)
     actions = parser._actions  # noqa: SLF001  (argparse offers no other way to look at what was declared)
-    return RunOffer(tuple(map(_option, actions)), {what: tuple(ways) for what, ways in part.faults.items()})
+    return RunOffer(tuple(map(_option, actions)), {what: tuple(ways) for what, ways in {**part.faults, **FAULTS}.items()})
 
 
 def _option(action: argparse.Action) -> RunOption:

@@ -68,13 +68,27 @@ def test_the_radios_faults_and_ports_reach_the_nodes(tmp_path: Path) -> None:
     assert ports == [0, 1, 5]
 
 
+def test_an_operator_is_a_node_of_its_own_where_one_acts(tmp_path: Path) -> None:
+    acts = ["--fail", "operator:pause@5-11", "--fail", "zed@30", "--fail", "operator:abort@20"]
+    for words, expected in (acts, ["operator:pause@5-11,operator:abort@20"]), (["--fail", "zed@30"], []):
+        spec = with_domain(parse(["mapping", *words, "--out", str(tmp_path / "run")]), 77)
+        config = launched("mapping", tmp_path, *launch_arguments(spec))
+        operators = [shlex.split(node.args) for node in config.nodes if node.name == "operator"]
+        assert [args[args.index("--acts") + 1] for args in operators] == expected
+        assert config.params["/uav_simulator/faults"].value == "zed@30"
+
+
 def test_every_argument_of_a_run_is_declared_and_has_one_default(tmp_path: Path) -> None:
     """An argument reaches all files that are included: roslaunch would not tell of one that no file knows."""
     general = LAUNCH.parents[1] / "skillset_ros1/launch/decision.launch"
     texts = [path.read_text(encoding="utf-8") for path in (*LAUNCH.glob("*.launch"), general)]
     declared = {name for text in texts for name in re.findall(r'<arg name="(\w+)" (?:default="[^"]*" )?doc="[^"]+"/>', text)}
-    spec = parse(["inspection", "--autopilot", "tcp:127.0.0.1:15760", "--groot", "0", "--out", str(tmp_path / "run")])
-    assert {word.partition(":=")[0] for word in launch_arguments(spec)} <= declared
+    words = ["--groot", "0", "--out", str(tmp_path / "run")]
+    specs = [
+        parse(["inspection", "--autopilot", "tcp:127.0.0.1:15760", *words]),
+        parse(["inspection", "--fail", "operator:abort@9", *words]),
+    ]
+    assert {word.partition(":=")[0] for spec in specs for word in launch_arguments(spec)} <= declared
     defaults = Counter(name for text in texts for name in set(re.findall(r'<arg name="(\w+)" default=', text)))
     # Each scenario has a world of its own, and the radio has a seed, too.
     assert {name for name, count in defaults.items() if count > 1} <= {"world", "seed"}

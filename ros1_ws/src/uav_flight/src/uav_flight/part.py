@@ -127,7 +127,7 @@ class DronePart(RunPart):
             # The autopilot that is followed has its own pace: a limit here would fall behind it.
             "rate": f"{0.0 if flight.sensors.startswith(FOLLOWED) else flight.rate:g}",
             "record": flight.record,
-            "faults": ",".join(fault for fault in spec.faults if fault not in others),
+            "faults": ",".join(fault for fault in spec.faults if parse_fault(fault).what in FAULTS),
             "radio_faults": ",".join(radio),
             "radio_port": flight.radio_port,
             "mavlink_port": flight.mavlink_port,
