@@ -3,19 +3,18 @@
 from __future__ import annotations
 
 import itertools
-import random
-from collections import Counter
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import asdict, dataclass, field, replace
 from pathlib import Path
 
+from alula.campaign.drawing import MAX_SEED, Draw, Kind, Kinds
 from alula.common.faults import FaultError, FaultRequest, parse_fault
 from alula.common.located_yaml import Located, choices, read_yaml
 from alula.common.scenarios import mission_names
 from alula.records.errors import AnalysisError
 
 KEYS = ("about", "over", "scenarios", "seeds", "faults", "runs", "seed", "draw", "worlds", "options", "behaviour", "at_once")
-DRAW = ("faults", "most", "in_turn", "at_s", "lasts_s")
+DRAW = ("faults", "least", "most", "in_turn", "at_s", "lasts_s")
 MOCKS, SIMULATOR = "mocks", "simulator"
 MOST_RUNS = 1_000_000
 
@@ -126,7 +125,7 @@ def _file(path: Path, part: Located, what: str) -> Path:
 
 
 def _listed(said: dict[str, Located], scenarios: Sequence[str]) -> list[PlannedRun]:
-    seeds = [_whole(part, "a seed", 0, 2**31 - 1) for part in said["seeds"].elements()] if "seeds" in said else [0]
+    seeds = [_whole(part, "a seed", 0, MAX_SEED) for part in said["seeds"].elements()] if "seeds" in said else [0]
     lists = [part.elements() for part in said["faults"].elements()] if "faults" in said else [[]]
     faults = [tuple(_fault(one, one.text("a fault")) for one in several) for several in lists]
     every = itertools.product(scenarios, seeds, faults)
@@ -143,86 +142,58 @@ def _fault(part: Located, text: str) -> str:
 # --- drawn --------------------------------------------------------------------------------------------------------------
 
 
-@dataclass(frozen=True)
-class _Kind:
-    """A fault to draw: its name and way; it lasts ``lasts_s`` seconds, or, where that is None, as long as the draw says."""
-
-    what: str
-    how: str
-    lasts_s: float | None = None
-
-
-@dataclass(frozen=True)
-class _Draw:
-    """The ranges from which a run's faults are drawn: their start times and durations, seconds.
-
-    Which faults come is drawn, too: up to ``most`` of ``faults``. With ``in_turn``, the runs of a scenario take its lists one after
-    another instead, and begin again after the last one.
-    """
-
-    faults: Mapping[str, tuple[_Kind, ...]]
-    in_turn: Mapping[str, tuple[tuple[_Kind, ...], ...]]
-    most: int
-    at_s: tuple[float, float]
-    lasts_s: tuple[float, float] | None
-
-    def faults_of(self, scenario: str, turn: int, chance: random.Random) -> tuple[str, ...]:
-        """Draw the faults of the scenario's run ``turn``, from 0: none, one or several, in the order of time."""
-        several = [self._fault(kind, chance) for kind in self._kinds(scenario, turn, chance)]
-        return tuple(str(fault) for fault in sorted(several, key=lambda fault: (fault.begin_s or 0.0, fault.what)))
-
-    def _kinds(self, scenario: str, turn: int, chance: random.Random) -> Iterator[_Kind]:
-        if self.in_turn:
-            lists = self.in_turn[scenario]
-            yield from lists[turn % len(lists)]
-        else:
-            for _ in range(chance.randint(0, self.most)):
-                yield chance.choice(self.faults[scenario])
-
-    def _fault(self, kind: _Kind, chance: random.Random) -> FaultRequest:
-        begin_s, lasts_s = round(chance.uniform(*self.at_s), 1), kind.lasts_s
-        if lasts_s is None and self.lasts_s is not None and chance.random() < 0.5:
-            lasts_s = chance.uniform(*self.lasts_s)
-        return FaultRequest(kind.what, kind.how, begin_s, None if lasts_s is None else round(begin_s + lasts_s, 1))
-
-
-def _drawn(document: Located, said: dict[str, Located], scenarios: Sequence[str]) -> Iterator[PlannedRun]:
+def _drawn(document: Located, said: dict[str, Located], scenarios: Sequence[str]) -> list[PlannedRun]:
     for key in ("runs", "draw"):
         if key not in said:
             raise document.wrong(f"a campaign that draws needs `{key}`")
     count = _whole(said["runs"], "`runs`", 1, MOST_RUNS)
-    seed = _whole(said["seed"], "`seed`", 0, 2**31 - 1) if "seed" in said else 0
-    draw = _draw(said["draw"], scenarios)
-    turns = Counter[str]()
-    for number in range(count):
-        # One generator a run: another number of runs leaves the first ones as they were.
-        chance = random.Random(f"{seed} {number}")  # noqa: S311 - nothing here is secret
-        scenario = scenarios[number % len(scenarios)]
-        yield PlannedRun(number, scenario, chance.randrange(2**31), draw.faults_of(scenario, turns[scenario], chance))
-        turns[scenario] += 1
+    seed = _whole(said["seed"], "`seed`", 0, MAX_SEED) if "seed" in said else 0
+    drawn = _draw(said["draw"], scenarios).runs(scenarios, count, seed)
+    return [PlannedRun(one.number, one.scenario, one.seed, tuple(map(str, one.faults))) for one in drawn]
 
 
-def _draw(part: Located, scenarios: Sequence[str]) -> _Draw:
+def _draw(part: Located, scenarios: Sequence[str]) -> Draw:
     said = part.record("`draw`", DRAW)
     if ("faults" in said) == ("in_turn" in said):
         raise part.wrong("`draw` needs `faults` to draw from, or `in_turn`: lists of faults, which the runs use one after another")
-    if "in_turn" in said and "most" in said:
-        raise said["most"].wrong("`most` says how many of `faults` are drawn; `in_turn` draws none")
+    for key in ("least", "most"):
+        if "in_turn" in said and key in said:
+            raise said[key].wrong(f"`{key}` says how many of `faults` are drawn; `in_turn` draws none")
+    least = _whole(said["least"], "`least`", 0, 100) if "least" in said else 0
+    most = _whole(said["most"], "`most`", least, 100) if "most" in said else max(1, least)
     faults, in_turn = (_by_scenario(said[key], key, scenarios) if key in said else {} for key in ("faults", "in_turn"))
-    lists = {scenario: tuple(tuple(map(_kind, one.elements())) for one in part.elements()) for scenario, part in in_turn.items()}
+    lists = {scenario: [_kinds(one) for one in part.elements()] for scenario, part in in_turn.items()}
     for scenario, one in lists.items():
         if not one:
             raise in_turn[scenario].wrong(f"`in_turn` has no list for {scenario}; `[[]]` means runs without faults")
-    for scenario, several in faults.items():
-        if not several.elements():
-            raise several.wrong(f"`faults` has no fault to draw for {scenario}; for runs without faults write `in_turn: [[]]`")
-    return _Draw(
-        faults={scenario: tuple(map(_kind, part.elements())) for scenario, part in faults.items()},
+    return Draw(
+        faults={scenario: _entries(scenario, part, most) for scenario, part in faults.items()},
         in_turn=lists,
-        most=_whole(said["most"], "`most`", 0, 100) if "most" in said else 1,
+        least=least,
+        most=most,
         at_s=_span(said["at_s"], "`at_s`") if "at_s" in said else (0.0, 90.0),
         lasts_s=_span(said["lasts_s"], "`lasts_s`") if "lasts_s" in said else None,
     )
+
+
+def _entries(scenario: str, part: Located, most: int) -> list[Kinds]:
+    """Read the entries to draw from: a run takes each at most once, so none of the things that fail is in two of them."""
+    found: list[Kinds] = []
+    known: set[str] = set()
+    for element in part.elements():
+        kinds = _kinds(element)
+        if not kinds:
+            raise element.wrong("an entry of `faults` has no fault; name one, or leave it out")
+        for what in sorted({kind.what for kind in kinds}):
+            if what in known:
+                raise element.wrong(f"`{what}` is in two entries, and could be drawn twice for a run; put its ways into one list")
+        known.update(kind.what for kind in kinds)
+        found.append(kinds)
+    if not found:
+        raise part.wrong(f"`faults` has no fault to draw for {scenario}; for runs without faults write `in_turn: [[]]`")
+    if most > len(found):
+        raise part.wrong(f"up to {most} of `faults` are to be drawn for {scenario}, and there are {len(found)} entries")
+    return found
 
 
 def _by_scenario(part: Located, key: str, scenarios: Sequence[str]) -> dict[str, Located]:
@@ -234,7 +205,12 @@ def _by_scenario(part: Located, key: str, scenarios: Sequence[str]) -> dict[str,
     return given
 
 
-def _kind(part: Located) -> _Kind:
+def _kinds(part: Located) -> Kinds:
+    """Read a fault, or a list of them."""
+    return [_kind(one) for one in part.elements()]
+
+
+def _kind(part: Located) -> Kind:
     """Read ``radio:out``, or ``{radio:out: 5}`` for a fault that lasts 5 s."""
     if not part.is_mapping:
         return _timeless(part, part.text("a fault"))
@@ -245,12 +221,12 @@ def _kind(part: Located) -> _Kind:
     return _timeless(part, name, lasts.number("how long a fault lasts", 0.1, 1e5))
 
 
-def _timeless(part: Located, text: str, lasts_s: float | None = None) -> _Kind:
+def _timeless(part: Located, text: str, lasts_s: float | None = None) -> Kind:
     name = _fault(part, text)
     if "@" in name:
         raise part.wrong(f"`{name}` has a time; times are drawn, from `at_s`")
     what, _, how = name.partition(":")
-    return _Kind(what, how, lasts_s)
+    return Kind(what, how, lasts_s)
 
 
 def _span(part: Located, what: str) -> tuple[float, float]:
