@@ -13,7 +13,7 @@ from alula.common.located_yaml import Located, choices, read_yaml
 from alula.common.scenarios import mission_names
 from alula.records.errors import AnalysisError
 
-KEYS = ("about", "over", "scenarios", "seeds", "faults", "runs", "seed", "draw", "worlds", "options", "behaviour", "at_once")
+KEYS = ("about", "over", "scenarios", "seeds", "faults", "runs", "seed", "draw", "worlds", "options", "limit_s", "behaviour", "at_once")
 DRAW = ("faults", "least", "most", "in_turn", "at_s", "lasts_s")
 MOCKS, SIMULATOR = "mocks", "simulator"
 MOST_RUNS = 1_000_000
@@ -39,12 +39,14 @@ class PlannedRun:
 class Campaign:
     """Runs, numbered from 0, and over what they are.
 
-    ``options`` are the robot's own of a live run, by name; ``at_once`` is how many at a time, None: one a core.
+    ``options`` are the robot's own of a live run, by name, and ``limit_s`` is how long one may last, seconds of mission clock, 0: without a
+    limit; ``at_once`` is how many at a time, None: one a core.
     """
 
     over: str
     runs: tuple[PlannedRun, ...]
     options: Mapping[str, str] = field(default_factory=dict)
+    limit_s: float = 0.0
     behaviour: tuple[Path, ...] = ()
     at_once: int | None = None
     scenarios: tuple[str, ...] = field(default=())
@@ -57,6 +59,7 @@ class Campaign:
             "behaviour": [path.read_text(encoding="utf-8") for path in self.behaviour],
             "runs": runs,
             **({"options": dict(self.options)} if self.options else {}),
+            **({"limit_s": self.limit_s} if self.limit_s else {}),
         }
 
 
@@ -83,7 +86,7 @@ def load_campaign(path: Path) -> Campaign:
     runs = _drawn(document, said, scenarios) if drawn else _listed(said, scenarios)
     if over == SIMULATOR and "behaviour" in said:
         raise said["behaviour"].wrong("`behaviour` is for mocks only; leave it out, or do it `over: mocks`")
-    for key in ("worlds", "options"):
+    for key in ("worlds", "options", "limit_s"):
         if over == MOCKS and key in said:
             raise said[key].wrong(f"`{key}` is for the simulator only; leave it out, or do it `over: simulator`")
     worlds = said["worlds"].record("`worlds`", scenarios) if "worlds" in said else {}
@@ -94,6 +97,7 @@ def load_campaign(path: Path) -> Campaign:
         options={name: one.text(f"the option `{name}`") for name, one in said["options"].entries("`options`").items()}
         if "options" in said
         else {},
+        limit_s=said["limit_s"].number("`limit_s`", 1.0, 1e5) if "limit_s" in said else 0.0,
         behaviour=tuple(_file(path, part, "a behaviour file") for part in said["behaviour"].elements()) if "behaviour" in said else (),
         at_once=_whole(said["at_once"], "`at_once`", 1, 64) if "at_once" in said else (1 if over == SIMULATOR else None),
         scenarios=scenarios,

@@ -81,8 +81,9 @@ def check_live_faults(campaign: Campaign, offer: RunOffer) -> None:
 
 def options_of(campaign: Campaign, offer: RunOffer) -> tuple[str, ...]:
     """Return the options of its live runs as words of their command lines; raises AnalysisError where the robot has no such options."""
+    limit = [f"--limit={campaign.limit_s:g}"] if campaign.limit_s else []
     try:
-        return tuple(words_of(campaign.options, offer.options))
+        return (*words_of(campaign.options, offer.options), *limit)
     except RequestError as error:
         raise AnalysisError(f"`options`: {error}") from None
 

@@ -131,6 +131,8 @@ WRONG = {
     "runs: 2\ndraw: {in_turn: [zed@3]}": "a.yaml:2: `zed@3` has a time",
     "runs: 2\ndraw: {in_turn: [{zed: 3, lidar: 4}]}": "a.yaml:2: a fault with its time is `{NAME: SECONDS}`",
     "runs: 2\ndraw: {in_turn: [{zed: 0}]}": "a.yaml:2: how long a fault lasts should be a number from 0.1",
+    "limit_s: 60": "a.yaml:1: `limit_s` is for the simulator only",
+    "over: simulator\nlimit_s: 0": "a.yaml:2: `limit_s` should be a number from 1",
     "faults: [[zed@3-1]]": "a.yaml:1: fault 'zed@3-1'",
     "behaviour: no.yaml": "a.yaml:1: there is no file ",
     "worlds: {mapping: no.yaml}": "a.yaml:1: `worlds` is for the simulator only",

@@ -156,13 +156,14 @@ def test_a_wind_that_rises_is_leant_against_and_calms_down():
     ]
 
 
-def test_a_pilot_takes_the_vehicle_and_gives_it_back():
-    simulation, flown = flown_with("pilot@4-6")
+@pytest.mark.parametrize(("way", "mode"), [("takes", "LOITER"), ("lands", "LAND")])
+def test_a_pilot_takes_the_vehicle_and_gives_it_back(way, mode):
+    simulation, flown = flown_with(f"pilot:{way}@4-6")
     modes = []
     while simulation.now_s < simulation.lift_off_s + 8.0:
         simulation.tick()
         modes += [flown.autopilot.mode.name] if modes[-1:] != [flown.autopilot.mode.name] else []
-    assert modes == ["GUIDED", "LOITER", "GUIDED"]
+    assert modes == ["GUIDED", mode, "GUIDED"]
 
 
 def test_a_pilots_stick_turns_the_nose_while_it_is_moved():

@@ -17,6 +17,8 @@ from uav_simulator.vehicle.hexacopter import Hexacopter
 from uav_simulator.vehicle.noise import Wind
 from uav_simulator.vehicle.rigid_body import ZERO, RigidBody
 
+TAKEN = {SensorMode.TAKES: Mode.LOITER, SensorMode.LANDS: Mode.LAND}
+"""The modes in which the pilot has the vehicle."""
 STICK_RAD_S = 0.5
 """How fast the pilot turns the nose where the stick is moved."""
 
@@ -97,8 +99,10 @@ class SimulatedAutopilotVehicle:
         if pilot is self._pilot:
             return
         before, self._pilot = self._pilot, pilot
-        if SensorMode.TAKES in {before, pilot}:
-            self.autopilot.set_mode(Mode.LOITER if pilot is SensorMode.TAKES else Mode.GUIDED)
+        if pilot in TAKEN:
+            self.autopilot.set_mode(TAKEN[pilot])
+        elif before in TAKEN:
+            self.autopilot.set_mode(Mode.GUIDED)
         if SensorMode.STICK in {before, pilot}:
             self.autopilot.yaw_stick(STICK_RAD_S if pilot is SensorMode.STICK else 0.0)
 

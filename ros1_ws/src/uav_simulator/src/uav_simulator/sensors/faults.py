@@ -37,6 +37,7 @@ class SensorMode(Enum):
     STOPPED = "stopped"  # a motor of six
     STRONG = "strong"  # a wind of 8 m/s, gusts 1.5
     TAKES = "takes"  # the pilot flips the switch to LOITER, and back to GUIDED in the end
+    LANDS = "lands"  # the pilot takes it, and lands it
     STICK = "stick"  # the pilot turns the nose by the stick, at 0.5 rad/s
 
 
@@ -59,7 +60,7 @@ FAULTS: dict[str, tuple[str, ...]] = {
     "gps": (SensorMode.DEAD.value, SensorMode.JAMMED.value),
     "motor": (SensorMode.STOPPED.value,),
     "wind": (SensorMode.STRONG.value,),
-    "pilot": (SensorMode.TAKES.value, SensorMode.STICK.value),
+    "pilot": (SensorMode.TAKES.value, SensorMode.LANDS.value, SensorMode.STICK.value),
 }
 """The sensors, each with the ways in which it can fail; the first one counts where none is named. Barometer and GPS are the autopilot's.
 Motor, wind and pilot are no sensors, but come and go alike."""
