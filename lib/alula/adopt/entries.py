@@ -7,15 +7,15 @@ from collections.abc import Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
 
 from alula.adopt.vocabulary import SkillOf, Vocabulary
-from alula.check.entries import NUMBER, TEXT, Use, Uses
+from alula.check.entries import NUMBER, TEXT, Key, Use, Uses
 from alula.check.scripts import Scripts
-from alula.check.sites import Key, Site, expand
-from alula.check.traits import PlainTraits
 from alula.missions.skill_types import PORT_TYPES, STATE_PORT
-from alula.trees.node import pointer
+from alula.trees.blackboard import Blackboard
+from alula.trees.node import Shared, Wiring, pointer
 from alula.trees.palette import Category, Direction, NodeType, Palette, Port, node_type
 from alula.trees.reading import TreeFiles, type_name
 from alula.trees.values import ANY, DOUBLE, NUMBERS, STRING, TYPES, PortType, literal
+from alula.trees.wiring import wire
 
 Slot = tuple[str, str]
 """A skill's input or output: the names of both."""
@@ -43,24 +43,26 @@ class _MainTree:
     """A main tree with all uses of entries in it; ``optional``: entries of its board that nodes do without."""
 
     files: TreeFiles
-    uses: Sequence[tuple[Site, Use]]
+    board: Blackboard
+    uses: Sequence[tuple[Wiring, Use]]
     optional: frozenset[str]
 
     @classmethod
     def of(cls, files: TreeFiles, palette: Palette) -> _MainTree:
-        root = expand(files, palette, files.main)
-        if root is None:
-            return cls(files, (), frozenset())
-        uses = Uses(Scripts(), PlainTraits())
-        sites = {id(use): site for site in root.walk() for use in (*uses.before(site), *uses.after(site))}
-        return cls(files, [(sites[id(use)], use) for use in uses.of(root)], frozenset(_optional(root)))
+        board = Blackboard(int)
+        if not files.trees[files.main].children:
+            return cls(files, board, (), frozenset())
+        root = wire(files, palette, files.main, Shared(int), blackboard=board)
+        uses = Uses(Scripts())
+        wirings = {id(use): one for one in root.walk() for use in (*uses.before(one), *uses.after(one))}
+        return cls(files, board, [(wirings[id(use)], use) for use in uses.of(root)], frozenset(_optional(root)))
 
     def read_first(self) -> dict[str, Use]:
         """Return the entries of its board that are read before they are written, each with where."""
         first: dict[Key, Use] = {}
         for _, use in self.uses:
             first.setdefault(use.key, use)
-        return {name: use for (board, name), use in first.items() if board == 0 and not use.write}
+        return {name: use for (board, name), use in first.items() if board is self.board and not use.write}
 
     def told(self) -> dict[str, str | None]:
         """Return the inputs that its model tells of, with their defaults."""
@@ -70,15 +72,15 @@ class _MainTree:
 
     def unwritten(self) -> set[str]:
         """Return the entries that nodes do without, and that nothing writes."""
-        return set(self.optional) - {use.key[1] for _, use in self.uses if use.write and use.key[0] == 0}
+        return set(self.optional) - {use.key[1] for _, use in self.uses if use.write and use.key[0] is self.board}
 
 
-def _optional(root: Site) -> Iterator[str]:
-    for site in root.walk():
-        for attribute in site.ports() if site.type is not None and not site.is_subtree else ():
-            port, key = site.type.ports.get(attribute.name) if site.type else None, pointer(attribute.value, attribute.name)
-            board, name = site.board.key(key) if key is not None else (-1, "")
-            if port is not None and port.optional and board == 0:
+def _optional(root: Wiring) -> Iterator[str]:
+    for wiring in root.walk():
+        for port in wiring.type.ports.values():
+            key = pointer(wiring.element.get(port.name), port.name) if port.optional else None
+            board, name = (None, "") if key is None else wiring.blackboard.where(key)
+            if board is root.blackboard:
                 yield name
 
 
@@ -114,12 +116,12 @@ class Entries:
             elif name in enumerators:  # each of a program's has a number of its own
                 value = enumerators.index(name) + 1
             else:
-                value = ZEROS.get(self._kind([pair for pair in main.uses if pair[1].key == (0, name)]), 0)
+                value = ZEROS.get(self._kind([pair for pair in main.uses if pair[1].key == (main.board, name)]), 0)
             found.append(GivenEntry(name, value))
         return found
 
-    def _slot(self, site: Site, port: str) -> Slot | None:
-        skill = self._skills.get(site.kind)
+    def _slot(self, wiring: Wiring, port: str) -> Slot | None:
+        skill = self._skills.get(wiring.type.name)
         return (skill.name, port) if skill is not None and (skill.name, port) in self._types else None
 
     def _refuse_literals(self) -> None:
@@ -140,17 +142,17 @@ class Entries:
             changed = False
             for pairs in (pairs for found in groups for pairs in found):
                 kind = self._common(pairs)
-                for site, use in pairs:
-                    slot = self._slot(site, use.attribute.name)
+                for wiring, use in pairs:
+                    slot = self._slot(wiring, use.attribute.name)
                     if kind is not ANY and slot is not None and self._types[slot] is ANY:
                         self._types[slot], changed = kind, True
 
-    def _common(self, pairs: Iterable[tuple[Site, Use]]) -> PortType:
+    def _common(self, pairs: Iterable[tuple[Wiring, Use]]) -> PortType:
         """Return the type that all who name an entry agree on: of several kinds of number the widest, else a text; ANY where nobody says.
 
         A number of a script is of any of these kinds.
         """
-        told = [(self._told(site, use), use.type == NUMBER) for site, use in pairs]
+        told = [(self._told(wiring, use), use.type == NUMBER) for wiring, use in pairs]
         kinds = {kind for kind, is_of_script in told if kind is not ANY and not is_of_script}
         if not kinds:
             return DOUBLE if any(is_of_script for _, is_of_script in told) else ANY
@@ -158,22 +160,22 @@ class Entries:
             return next(iter(kinds))
         return DOUBLE if kinds <= set(NUMBERS) else STRING
 
-    def _told(self, site: Site, use: Use) -> PortType:
-        slot = self._slot(site, use.attribute.name) if use.offsets is None else None
+    def _told(self, wiring: Wiring, use: Use) -> PortType:
+        slot = self._slot(wiring, use.attribute.name) if use.offsets is None else None
         if slot is not None:
             return self._types[slot]
         return STRING if use.type == TEXT else TYPES.get(use.type, ANY)
 
-    def _kind(self, pairs: Sequence[tuple[Site, Use]]) -> str:
+    def _kind(self, pairs: Sequence[tuple[Wiring, Use]]) -> str:
         kind = self._common(pairs)
         is_of_scripts = all(use.offsets is not None for _, use in pairs) and pairs
         return "float64" if kind is ANY and is_of_scripts else model_type(kind)
 
 
-def _by_key(uses: Iterable[tuple[Site, Use]]) -> dict[Key, list[tuple[Site, Use]]]:
-    found: dict[Key, list[tuple[Site, Use]]] = {}
-    for site, use in uses:
-        found.setdefault(use.key, []).append((site, use))
+def _by_key(uses: Iterable[tuple[Wiring, Use]]) -> dict[Key, list[tuple[Wiring, Use]]]:
+    found: dict[Key, list[tuple[Wiring, Use]]] = {}
+    for wiring, use in uses:
+        found.setdefault(use.key, []).append((wiring, use))
     return found
 
 

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Iterator
+from collections.abc import Collection, Iterable, Iterator
 from contextlib import suppress
 from dataclasses import dataclass
 from itertools import islice
@@ -11,19 +11,21 @@ from alula.check import entries
 from alula.check.entries import Writers
 from alula.check.exclusion import exclude
 from alula.check.problems import of_element
-from alula.check.reach import Reach, never_reached, several_run, unreached, waits_in_vain
+from alula.check.reach import never_reached, several_run, unreached, waits_in_vain
 from alula.check.scripts import Scripts
-from alula.check.sites import expand
-from alula.check.traits import Traits
 from alula.check.unread import never_read
 from alula.check.whole import Rule, Whole
 from alula.trees import nav2
 from alula.trees.access import scripts_of
+from alula.trees.blackboard import Blackboard
 from alula.trees.errors import Problem
 from alula.trees.library import Library
+from alula.trees.node import Shared
 from alula.trees.palette import Direction, Palette
+from alula.trees.reach import Reach
 from alula.trees.reading import TreeFiles, type_name
 from alula.trees.structure import verify
+from alula.trees.wiring import wire
 
 ENDLESS = frozenset({"ALU007", "ALU009"})
 """What keeps the tree from being put together at all."""
@@ -48,7 +50,7 @@ class Beside:
 def check(
     files: TreeFiles,
     palette: Palette,
-    traits: Traits,
+    names: Collection[str] = (),
     rules: Iterable[Rule] = (),
     *,
     beside: Beside = Beside(),
@@ -56,7 +58,9 @@ def check(
     of_others: bool = False,
     checked: Library | None = None,
 ) -> list[Problem]:
-    """Return what is wrong with the files, each thing once, in the order of the source; ``rules`` are more than those of trees alone.
+    """Return what is wrong with the files, each thing once, in the order of the source.
+
+    ``names`` stand in scripts for something else than an entry, ``rules`` are more than those of trees alone.
 
     The blackboard of a ``foreign`` mission may be filled from outside with what no file tells of; trees ``of_others`` have nodes that no
     file declares. All files of the library ``checked`` are checked, each by itself: what is wrong in a tree that others use, they tell.
@@ -72,7 +76,7 @@ def check(
         verify(files, palette, report, of_others=of_others, others=() if checked is None else checked.documents)
     is_told = checked is not None and files.is_part and files.main in files.trees and checked.has_user(files.trees[files.main])
     if files.trees and not is_told and not any(problem.code in ENDLESS for problem in found):
-        wholes = list(_wholes(files, palette, traits, beside, foreign=foreign))
+        wholes = list(_wholes(files, palette, names, beside, foreign=foreign))
         found += _problems(wholes, (*RULES, *rules))
         if all(problem.warning for problem in found):  # else what is to be mended may be what reads it
             found += _problems(wholes, [never_read])
@@ -82,22 +86,23 @@ def check(
     return sorted(places.values(), key=lambda one: (one.place.path != files.path, one.place.path, one.place.line, one.place.column))
 
 
-def _wholes(files: TreeFiles, palette: Palette, traits: Traits, beside: Beside, *, foreign: bool) -> Iterator[Whole]:
+def _wholes(files: TreeFiles, palette: Palette, names: Collection[str], beside: Beside, *, foreign: bool) -> Iterator[Whole]:
     model = files.models.get(files.main)
-    programs, reach = Scripts(), Reach(traits)
+    programs, reach, shared = Scripts(), Reach(), Shared(int)
     given, others = tuple(model.ports) if model else (), Writers()
     # A tree of these is ticked by itself, also where the main one has it as a subtree, over other entries then.
     started = [name for name in (*beside.before, *beside.later) if name in files.trees and name != files.main]
     mains = [files.main] if files.main in files.trees else []
     several = dict.fromkeys((*mains, *started, *_others(files)))
-    roots = {name: root for name in several if (root := expand(files, palette, name)) is not None}
+    board = Blackboard(shared.clock)
+    boards = dict.fromkeys((*mains, *started), board)
+    roots = {one: wire(files, palette, one, shared, blackboard=boards.get(one)) for one in several if files.trees[one].children}
     for name, root in roots.items():
         known = given if name in started or (name == files.main and not files.is_part) else None
-        around = [one for one in (*mains, *started) if one in roots and one != name] if name in {*mains, *started} else []
-        shared = tuple(roots[one] for one in around)
-        yield Whole(root, programs, reach, traits, known, others, name in beside.later, foreign, shared)
+        around = tuple(roots[one] for one in boards if one in roots and one != name) if name in boards else ()
+        yield Whole(root, programs, reach, names, known, others, name in beside.later, foreign, around)
         if name == files.main:
-            others = entries.written(root, entries.Uses(programs, traits))
+            others = entries.written(root, entries.Uses(programs, names))
 
 
 def _problems(wholes: Iterable[Whole], rules: Iterable[Rule]) -> Iterator[Problem]:
@@ -115,38 +120,38 @@ def _others(files: TreeFiles) -> list[str]:
 
 
 def _scripts(whole: Whole) -> Iterator[Problem]:
-    for site in whole.root.walk():
-        for attribute in scripts_of(site.element, site.type):
+    for wiring in whole.root.walk():
+        for attribute in scripts_of(wiring.element, wiring.type):
             whole.scripts.program(attribute)
     yield from whole.scripts.problems
 
 
 def _missing(whole: Whole) -> Iterator[Problem]:
     """Yield inputs that a file does not give and that have no default; of nodes that only a model tells of, nobody knows."""
-    for site in whole.root.walk():
-        for port in site.type.ports.values() if site.type and site.type.make else ():
-            if port.direction is not Direction.OUTPUT and not port.optional and site.given(port.name) is None and not port.required:
-                message = f"'{site.kind}' has no input '{port.name}', which has no default"
-                yield of_element("ALU604", site.element, message, f'add {port.name}="..."', warning=whole.foreign)
+    for wiring in whole.root.walk():
+        for port in wiring.type.ports.values() if wiring.type.make else ():
+            if port.direction is not Direction.OUTPUT and not port.optional and wiring.ports.get(port.name) is None and not port.required:
+                message = f"'{wiring.type.name}' has no input '{port.name}', which has no default"
+                yield of_element("ALU604", wiring.element, message, f'add {port.name}="..."', warning=whole.foreign)
 
 
 def _unreached(whole: Whole) -> Iterator[Problem]:
     waited = list(waits_in_vain(whole.root, whole.reach))
     yield from (problem for problem, _ in waited)
-    explained = {site for _, site in waited}
+    explained = {wiring for _, wiring in waited}
     for child, waits_for in unreached(whole.root, whole.reach):
         if waits_for not in explained:
             yield never_reached(child, waits_for, whole.reach)
 
 
 def _several_run(whole: Whole) -> Iterator[Problem]:
-    return several_run(whole.root, whole.reach, lambda one, other: exclude(one, other, whole.scripts, whole.traits))
+    return several_run(whole.root, whole.reach, lambda one, other: exclude(one, other, whole.scripts, whole.names))
 
 
 def _entries(whole: Whole) -> Iterator[Problem]:
-    uses = entries.Uses(whole.scripts, whole.traits)
+    uses = entries.Uses(whole.scripts, whole.names)
     if whole.given is not None:
-        of_nav2 = whole.foreign and any(site.kind in nav2.declared() for site in whole.root.walk())
+        of_nav2 = whole.foreign and any(wiring.type.name in nav2.declared() for wiring in whole.root.walk())
         given = (*whole.given, *(nav2.WRITTEN if of_nav2 else ()))
         yield from entries.read_too_early(whole.root, uses, given, whole.others, late=whole.begins_late, foreign=whole.foreign)
     yield from entries.mismatched(whole.root, uses)

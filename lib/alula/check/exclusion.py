@@ -3,15 +3,14 @@
 from __future__ import annotations
 
 import operator
-from collections.abc import Callable, Iterator, Mapping
+from collections.abc import Callable, Collection, Iterator, Mapping
 from dataclasses import dataclass
 from itertools import pairwise, product
 from math import prod
 from typing import TypeAlias
 
 from alula.check.scripts import Scripts
-from alula.check.sites import Site
-from alula.check.traits import Traits
+from alula.trees.node import Wiring
 from alula.trees.script.syntax import Call, Chain, Comparison, Literal, Name, Node, Prefix
 
 MOST = 4096
@@ -33,38 +32,38 @@ class _Unclear(Exception):  # noqa: N818 - ends an attempt, is no error
 class _Guard:
     """A condition that has to hold, or not to, where it stands."""
 
-    site: Site
+    wiring: Wiring
     node: Node
     holds: bool
 
 
-def exclude(one: Site, other: Site, scripts: Scripts, traits: Traits) -> bool:
+def exclude(one: Wiring, other: Wiring, scripts: Scripts, names: Collection[str]) -> bool:
     """Tell whether the two can't both begin: whatever values entries have, a condition of one of them is not met."""
     guards = [*_guards(one, scripts), *_guards(other, scripts)]
-    if {guard.site for guard in guards} != {one, other}:
+    if {guard.wiring for guard in guards} != {one, other}:
         return False
     try:
-        domains = _Domains(traits)
+        domains = _Domains(names)
         for guard in guards:
-            domains.add(guard.site, guard.node)
-        return not any(all(domains.truth(guard.site, guard.node, values) is guard.holds for guard in guards) for values in domains.all())
+            domains.add(guard.wiring, guard.node)
+        return not any(all(domains.truth(guard.wiring, guard.node, values) is guard.holds for guard in guards) for values in domains.all())
     except _Unclear:
         return False
 
 
-def _guards(site: Site, scripts: Scripts) -> Iterator[_Guard]:
+def _guards(wiring: Wiring, scripts: Scripts) -> Iterator[_Guard]:
     for name, holds in (("_while", True), ("_skipIf", False)):
-        attribute = site.element.attributes.get(name)
+        attribute = wiring.element.attributes.get(name)
         program = scripts.program(attribute) if attribute else None
         if program is not None and len(program.statements) == 1:
-            yield _Guard(site, program.statements[0], holds)
+            yield _Guard(wiring, program.statements[0], holds)
 
 
 class _Domains:
     """The values that each entry is compared with, and one that is none of them."""
 
-    def __init__(self, traits: Traits) -> None:
-        self._traits = traits
+    def __init__(self, names: Collection[str]) -> None:
+        self._names = names
         self._values: dict[object, set[Value]] = {}
 
     def all(self) -> Iterator[Values]:
@@ -77,62 +76,62 @@ class _Domains:
         for chosen in product(*self._values.values()):
             yield dict(zip(self._values, chosen, strict=True))
 
-    def add(self, site: Site, node: Node) -> None:
+    def add(self, wiring: Wiring, node: Node) -> None:
         """Take in a condition."""
         match node:
             case Chain(operators=operators) if set(operators) <= {"&&", "||"}:
                 for operand in node.operands:
-                    self.add(site, operand)
+                    self.add(wiring, operand)
             case Prefix(operator="!"):
-                self.add(site, node.operand)
+                self.add(wiring, node.operand)
             case Comparison():
                 for left, right in pairwise(node.operands):
-                    self._compared(site, left, right)
+                    self._compared(wiring, left, right)
             case Literal():
                 pass
             case _:
-                self._values.setdefault(self._key(site, node), set()).update({0.0, 1.0})
+                self._values.setdefault(self._key(wiring, node), set()).update({0.0, 1.0})
 
-    def _compared(self, site: Site, left: Node, right: Node) -> None:
+    def _compared(self, wiring: Wiring, left: Node, right: Node) -> None:
         fixed = [self._fixed(one) for one in (left, right)]
         for node, value in ((left, fixed[1]), (right, fixed[0])):
             if self._fixed(node) is None:
                 if value is None:
                     raise _Unclear
                 near: set[Value] = {_OTHER} if isinstance(value, str) else {value - NEAR, value + NEAR}
-                self._values.setdefault(self._key(site, node), set()).update({value, *near})
+                self._values.setdefault(self._key(wiring, node), set()).update({value, *near})
 
-    def truth(self, site: Site, node: Node, values: Values) -> bool:
+    def truth(self, wiring: Wiring, node: Node, values: Values) -> bool:
         """Return whether a condition holds with these values."""
         match node:
             case Chain():
-                answers = [self.truth(site, operand, values) for operand in node.operands]
+                answers = [self.truth(wiring, operand, values) for operand in node.operands]
                 return all(answers) if set(node.operators) == {"&&"} else any(answers) if set(node.operators) == {"||"} else self._mixed()
             case Prefix():
-                return not self.truth(site, node.operand, values)
+                return not self.truth(wiring, node.operand, values)
             case Comparison():
-                known = [self._value(site, operand, values) for operand in node.operands]
+                known = [self._value(wiring, operand, values) for operand in node.operands]
                 return all(_compare(sign, *pair) for sign, pair in zip(node.operators, pairwise(known), strict=True))
             case _:
-                return self._value(site, node, values) != 0.0
+                return self._value(wiring, node, values) != 0.0
 
     @staticmethod
     def _mixed() -> bool:
         raise _Unclear
 
-    def _value(self, site: Site, node: Node, values: Values) -> Value:
+    def _value(self, wiring: Wiring, node: Node, values: Values) -> Value:
         fixed = self._fixed(node)
-        return values[self._key(site, node)] if fixed is None else fixed
+        return values[self._key(wiring, node)] if fixed is None else fixed
 
     def _fixed(self, node: Node) -> Value | None:
         if isinstance(node, Literal):
             return node.value if isinstance(node.value, str) else float(node.value)
-        return node.name if isinstance(node, Name) and "." not in node.name and self._traits.is_name(node.name) else None
+        return node.name if isinstance(node, Name) and "." not in node.name and node.name in self._names else None
 
-    def _key(self, site: Site, node: Node) -> object:
+    def _key(self, wiring: Wiring, node: Node) -> object:
         match node:
             case Name(name=name):
-                return name if "." in name else site.board.key(name)
+                return name if "." in name else wiring.blackboard.where(name)
             case Call() if all(isinstance(argument, Name) for argument in node.arguments):
                 return (node.function, *(argument.name for argument in node.arguments if isinstance(argument, Name)))
             case _:

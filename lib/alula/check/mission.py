@@ -12,7 +12,7 @@ from alula.check.defaults import wrong_defaults
 from alula.check.names import NameRules
 from alula.check.outcomes import OutcomeRules
 from alula.check.rules import SkillRules
-from alula.check.skills import Skills, SkillTraits
+from alula.check.skills import Skills
 from alula.language.messages import NO_MESSAGES, Messages
 from alula.missions.mission_file import READY, STOP_HERE
 from alula.missions.palette import no_class, palette_of
@@ -57,7 +57,7 @@ def check_mission(
     known = palette_for(files, skillsets, palettes, part)
     own = (rules.units, rules.results, rules.resources, NameRules(skills).names, OutcomeRules(skills).asked)
     foreign = bool(palettes) or of_others
-    found += check(files, known, SkillTraits(skills, enums), own, beside=BESIDE, foreign=foreign, of_others=of_others, checked=checked)
+    found += check(files, known, {*enums, *skills.states}, own, beside=BESIDE, foreign=foreign, of_others=of_others, checked=checked)
     found += wrong_defaults(files, foreign=foreign)
     if of_others:
         found = _told_once([replace(one, warning=one.warning or one.code == "ALU607") for one in found])

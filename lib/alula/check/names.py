@@ -27,8 +27,8 @@ class NameRules:
 
     def names(self, whole: Whole) -> Iterator[Problem]:
         """Yield dotted names, states and functions in scripts that nothing of the robot has."""
-        for site in whole.root.walk():
-            for attribute in scripts_of(site.element, site.type):
+        for wiring in whole.root.walk():
+            for attribute in scripts_of(wiring.element, wiring.type):
                 program = whole.scripts.program(attribute)
                 for statement in program.statements if program else ():
                     yield from self._unguarded(attribute, statement)

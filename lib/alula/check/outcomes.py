@@ -5,8 +5,8 @@ from __future__ import annotations
 from collections.abc import Iterator
 from dataclasses import dataclass, field
 
+from alula.check.entries import Key
 from alula.check.problems import in_value, of_value
-from alula.check.sites import Key, Site
 from alula.check.skills import Skills
 from alula.check.whole import Whole
 from alula.common.suggestions import nearest, quoted
@@ -14,11 +14,13 @@ from alula.missions.skill_types import OUTCOME_PORT
 from alula.model.execution_state import ExecutionState
 from alula.model.model import Skill
 from alula.trees.access import scripts_of, takes_script_from_entry
+from alula.trees.blackboard import Blackboard
 from alula.trees.document import Attribute
 from alula.trees.errors import Problem
-from alula.trees.node import pointer
+from alula.trees.node import Wiring, pointer
 from alula.trees.palette import Direction
 from alula.trees.script.syntax import Assignment, Comparison, Conditional, Literal, Name, Node, walk
+from alula.trees.wiring import plain_inside
 
 SWITCH, VARIABLE, CASE = "Switch", "variable", "case_"
 
@@ -32,11 +34,11 @@ class OutcomeRules:
     def asked(self, whole: Whole) -> Iterator[Problem]:
         """Yield texts that an entry never has in which nothing but ends of skills and texts of the file are written."""
         written = _Written.of(self.skills, whole)
-        if any(takes_script_from_entry(site.element, site.type) for one in (whole.root, *whole.beside) for site in one.walk()):
+        if any(takes_script_from_entry(wiring.element, wiring.type) for one in (whole.root, *whole.beside) for wiring in one.walk()):
             return
-        for site in whole.root.walk():
-            for attribute, name, text, place in _compared(site, whole):
-                key = site.board.key(name)
+        for wiring in whole.root.walk():
+            for attribute, name, text, place in _compared(wiring, whole):
+                key = wiring.blackboard.where(name)
                 ends = written.ends.get(key)
                 if not text or ends is None or key not in written.skills_of or key in written.anything or text in ends:
                     continue
@@ -68,58 +70,58 @@ class _Written:
     @classmethod
     def of(cls, skills: Skills, whole: Whole) -> _Written:
         """Read it of a tree, and of those on its blackboard."""
-        found, board = cls(skills, whole), whole.root.board
-        found.anything.update(board.key(name) for name in whole.given or ())
+        found, board = cls(skills, whole), whole.root.blackboard
+        found.anything.update(board.where(name) for name in whole.given or ())
         found.tree(whole.root)
         for root in whole.beside:
             other = cls(skills, whole)
             other.tree(root)
-            found.take(other, board.number)
+            found.take(other, board)
         if whole.given is None:  # who starts this tree may write whatever it likes
-            found.anything.update(key for key in found.ends if key[0] == board.number)
+            found.anything.update(key for key in found.ends if key[0] is board)
         return found
 
-    def tree(self, root: Site) -> None:
+    def tree(self, root: Wiring) -> None:
         """Add what a tree writes."""
         texts: dict[Key, set[str]] = {}
-        for site in root.walk():
-            self._ports(site)
-            for name, text in _assigned(site, self.whole):
+        for wiring in root.walk():
+            self._ports(wiring)
+            for name, text in _assigned(wiring, self.whole):
                 if text is None:
-                    self.anything.add(site.board.key(name))
+                    self.anything.add(wiring.blackboard.where(name))
                 else:
-                    texts.setdefault(site.board.key(name), set()).add(text)
+                    texts.setdefault(wiring.blackboard.where(name), set()).add(text)
         for key, several in texts.items():
             self.ends.setdefault(key, set()).update(several)
 
-    def take(self, other: _Written, board: int) -> None:
+    def take(self, other: _Written, board: Blackboard) -> None:
         """Add what another tree writes on one blackboard."""
-        self.anything.update(key for key in other.anything if key[0] == board)
+        self.anything.update(key for key in other.anything if key[0] is board)
         for mine, its in ((self.ends, other.ends), (self.skills_of, other.skills_of)):
             for key, several in its.items():
-                if key[0] == board:
+                if key[0] is board:
                     mine.setdefault(key, set()).update(several)
 
-    def _ports(self, site: Site) -> None:
-        skill = self.skills.of(site)
-        for attribute in site.ports():
-            port = site.type.ports.get(attribute.name) if site.type and not site.is_subtree else None
+    def _ports(self, wiring: Wiring) -> None:
+        if wiring.is_subtree:
+            self.anything.update((child.blackboard, name) for child in wiring.children for name in plain_inside(wiring))
+            return
+        skill = self.skills.of(wiring)
+        for attribute in wiring.port_attributes():
+            port = wiring.type.ports.get(attribute.name)
             key = pointer(attribute.value, attribute.name)
-            if site.is_subtree:
-                if key is None and site.children:
-                    self.anything.add((site.children[0].board.number, attribute.name))
-            elif port is not None and port.written_from and key is None:
-                self.anything.add(site.board.key(attribute.value))
+            if port is not None and port.written_from and key is None:
+                self.anything.add(wiring.blackboard.where(attribute.value))
             elif key is not None and skill is not None and attribute.name == OUTCOME_PORT:
-                self.ends.setdefault(site.board.key(key), set()).update(_ends(skill))
-                self.skills_of.setdefault(site.board.key(key), set()).add(site.kind)
+                self.ends.setdefault(wiring.blackboard.where(key), set()).update(_ends(skill))
+                self.skills_of.setdefault(wiring.blackboard.where(key), set()).add(wiring.type.name)
             elif key is not None and (port is None or port.direction is not Direction.INPUT):
-                self.anything.add(site.board.key(key))
+                self.anything.add(wiring.blackboard.where(key))
 
 
-def _assigned(site: Site, whole: Whole) -> Iterator[tuple[str, str | None]]:
+def _assigned(wiring: Wiring, whole: Whole) -> Iterator[tuple[str, str | None]]:
     """Yield the entries that the scripts of a node write, each with a text of the file, or None for anything else."""
-    for node in _nodes(site, whole):
+    for node in _nodes(wiring, whole):
         match node:
             case Assignment(target=Name(name=name), value=value):
                 yield from ((name, text) for text in _texts(value))
@@ -136,23 +138,23 @@ def _texts(value: Node) -> Iterator[str | None]:
             yield None
 
 
-def _compared(site: Site, whole: Whole) -> Iterator[tuple[Attribute, str, str, tuple[int, int] | None]]:
+def _compared(wiring: Wiring, whole: Whole) -> Iterator[tuple[Attribute, str, str, tuple[int, int] | None]]:
     """Yield texts that a node compares an entry with: where it does, the entry, the text, and its place in a script."""
-    for attribute in scripts_of(site.element, site.type):
+    for attribute in scripts_of(wiring.element, wiring.type):
         for node in _nodes_of(attribute, whole):
             match node:
                 case Comparison(operands=(Name(name=name), Literal(value=str(text)) as one), operators=("==" | "!=",)):
                     yield attribute, name, text, (one.offset, one.end)
                 case Comparison(operands=(Literal(value=str(text)) as one, Name(name=name)), operators=("==" | "!=",)):
                     yield attribute, name, text, (one.offset, one.end)
-    variable = pointer(site.element.get(VARIABLE), VARIABLE) if site.kind.startswith(SWITCH) else None
-    for attribute in site.ports() if variable is not None else ():
+    variable = pointer(wiring.element.get(VARIABLE), VARIABLE) if wiring.type.name.startswith(SWITCH) else None
+    for attribute in wiring.port_attributes() if variable is not None else ():
         if attribute.name.startswith(CASE) and pointer(attribute.value, attribute.name) is None:
             yield attribute, variable or "", attribute.value, None
 
 
-def _nodes(site: Site, whole: Whole) -> Iterator[Node]:
-    for attribute in scripts_of(site.element, site.type):
+def _nodes(wiring: Wiring, whole: Whole) -> Iterator[Node]:
+    for attribute in scripts_of(wiring.element, wiring.type):
         yield from _nodes_of(attribute, whole)
 
 

@@ -9,7 +9,6 @@ from dataclasses import dataclass
 from alula.check.problems import of_element, of_value
 from alula.check.reach import is_parallel
 from alula.check.resources import clash
-from alula.check.sites import Site
 from alula.check.skills import Skills, named_results
 from alula.check.whole import Whole
 from alula.common.suggestions import nearest, quoted
@@ -18,6 +17,7 @@ from alula.model.model import Skill
 from alula.model.units import KIND_OF_UNIT, UNIT_IN_SI
 from alula.trees.document import Attribute
 from alula.trees.errors import Problem
+from alula.trees.node import Wiring
 
 _NUMBER_WITH_UNIT = re.compile(r"\s*[-+]?[0-9.]+(?:[eE][-+]?[0-9]+)?\s*([A-Za-z%/]+)\s*")
 
@@ -30,37 +30,37 @@ class SkillRules:
 
     def units(self, whole: Whole) -> Iterator[Problem]:
         """Yield numbers that are written with a unit."""
-        for site in whole.root.walk():
-            for attribute in site.ports():
-                port = site.type.ports.get(attribute.name) if site.type else None
+        for wiring in whole.root.walk():
+            for attribute in wiring.port_attributes():
+                port = wiring.type.ports.get(attribute.name)
                 match = _NUMBER_WITH_UNIT.fullmatch(attribute.value)
                 if port is not None and port.unit and match and match[1] in UNIT_IN_SI:
                     yield _wrong_unit(attribute, match[1], port.unit)
 
     def results(self, whole: Whole) -> Iterator[Problem]:
         """Yield results that the skill does not have, and those after which the mission just fails."""
-        for site in whole.root.walk():
-            skill = self.skills.of(site)
+        for wiring in whole.root.walk():
+            skill = self.skills.of(wiring)
             if skill is None:
                 continue
             known = [result.name for result in skill.results]
-            for name in sorted((named_results(site) or frozenset()) - set(known)):
+            for name in sorted((named_results(wiring) or frozenset()) - set(known)):
                 cure = nearest(name, known)
-                yield of_value("ALU618", site.element.attributes[SUCCESS_PORT], f"'{site.kind}' has no result `{name}`", cure)
-            left = [name for name in known if name not in self.skills.successes(site)]
-            if left and not any(_deals(parent, child) for parent, child in site.above()) and not _is_asked(site, whole):
-                yield _ignored(site, left)
+                yield of_value("ALU618", wiring.element.attributes[SUCCESS_PORT], f"'{wiring.type.name}' has no result `{name}`", cure)
+            left = [name for name in known if name not in self.skills.successes(wiring)]
+            if left and not any(_deals(parent, child) for parent, child in wiring.above()) and not _is_asked(wiring, whole):
+                yield _ignored(wiring, left)
 
     def resources(self, whole: Whole) -> Iterator[Problem]:
         """Yield skills in two branches of a Parallel that can't run at once."""
-        for site in whole.root.walk():
-            if not is_parallel(site):
+        for wiring in whole.root.walk():
+            if not is_parallel(wiring):
                 continue
-            branches = [[(leaf, skill) for leaf in child.walk() if (skill := self.skills.of(leaf))] for child in site.children]
+            branches = [[(leaf, skill) for leaf in child.walk() if (skill := self.skills.of(leaf))] for child in wiring.children]
             for number, branch in enumerate(branches):
                 for leaf, skill in branch:
                     others = [one for later in branches[:number] for one in later]
-                    yield from _clashes(site, leaf, skill, others)
+                    yield from _clashes(wiring, leaf, skill, others)
 
 
 def _wrong_unit(attribute: Attribute, written: str, expected: str) -> Problem:
@@ -73,29 +73,28 @@ def _wrong_unit(attribute: Attribute, written: str, expected: str) -> Problem:
     return of_value("ALU606", attribute, f"`{attribute.name}` is in {expected}, and is written without its unit", cure)
 
 
-def _deals(parent: Site, child: Site) -> bool:
+def _deals(parent: Wiring, child: Wiring) -> bool:
     """Tell whether a node does something about the failure of a child other than to fail, too."""
     place = parent.children.index(child)
     if "_onFailure" in child.element.attributes:
         return True
-    return parent.ticking.heeds_failure(place, len(parent.children), parent.given)
+    return parent.ticking.heeds_failure(place, len(parent.children), parent.ports.get)
 
 
-def _is_asked(site: Site, whole: Whole) -> bool:
-    return (
-        OUTCOME_PORT in site.element.attributes or "_onFailure" in site.element.attributes or "_onFailure" in whole.root.element.attributes
-    )
+def _is_asked(wiring: Wiring, whole: Whole) -> bool:
+    mine = wiring.element.attributes
+    return OUTCOME_PORT in mine or "_onFailure" in mine or "_onFailure" in whole.root.element.attributes
 
 
-def _ignored(site: Site, left: list[str]) -> Problem:
-    message = f"no branch deals with {quoted(left)} of '{site.name}': the mission fails"
+def _ignored(wiring: Wiring, left: list[str]) -> Problem:
+    message = f"no branch deals with {quoted(left)} of '{wiring.name}': the mission fails"
     cure = "put a Fallback around it with what is to be done then, or ForceFailure where that is meant"
-    return of_element("ALU609", site.element, message, cure, warning=True)
+    return of_element("ALU609", wiring.element, message, cure, warning=True)
 
 
-def _clashes(parallel: Site, leaf: Site, skill: Skill, others: list[tuple[Site, Skill]]) -> Iterator[Problem]:
+def _clashes(parallel: Wiring, leaf: Wiring, skill: Skill, others: list[tuple[Wiring, Skill]]) -> Iterator[Problem]:
     for other, known in others:
-        if leaf.kind.partition(".")[0] != other.kind.partition(".")[0]:
+        if leaf.type.name.partition(".")[0] != other.type.name.partition(".")[0]:
             continue
         resource = clash(skill, known)
         if resource:
@@ -106,7 +105,7 @@ def _clashes(parallel: Site, leaf: Site, skill: Skill, others: list[tuple[Site, 
             return
 
 
-def _at_once(parallel: Site, leaf: Site) -> bool:
+def _at_once(parallel: Wiring, leaf: Wiring) -> bool:
     """Tell whether nothing but sequences, of which it is the first, and no condition stands between the leaf and the Parallel."""
     guards = {"_skipIf", "_while", "_successIf", "_failureIf"}
     if guards & set(leaf.element.attributes):

@@ -2,16 +2,13 @@
 
 from __future__ import annotations
 
-from collections.abc import Collection, Iterable, Mapping
+from collections.abc import Iterable, Mapping
 from functools import cached_property
 
-from alula.check.sites import Site
-from alula.check.traits import PlainTraits
 from alula.language.messages import NO_MESSAGES, Messages
 from alula.missions.skill_types import SEPARATOR, SUCCESS_PORT
 from alula.model.model import ResultKind, Skill, Skillset
-from alula.trees.ends import ENDS, FAILS, Ends
-from alula.trees.node import pointer
+from alula.trees.node import Wiring, pointer
 
 
 class Skills:
@@ -27,9 +24,9 @@ class Skills:
         known = self.skillsets.get(skillset)
         return known.skill_index.get(skill) if known else None
 
-    def of(self, site: Site) -> Skill | None:
+    def of(self, wiring: Wiring) -> Skill | None:
         """Return the skill that a leaf is."""
-        return self.get(site.kind)
+        return self.get(wiring.type.name)
 
     @cached_property
     def names(self) -> Mapping[str, frozenset[str]]:
@@ -51,10 +48,10 @@ class Skills:
         """The names of all states of all resources."""
         return frozenset(state for one in self.skillsets.values() for resource in one.resources for state in resource.states)
 
-    def successes(self, site: Site) -> frozenset[str]:
+    def successes(self, wiring: Wiring) -> frozenset[str]:
         """Return the results with which a leaf succeeds: what the file narrows them to, else those that the model calls a success."""
-        skill = self.of(site)
-        narrowed = named_results(site)
+        skill = self.of(wiring)
+        narrowed = named_results(wiring)
         if skill is None:
             return frozenset()
         known = frozenset(result.name for result in skill.results)
@@ -63,31 +60,9 @@ class Skills:
         return frozenset(name for name in known if skill.kind_of(name) is ResultKind.SUCCESS)
 
 
-def named_results(site: Site) -> frozenset[str] | None:
+def named_results(wiring: Wiring) -> frozenset[str] | None:
     """Return the results that the file says are a success, None where it says nothing, or names an entry."""
-    attribute = site.element.attributes.get(SUCCESS_PORT)
+    attribute = wiring.element.attributes.get(SUCCESS_PORT)
     if attribute is None or pointer(attribute.value, SUCCESS_PORT) is not None:
         return None
     return frozenset(attribute.value.split(SEPARATOR)) - {""}
-
-
-class SkillTraits(PlainTraits):
-    """What is known of BehaviorTree.CPP's nodes and of the robot's skills."""
-
-    def __init__(self, skills: Skills, names: Collection[str] = ()) -> None:
-        super().__init__({*names, *skills.states})
-        self._skills = skills
-
-    def ends(self, site: Site) -> Ends | None:
-        """Any skill may fail: it may be refused, interrupted, or stopped by an invariant."""
-        if self._skills.of(site) is None:
-            return super().ends(site)
-        return ENDS if self._skills.successes(site) else FAILS
-
-    def runs(self, site: Site) -> bool | None:
-        """Every skill takes several ticks."""
-        return True if self._skills.of(site) is not None else super().runs(site)
-
-    def endless(self, site: Site) -> bool:
-        """Tell whether none of its results is a success."""
-        return self._skills.of(site) is not None and not self._skills.successes(site)

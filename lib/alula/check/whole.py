@@ -6,21 +6,21 @@ from collections.abc import Callable, Collection, Iterable
 from dataclasses import dataclass, field
 
 from alula.check.entries import Writers
-from alula.check.reach import Reach
 from alula.check.scripts import Scripts
-from alula.check.sites import Site
-from alula.check.traits import Traits
 from alula.trees.errors import Problem
+from alula.trees.node import Wiring
+from alula.trees.reach import Reach
 
 
 @dataclass
 class Whole:
     """A tree as it will stand, and what is known of it: what rules are made of."""
 
-    root: Site
+    root: Wiring
     scripts: Scripts
     reach: Reach
-    traits: Traits
+    names: Collection[str]
+    """What names in scripts stand for besides entries: enums, states."""
     given: Collection[str] | None = None
     """Entries of its blackboard that are written before it starts; None: who starts it, and with which entries, is not in the files."""
     others: Writers = field(default_factory=dict)
@@ -28,7 +28,7 @@ class Whole:
     begins_late: bool = False
     """It may begin before or after the main tree has written them."""
     foreign: bool = False
-    beside: tuple[Site, ...] = ()
+    beside: tuple[Wiring, ...] = ()
     """Other trees on the same blackboard: the main one, and those that stand beside it."""
 
 

@@ -12,7 +12,7 @@ from alula.missions.skill_types import HALT_PORT, OUTCOME_PORT, SEPARATOR, STATE
 from alula.missions.skillset import Client
 from alula.model.execution_state import ExecutionState
 from alula.model.model import Resource, Skill, Skillset
-from alula.trees.ends import ENDS
+from alula.trees.ends import ENDS, FAILS, Ends, Given
 from alula.trees.node import Action, Condition, Wiring
 from alula.trees.palette import Palette
 from alula.trees.status import FAILURE, IDLE, RUNNING, SUCCESS, Answer
@@ -37,6 +37,11 @@ class SkillNode(Action):
     """
 
     ends = ENDS
+
+    @classmethod
+    def may_end(cls, given: Given, children: Sequence[Ends]) -> Ends:  # noqa: ARG003
+        """Fail at any time, as it may be refused, interrupted, or stopped by an invariant; succeed where a result is a success."""
+        return cls.ends if given(SUCCESS_PORT) else FAILS
 
     def __init__(self, wiring: Wiring, model: Skill, skillset: str, crew: Crew) -> None:
         super().__init__(wiring)
@@ -121,9 +126,9 @@ def robot_nodes(skillsets: Sequence[Skillset], crew: Crew | None = None) -> Pale
     for one in skillsets:
         # No class for each: isinstance asks every subclass of a base that there is, and a campaign makes missions by the thousand.
         for skill in one.skills:
-            known = skill_type(one.name, skill)
+            known = replace(skill_type(one.name, skill), tells=SkillNode)
             palette.add(known if crew is None else replace(known, make=partial(SkillNode, model=skill, skillset=one.name, crew=crew)))
         for resource in one.resources:
-            known = resource_type(one.name, resource)
+            known = replace(resource_type(one.name, resource), tells=ResourceNode)
             palette.add(known if crew is None else replace(known, make=partial(ResourceNode, model=resource, skillset=one.name, crew=crew)))
     return palette

@@ -8,16 +8,18 @@ from __future__ import annotations
 
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field
-from typing import ClassVar, Protocol, TypeVar
+from functools import cached_property
+from typing import ClassVar, Protocol, TypeAlias, TypeVar
 
 from py_trees.behaviour import Behaviour
 
 from alula.common.public import public
 from alula.trees.blackboard import Blackboard, Clock, Entry
-from alula.trees.document import Element
+from alula.trees.document import Attribute, Element
 from alula.trees.ends import ANY_END, Ends, Given
 from alula.trees.errors import TickError
 from alula.trees.palette import Category, NodeType, Port
+from alula.trees.reading import is_port
 from alula.trees.status import FAILURE, IDLE, RUNNING, SKIPPED, SUCCESS, Answer, Status
 from alula.trees.ticking import ANY_TICKING, Order, Ticking, never_ticked
 from alula.trees.values import StandIn
@@ -25,6 +27,7 @@ from alula.trees.values import StandIn
 NANOSECONDS_PER_MS = 1_000_000
 Watcher = Callable[["Node", Status, Status], None]
 """Told of a node, what it was, and what it is now: at each change, in their order."""
+NodeClass: TypeAlias = "type[Node]"
 
 
 @public("alula.trees")
@@ -53,9 +56,12 @@ class Shared:
     """A node that only gave the flow back wants the next tick at once."""
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, eq=False)
 class Wiring:
-    """What a node is made of: ``ports`` are those that the file gives or that have a default, as text."""
+    """A node where it stands in a tree: what the one that ticks is made of, and what the check and the search look at.
+
+    ``ports`` are those that the file gives or that have a default, as text; ``children`` of a subtree's use the top of that tree.
+    """
 
     type: NodeType
     name: str
@@ -68,6 +74,53 @@ class Wiring:
     compile: Callable[[str, str], Script]
     """Makes a script of text over this node's blackboard, for the attribute that it stands in; raises FileError."""
     enums: Mapping[str, float] = field(default_factory=dict)
+    parent: Wiring | None = None
+    children: list[Wiring] = field(default_factory=list)
+
+    @property
+    def is_subtree(self) -> bool:
+        """Tell whether it is the use of another tree."""
+        return self.type.category is Category.SUBTREE
+
+    @cached_property
+    def is_whole(self) -> bool:
+        """Whether it has as many children as its type takes: not the use of a tree that there is not."""
+        least, most = self.type.children
+        return least <= len(self.children) <= (len(self.children) if most is None else most)
+
+    @property
+    def described(self) -> NodeClass | None:
+        """The class that tells how it ticks its children and ends; None where nobody does, or where it has not the children for that."""
+        return self.type.described if self.is_whole else None
+
+    @property
+    def may_run(self) -> bool | None:
+        """Whether it may take several ticks, its children aside; None: nobody knows."""
+        return self.type.may_run if self.is_whole else None
+
+    @cached_property
+    def ticking(self) -> Ticking:
+        """How it ticks its children."""
+        return self.described.known_ticking() if self.described else ANY_TICKING
+
+    def port_attributes(self) -> Iterator[Attribute]:
+        """Yield the attributes of its element that are ports."""
+        yield from (one for name, one in self.element.attributes.items() if is_port(name))
+
+    def walk(self) -> Iterator[Wiring]:
+        """Yield the node and all below it, in the order of the file."""
+        left = [self]
+        while left:
+            one = left.pop()
+            yield one
+            left.extend(reversed(one.children))
+
+    def above(self) -> Iterator[tuple[Wiring, Wiring]]:
+        """Yield each node above with its child on the way, from here up."""
+        one = self
+        while one.parent is not None:
+            yield one.parent, one
+            one = one.parent
 
 
 @dataclass(frozen=True)

@@ -107,6 +107,8 @@ class NodeType:
     """The class that tells of its nodes what `described` ones do, though it makes none."""
     assumed: bool = False
     """Nobody has declared it: it is taken for a node that many programs have."""
+    unknown: bool = False
+    """No palette has it: it may do anything, and read and write any entry."""
 
     @cached_property
     def scripts(self) -> tuple[str, ...]:
@@ -118,6 +120,13 @@ class NodeType:
         """The class of its nodes where that tells how they end (`Node.is_described`), else None: they may do anything."""
         known = self.tells or self.make
         return known if _is_class(known) and known.is_described() else None
+
+    @property
+    def may_run(self) -> bool | None:
+        """Whether it may take several ticks, its children aside; None: nobody knows. A condition answers at once."""
+        if self.category is Category.CONDITION:
+            return False
+        return self.described.may_run if self.described else self.runs
 
     def wired(self, wiring: Wiring) -> Node:
         """Make a node, ready to be ticked; raises FileError."""
@@ -147,6 +156,11 @@ def node_type(
 ) -> NodeType:
     """Return a type that nothing can be made of yet, with the number of children that its category has."""
     return NodeType(name, category, {port.name: port for port in ports}, doc, None, children or CHILDREN[category])
+
+
+def unknown_type(name: str) -> NodeType:
+    """Return the type of a node that no palette has."""
+    return NodeType(name, Category.ACTION, children=(0, None), unknown=True)
 
 
 def name_in_files(node: type[Node]) -> str:

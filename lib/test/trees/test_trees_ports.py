@@ -5,7 +5,6 @@ from __future__ import annotations
 import pytest
 
 from alula.check.checking import check
-from alula.check.traits import PlainTraits
 from alula.trees.errors import FileError
 from alula.trees.factory import make_tree
 from alula.trees.node import SyncAction
@@ -54,7 +53,7 @@ class Counts(SyncAction):
 def found(node, *types):
     palette = standard_palette() | Palette(types)
     palette.register(Counts)
-    return [(one.code, one.warning) for one in check(read_text(ROOT.format(node)), palette, PlainTraits())]
+    return [(one.code, one.warning) for one in check(read_text(ROOT.format(node)), palette)]
 
 
 def test_an_empty_output_and_an_empty_script_are_no_findings():
@@ -113,6 +112,23 @@ TAKEN = '<UnsetBlackboard key="a"/>'
     ],
 )
 def test_an_entry_that_was_taken_away_is_not_read(between, wrong):
-    problems = check(read_text(ROOT.format(UNSET.format(between))), standard_palette(), PlainTraits())
+    problems = check(read_text(ROOT.format(UNSET.format(between))), standard_palette())
     told = [one.message for one in problems if one.code != "ALU624"]  # `b` is never read
     assert ["UnsetBlackboard in line 1 has taken it away" in one for one in told] == [True] * wrong
+
+
+INNER = """
+<root BTCPP_format="4" main_tree_to_execute="m">
+  <BehaviorTree ID="m"><SubTree ID="inner"{}/></BehaviorTree>
+  <BehaviorTree ID="inner"><ScriptCondition code="height == 3"/></BehaviorTree>
+  <TreeNodesModel><SubTree ID="inner"><input_port name="height"{}/></SubTree></TreeNodesModel>
+</root>"""
+
+
+@pytest.mark.parametrize(("use", "default"), [("", ' default="3"'), (' height="3"', ""), (' height="3" _autoremap="true"', "")])
+def test_what_a_subtree_is_given_as_plain_text_is_written(use, default):
+    text = INNER.format(use, default)
+    assert [one.code for one in check(read_text(text), standard_palette())] == []
+    assert make_tree(read_text(text), standard_palette(), int).tick() is SUCCESS
+    oracle = pytest.importorskip("oracle")
+    assert oracle.Theirs().play(text, {}, 1, []).ticks == oracle.ours(text, {}, 1, []).ticks

@@ -8,15 +8,15 @@ import pytest
 from random_trees import make_case
 
 from alula.check.checking import check
-from alula.check.reach import Reach, unreached
-from alula.check.sites import expand
-from alula.check.traits import PlainTraits
+from alula.check.reach import unreached
 from alula.trees.ends import ANY_END, FAILS, SKIPS, SUCCEEDS
-from alula.trees.node import Decorator
+from alula.trees.node import Decorator, Shared
 from alula.trees.nodes import leaves, sequences
+from alula.trees.reach import Reach
 from alula.trees.reading import read_text
 from alula.trees.standard import standard_palette
 from alula.trees.status import ANSWERS, RUNNING, SKIPPED, SUCCESS
+from alula.trees.wiring import wire
 
 COUNT = 400
 """Trees in the suite; 20,000 were tried once."""
@@ -25,27 +25,25 @@ ROOT = '<root BTCPP_format="4"><BehaviorTree ID="m">{}</BehaviorTree></root>'
 ACT = '<Action ID="Act"/>'
 
 
-class Told(PlainTraits):
+class Told(Reach):
     """The leaves' ends are those of the answers that they are going to give: so much is known of no other tree."""
 
     def __init__(self, answers):
         super().__init__()
         self._answers = answers
 
-    def ends(self, site):
-        given = self._answers.get(site.name)
-        return None if given is None else frozenset(ANSWERS[answer] for answer in given) - {RUNNING}
+    def own_ends(self, wiring):
+        given = self._answers.get(wiring.name)
+        return super().own_ends(wiring) if given is None else frozenset(ANSWERS[answer] for answer in given) - {RUNNING}
 
 
-def unreachable(text, palette, traits):
+def unreachable(text, palette, reach):
     """Return a file, and its elements that are never ticked wherever they stand, with all below them."""
     files = read_text(text)
-    root = expand(files, palette, files.main)
-    reach = Reach(traits)
-    never = {site for child, _ in unreached(root, reach) for site in child.walk()}
-    sites = list(root.walk())
-    reached = {id(site.element) for site in sites if site not in never}
-    return files, {id(site.element) for site in sites} - reached
+    root = wire(files, palette, files.main, Shared(int))
+    never = {one for child, _ in unreached(root, reach) for one in child.walk()}
+    reached = {id(one.element) for one in root.walk() if one not in never}
+    return files, {id(one.element) for one in root.walk()} - reached
 
 
 def marked(files):
@@ -74,7 +72,7 @@ def test_no_child_that_the_field_reaches_is_called_unreachable():
 
 def codes(node, palette=None):
     """Return what is found, but for entries that nothing reads, which these trees write to have conditions."""
-    found = check(read_text(ROOT.format(node)), palette or standard_palette(), PlainTraits())
+    found = check(read_text(ROOT.format(node)), palette or standard_palette())
     return [one.code for one in found if one.code != "ALU624"]
 
 
@@ -181,6 +179,6 @@ def test_conditions_that_exclude_each_other_let_two_children_run(one, other):
 
 @pytest.mark.parametrize(("one", "other"), TOGETHER)
 def test_two_children_that_may_run_are_a_warning(one, other):
-    problems = check(read_text(TWO.format(one, other).join(ROOT.split("{}"))), standard_palette(), PlainTraits())
+    problems = check(read_text(TWO.format(one, other).join(ROOT.split("{}"))), standard_palette())
     (found,) = (one for one in problems if one.code != "ALU624")
     assert (found.code, found.warning) == ("ALU611", True)

@@ -1,0 +1,203 @@
+"""A tree as it will stand: every use of a subtree with its own nodes, each with its type, its ports and its view of the blackboard.
+
+The factory makes the nodes of it that tick. The check looks at it as it is, so nothing here minds what is wrong in the files.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass
+from typing import Protocol
+
+from alula.trees.blackboard import Blackboard
+from alula.trees.document import Element
+from alula.trees.errors import FileError, Problem, TickError
+from alula.trees.node import Script, Shared, Wiring, pointer
+from alula.trees.nodes.subtree import SubTree
+from alula.trees.palette import Category, NodeType, Palette, unknown_type
+from alula.trees.reading import AUTOREMAP, TreeFiles, is_port, node_name, type_name
+from alula.trees.script import Program, ScriptError, parse
+from alula.trees.script.scope import Unknown
+from alula.trees.values import literal
+
+SUBTREE = NodeType("SubTree", Category.SUBTREE, {}, "Another tree of the files.", SubTree, (1, 1))
+
+
+class Surroundings(Protocol):
+    """What scripts may name besides the blackboard: ``navigation.flight_status``, ``running(perception.zed_depthmap)``."""
+
+    def value(self, name: str) -> object:
+        """Return what a dotted name stands for, None where it stands for nothing."""
+        ...
+
+    def call(self, name: str, arguments: Sequence[object]) -> object:
+        """Return what a function answers; raises KeyError where there is none, ValueError for wrong arguments."""
+        ...
+
+
+class Nothing:
+    """No names beyond the blackboard's."""
+
+    def value(self, name: str) -> object:  # noqa: ARG002
+        """Know none."""
+        return None
+
+    def call(self, name: str, arguments: Sequence[object]) -> object:  # noqa: ARG002
+        """Know none."""
+        raise KeyError(name)
+
+
+@dataclass(frozen=True)
+class Scope:
+    """What the scripts of one tree see: enumerators, the entries of its blackboard, and what surrounds the tree."""
+
+    blackboard: Blackboard
+    enums: Mapping[str, float]
+    surroundings: Surroundings
+
+    def get(self, name: str) -> object:
+        """Return a value, None for an entry that was not written yet; raises KeyError where there is nothing of that name."""
+        entry = self.blackboard.entry(name)
+        if entry is not None:
+            return entry.value
+        value = self.surroundings.value(name)
+        if value is None:
+            raise KeyError(name)
+        return value
+
+    def set(self, name: str, value: object, *, create: bool) -> None:
+        """Write an entry; raises KeyError where there is none and ValueError where it takes no such value."""
+        try:
+            self.blackboard.assign(name, value, create=create)
+        except TickError as error:
+            raise ValueError(str(error)) from error
+
+    def call(self, name: str, args: Sequence[object]) -> object:
+        """Ask what surrounds the tree."""
+        return self.surroundings.call(name, args)
+
+
+@dataclass
+class BoundScript:
+    """A script of a node; ``unknown`` is why its last answer as a condition was false, where that was because nobody knows."""
+
+    program: Program
+    scope: Scope
+    where: str
+    unknown: str = ""
+
+    def run(self) -> object:
+        """Run it; raises TickError."""
+        try:
+            return self.program.run(self.scope)
+        except ScriptError as error:
+            raise TickError(f"{self.where}: {error}") from error
+
+    def holds(self) -> bool:
+        """Run it as a condition; what is unknown does not hold. Raises TickError."""
+        try:
+            answer = self.program.judge(self.scope)
+        except ScriptError as error:
+            raise TickError(f"{self.where}: {error}") from error
+        self.unknown = answer.why if isinstance(answer, Unknown) else ""
+        return answer is True
+
+
+def wire(
+    files: TreeFiles,
+    palette: Palette,
+    main: str,
+    shared: Shared,
+    *,
+    enums: Mapping[str, float] | None = None,
+    surroundings: Surroundings | None = None,
+    blackboard: Blackboard | None = None,
+    after: int = 0,
+) -> Wiring:
+    """Return the top of a tree that has one, with its subtrees put in; `structure.verify` has ruled out cycles and giants.
+
+    Arguments are those of `factory.build_tree`. On the blackboards stands nothing yet but what uses of subtrees give these as plain text.
+    """
+    wirer = _Wirer(files, palette, shared, enums or {}, surroundings or Nothing(), after)
+    return wirer.node(files.trees[main].children[0], blackboard or Blackboard(shared.clock), "", None)
+
+
+def path_inside(use: Wiring, path: str) -> str:
+    """Return the path of the tree that a node uses, which stands in the one with the path ``path``."""
+    return _joined(path, use.element.get("name") or f"{type_name(use.element)}::{use.uid}")
+
+
+def _joined(path: str, name: str) -> str:
+    return f"{path}/{name}" if path else name
+
+
+class _Wirer:
+    def __init__(
+        self, files: TreeFiles, palette: Palette, shared: Shared, enums: Mapping[str, float], surroundings: Surroundings, after: int
+    ) -> None:
+        self._files = files
+        self._palette = palette
+        self._shared = shared
+        self._enums = enums
+        self._surroundings = surroundings
+        self._count = after
+
+    def node(self, element: Element, board: Blackboard, path: str, parent: Wiring | None) -> Wiring:
+        """Return a node with all below it; ``path`` is that of the tree that it stands in."""
+        self._count += 1
+        uid, name, tag = self._count, node_name(element), type_name(element)
+        is_subtree = element.tag == SUBTREE.name
+        known = SUBTREE if is_subtree else self._palette.get(tag) or unknown_type(tag)
+        ports = {name: one.value for name, one in element.attributes.items() if is_port(name)}
+        model = self._files.models.get(tag) if is_subtree and not _autoremaps(element) else known
+        for port in () if model is None else model.ports.values():
+            if port.name not in ports and port.default is not None:
+                ports[port.name] = port.default
+        whole = _joined(path, name if name != tag else f"{name}::{uid}")
+        compiled = _compiler(element, Scope(board, self._enums, self._surroundings))
+        wiring = Wiring(known, name, uid, whole, element, ports, board, self._shared, compiled, self._enums, parent)
+        inner: Sequence[Element] = element.children
+        if is_subtree:
+            tree = self._files.trees.get(tag)
+            inner, board, path = tree.children[:1] if tree is not None else (), self._inside(wiring), path_inside(wiring, path)
+        wiring.children.extend(self.node(child, board, path, wiring) for child in inner)
+        return wiring
+
+    def _inside(self, use: Wiring) -> Blackboard:
+        """Return the blackboard of the tree that a node uses."""
+        board = Blackboard(self._shared.clock, above=use.blackboard)
+        board.autoremap = _autoremaps(use.element)
+        plain = plain_inside(use)
+        board.remapped = {name: pointer(text, name) or name for name, text in use.ports.items() if name not in plain}
+        _write(board, plain)
+        return board
+
+
+def plain_inside(use: Wiring) -> Mapping[str, str]:
+    """Return what the use of a subtree writes into entries of its own, as text: all that names no entry above."""
+    return {name: text for name, text in use.ports.items() if text == "=" or pointer(text, name) is None}
+
+
+def _autoremaps(use: Element) -> bool:
+    return use.get(AUTOREMAP).lower() in {"1", "true"}
+
+
+def _write(board: Blackboard, constants: Mapping[str, str]) -> None:
+    """Write what a subtree is given as plain text, a number as one; these entries are its own, whatever is remapped."""
+    autoremap, board.autoremap = board.autoremap, False
+    for name, text in constants.items():
+        board.set(name, literal(text))
+    board.autoremap = autoremap
+
+
+def _compiler(element: Element, scope: Scope) -> Callable[[str, str], Script]:
+    def compiled(text: str, attribute: str) -> Script:
+        try:
+            program = parse(text)
+        except ScriptError as error:
+            known = element.attributes.get(attribute)
+            place = element.place if known is None or known.value != text else known.place_of(error.offset)
+            raise FileError(Problem(place, error.message, error.cure)) from error
+        return BoundScript(program, scope, f"{element.place_of(attribute)} ({node_name(element)}, {attribute})")
+
+    return compiled
