@@ -5,7 +5,6 @@ from __future__ import annotations
 import functools
 import json
 import math
-import subprocess
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
@@ -13,6 +12,7 @@ from typing import Any
 
 from alula.campaign.failures import FAULT, PROCESS, Failure, Way, as_dict, failures_by, failures_in, name_of, ways_to_fail
 from alula.campaign.flown import FlownAnswer
+from alula.campaign.live import run_live
 from alula.campaign.mocked_scenarios import MockedScenario, load_mocked_scenario
 from alula.campaign.plan import SIMULATOR, PlannedRun
 from alula.common.operator import is_operator
@@ -29,7 +29,6 @@ from alula.records.models import models_of
 from alula.records.run import RecordedRun, departure, lift_off_of, load_recorded_run, origin_of
 from alula.records.tree import Places, places_in
 from alula.runtime.core.events import EngineEvent, ExecutionEvent, TransitionEvent
-from alula.runtime.live.options import entry
 
 Row = dict[str, Any]
 OBEYED = "the operator's act"
@@ -151,17 +150,7 @@ def _ended(died: Mapping[str, Any], events: Sequence[EngineEvent], effects: Effe
 
 def _simulated(planned: PlannedRun, options: Sequence[str], out: Path) -> Row:
     """Run by the command line, as a user does; keep the run's folder."""
-    folder = out / f"run-{planned.number:05d}"
-    for number in range(2, 1000):  # one that a crash has left half done stays as it is
-        if not folder.exists():
-            break
-        folder = out / f"run-{planned.number:05d}-{number}"
-    words = [entry(), "run", planned.scenario, "--seed", str(planned.seed), *options]
-    if planned.world is not None:
-        words += ["--world", str(planned.world.absolute())]
-    for fault in planned.faults:
-        words += ["--fail", fault]
-    done = subprocess.run([*words, "--out", str(folder)], capture_output=True, text=True, check=False, stdin=subprocess.DEVNULL)
+    folder, done = run_live(planned, options, out)
     try:
         summary = json.loads((folder / "summary.json").read_text(encoding="utf-8"))
     except (OSError, ValueError):

@@ -94,6 +94,10 @@ def finish(campaign: Campaign, table: Table, out: Path, title: str, time_s: floa
     return coverage
 
 
+def _listed(numbers: Sequence[int], most: int = 20) -> str:
+    return ", ".join(map(str, numbers[:most])) + (", ..." if len(numbers) > most else "")
+
+
 def main(arguments: Sequence[str] | None = None) -> int:
     """Do it; return the exit code."""
     given = parse("campaign", arguments)
@@ -107,7 +111,7 @@ def main(arguments: Sequence[str] | None = None) -> int:
         table = Table(out, campaign)
         if table.rows:
             sys.stderr.write(f"{len(table.rows)} of {len(campaign.runs)} runs are in {out / ROWS}\n")
-        run(campaign, table, out, Teller(len(campaign.runs), len(table.rows)), options, given.dask)
+        lost = run(campaign, table, out, Teller(len(campaign.runs), len(table.rows)), options, given.dask)
         coverage = finish(campaign, table, out, f"Campaign {given.file.stem}", given.time)
     except (AnalysisError, RobotError, ScenarioError) as error:
         sys.stderr.write(f"alula campaign: {error}\n")
@@ -121,7 +125,11 @@ def main(arguments: Sequence[str] | None = None) -> int:
     sys.stdout.write(as_text(coverage))
     sys.stderr.write("".join(f"alula campaign: {line}\n" for line in coverage.unknown))
     sys.stderr.write(f"{out / 'coverage.html'}\n")
-    return TROUBLE if coverage.troubled or coverage.unknown else DONE
+    if lost:
+        sys.stderr.write(
+            f"alula campaign: {len(lost)} runs were lost with who did them ({_listed(lost)}); the same command does them again\n"
+        )
+    return TROUBLE if lost or coverage.troubled or coverage.unknown else DONE
 
 
 if __name__ == "__main__":
