@@ -131,7 +131,7 @@ def test_the_mapping_tells_once_and_uses_the_imu_no_more_until_it_begins_again()
     assert host.told == [("OK", "")]
     good = [[alive(number * SWEEP_NS + 1), alive(number * SWEEP_NS + 2)] for number in range(61)]
     used = [len(core._usable(good[number] if number < 20 else frozen(good[number]), number * SWEEP_NS)) for number in range(1, 40)]
-    assert used == [2] * 29 + [0] * 10, "until it is found"
+    assert used == [2] * 20 + [0] * 19, "the first sweep that is still differs from the one before it"
     assert [len(core._usable(good[number], number * SWEEP_NS)) for number in range(40, 60)] == [0] * 20
     assert host.told[1:] == [("BROKEN", "its readings do not change")]
     assert host.warned == ["the IMU is not used any more in this mapping: its readings do not change"]

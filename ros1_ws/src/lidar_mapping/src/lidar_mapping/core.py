@@ -199,11 +199,14 @@ class LidarMapping:
             self._host.warn("full", f"the map is full ({len(self._slam.map)} voxels): new surfaces are left out", every_s=10.0)
 
     def _usable(self, readings: Sequence[ImuReading], end_ns: int) -> Sequence[ImuReading]:
-        """Return the readings, or none once the IMU has failed: the filter then says itself how much less it knows."""
+        """Return the readings, or none of an IMU that has failed or stands still: the filter then says itself how much less it knows.
+
+        A second of zeros would be a free fall of 5 m to it: the map were lost before the IMU is told to be broken.
+        """
         if self._imu.fails(end_ns, readings):
             self._host.warn("imu", f"the IMU is not used any more in this mapping: {self._imu.problem}")
             self._host.report("mapping.imu_status", "BROKEN", self._imu.problem)
-        return () if self._imu.problem else readings
+        return () if self._imu.problem or self._imu.still else readings
 
     def _begin_as_flown(self) -> None:
         """Let a mapping that has not begun take the place of `map` from the guidance, which flew on by it if this node has crashed."""

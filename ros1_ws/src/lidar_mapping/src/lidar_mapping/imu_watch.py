@@ -22,6 +22,8 @@ class ImuWatch:
 
     def __init__(self) -> None:
         self.problem = ""
+        self.still = False
+        """The readings of the last sweep do not change: they are none of the motion, whether the IMU has failed or will go on."""
         self._useful_ns: int | None = None
         self._newest: ImuReading | None = None
         self._refused = 0
@@ -36,7 +38,7 @@ class ImuWatch:
         """Judge by the readings of a sweep, up to its end; return whether the IMU has failed just now, for a second: see ``problem``."""
         if self._useful_ns is None or end_ns < self._useful_ns:  # the first one, or a clock that was set back
             self._useful_ns, self._newest = end_ns, None
-        still = bool(readings) and self._newest is not None and unchanging([self._newest, *readings])
+        still = self.still = bool(readings) and self._newest is not None and unchanging([self._newest, *readings])
         self._newest = readings[-1] if readings else self._newest
         late = self._newest is None or end_ns - self._newest.stamp_ns > OLD_NS
         if not late and not still:
