@@ -7,9 +7,9 @@ from collections.abc import Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
 
 from alula.adopt.vocabulary import SkillOf, Vocabulary
-from alula.check.entries import NUMBER, TEXT, Key, Use, Uses
 from alula.check.scripts import Scripts
 from alula.missions.skill_types import PORT_TYPES, STATE_PORT
+from alula.trees.access import NUMBER, TEXT, Access, Accesses, Key
 from alula.trees.blackboard import Blackboard
 from alula.trees.node import Shared, Wiring, pointer
 from alula.trees.palette import Category, Direction, NodeType, Palette, Port, node_type
@@ -40,11 +40,11 @@ class GivenEntry:
 
 @dataclass(frozen=True)
 class _MainTree:
-    """A main tree with all uses of entries in it; ``optional``: entries of its board that nodes do without."""
+    """A main tree with all accesses to entries in it; ``optional``: entries of its board that nodes do without."""
 
     files: TreeFiles
     board: Blackboard
-    uses: Sequence[tuple[Wiring, Use]]
+    accesses: Sequence[tuple[Wiring, Access]]
     optional: frozenset[str]
 
     @classmethod
@@ -53,16 +53,17 @@ class _MainTree:
         if not files.trees[files.main].children:
             return cls(files, board, (), frozenset())
         root = wire(files, palette, files.main, Shared(int), blackboard=board)
-        uses = Uses(Scripts())
-        wirings = {id(use): one for one in root.walk() for use in (*uses.before(one), *uses.after(one))}
-        return cls(files, board, [(wirings[id(use)], use) for use in uses.of(root)], frozenset(_optional(root)))
+        accesses = Accesses(Scripts().statements)
+        wirings = {id(one): wiring for wiring in root.walk() for one in accesses.of_node(wiring)}
+        several = [(wirings[id(one)], one) for one in accesses.of(root) if one.write or one.needed]
+        return cls(files, board, several, frozenset(_optional(root)))
 
-    def read_first(self) -> dict[str, Use]:
+    def read_first(self) -> dict[str, Access]:
         """Return the entries of its board that are read before they are written, each with where."""
-        first: dict[Key, Use] = {}
-        for _, use in self.uses:
-            first.setdefault(use.key, use)
-        return {name: use for (board, name), use in first.items() if board is self.board and not use.write}
+        first: dict[Key, Access] = {}
+        for _, access in self.accesses:
+            first.setdefault(access.key, access)
+        return {name: access for (board, name), access in first.items() if board is self.board and not access.write}
 
     def told(self) -> dict[str, str | None]:
         """Return the inputs that its model tells of, with their defaults."""
@@ -72,7 +73,7 @@ class _MainTree:
 
     def unwritten(self) -> set[str]:
         """Return the entries that nodes do without, and that nothing writes."""
-        return set(self.optional) - {use.key[1] for _, use in self.uses if use.write and use.key[0] is self.board}
+        return set(self.optional) - {access.key[1] for _, access in self.accesses if access.write and access.key[0] is self.board}
 
 
 def _optional(root: Wiring) -> Iterator[str]:
@@ -107,7 +108,7 @@ class Entries:
         """Return the entries that a program writes before it starts a main tree."""
         main = self._mains[id(files)]
         read, told = main.read_first(), main.told()
-        enumerators = [name for name, use in sorted(read.items()) if name.isupper() and use.offsets is not None]
+        enumerators = [name for name, access in sorted(read.items()) if name.isupper() and access.offsets is not None]
         found = []
         for name in sorted({*read, *told, *main.unwritten()}):
             default = told.get(name)
@@ -116,7 +117,7 @@ class Entries:
             elif name in enumerators:  # each of a program's has a number of its own
                 value = enumerators.index(name) + 1
             else:
-                value = ZEROS.get(self._kind([pair for pair in main.uses if pair[1].key == (main.board, name)]), 0)
+                value = ZEROS.get(self._kind([pair for pair in main.accesses if pair[1].key == (main.board, name)]), 0)
             found.append(GivenEntry(name, value))
         return found
 
@@ -136,23 +137,23 @@ class Entries:
 
     def _spread(self) -> None:
         """Give what has no type yet that of the entries which it names, until nothing changes."""
-        groups = [list(_by_key(main.uses).values()) for main in self._mains.values()]
+        groups = [list(_by_key(main.accesses).values()) for main in self._mains.values()]
         changed = True
         while changed:
             changed = False
             for pairs in (pairs for found in groups for pairs in found):
                 kind = self._common(pairs)
-                for wiring, use in pairs:
-                    slot = self._slot(wiring, use.attribute.name)
+                for wiring, access in pairs:
+                    slot = self._slot(wiring, access.attribute.name)
                     if kind is not ANY and slot is not None and self._types[slot] is ANY:
                         self._types[slot], changed = kind, True
 
-    def _common(self, pairs: Iterable[tuple[Wiring, Use]]) -> PortType:
+    def _common(self, pairs: Iterable[tuple[Wiring, Access]]) -> PortType:
         """Return the type that all who name an entry agree on: of several kinds of number the widest, else a text; ANY where nobody says.
 
         A number of a script is of any of these kinds.
         """
-        told = [(self._told(wiring, use), use.type == NUMBER) for wiring, use in pairs]
+        told = [(self._told(wiring, access), access.type == NUMBER) for wiring, access in pairs]
         kinds = {kind for kind, is_of_script in told if kind is not ANY and not is_of_script}
         if not kinds:
             return DOUBLE if any(is_of_script for _, is_of_script in told) else ANY
@@ -160,22 +161,22 @@ class Entries:
             return next(iter(kinds))
         return DOUBLE if kinds <= set(NUMBERS) else STRING
 
-    def _told(self, wiring: Wiring, use: Use) -> PortType:
-        slot = self._slot(wiring, use.attribute.name) if use.offsets is None else None
+    def _told(self, wiring: Wiring, access: Access) -> PortType:
+        slot = self._slot(wiring, access.attribute.name) if access.offsets is None else None
         if slot is not None:
             return self._types[slot]
-        return STRING if use.type == TEXT else TYPES.get(use.type, ANY)
+        return STRING if access.type == TEXT else TYPES.get(access.type, ANY)
 
-    def _kind(self, pairs: Sequence[tuple[Wiring, Use]]) -> str:
+    def _kind(self, pairs: Sequence[tuple[Wiring, Access]]) -> str:
         kind = self._common(pairs)
-        is_of_scripts = all(use.offsets is not None for _, use in pairs) and pairs
+        is_of_scripts = all(access.offsets is not None for _, access in pairs) and pairs
         return "float64" if kind is ANY and is_of_scripts else model_type(kind)
 
 
-def _by_key(uses: Iterable[tuple[Wiring, Use]]) -> dict[Key, list[tuple[Wiring, Use]]]:
-    found: dict[Key, list[tuple[Wiring, Use]]] = {}
-    for wiring, use in uses:
-        found.setdefault(use.key, []).append((wiring, use))
+def _by_key(accesses: Iterable[tuple[Wiring, Access]]) -> dict[Key, list[tuple[Wiring, Access]]]:
+    found: dict[Key, list[tuple[Wiring, Access]]] = {}
+    for wiring, access in accesses:
+        found.setdefault(access.key, []).append((wiring, access))
     return found
 
 

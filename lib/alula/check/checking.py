@@ -16,7 +16,7 @@ from alula.check.scripts import Scripts
 from alula.check.unread import never_read
 from alula.check.whole import Rule, Whole
 from alula.trees import nav2
-from alula.trees.access import scripts_of
+from alula.trees.access import Accesses, scripts_of
 from alula.trees.blackboard import Blackboard
 from alula.trees.errors import Problem
 from alula.trees.library import Library
@@ -88,7 +88,8 @@ def check(
 
 def _wholes(files: TreeFiles, palette: Palette, names: Collection[str], beside: Beside, *, foreign: bool) -> Iterator[Whole]:
     model = files.models.get(files.main)
-    programs, reach, shared = Scripts(), Reach(), Shared(int)
+    scripts, reach, shared = Scripts(), Reach(), Shared(int)
+    accesses = Accesses(scripts.statements, names)
     given, others = tuple(model.ports) if model else (), Writers()
     # A tree of these is ticked by itself, also where the main one has it as a subtree, over other entries then.
     started = [name for name in (*beside.before, *beside.later) if name in files.trees and name != files.main]
@@ -100,9 +101,9 @@ def _wholes(files: TreeFiles, palette: Palette, names: Collection[str], beside: 
     for name, root in roots.items():
         known = given if name in started or (name == files.main and not files.is_part) else None
         around = tuple(roots[one] for one in boards if one in roots and one != name) if name in boards else ()
-        yield Whole(root, programs, reach, names, known, others, name in beside.later, foreign, around)
+        yield Whole(root, scripts, accesses, reach, names, known, others, name in beside.later, foreign, around)
         if name == files.main:
-            others = entries.written(root, entries.Uses(programs, names))
+            others = entries.written(root, accesses)
 
 
 def _problems(wholes: Iterable[Whole], rules: Iterable[Rule]) -> Iterator[Problem]:
@@ -149,12 +150,11 @@ def _several_run(whole: Whole) -> Iterator[Problem]:
 
 
 def _entries(whole: Whole) -> Iterator[Problem]:
-    uses = entries.Uses(whole.scripts, whole.names)
     if whole.given is not None:
         of_nav2 = whole.foreign and any(wiring.type.name in nav2.declared() for wiring in whole.root.walk())
         given = (*whole.given, *(nav2.WRITTEN if of_nav2 else ()))
-        yield from entries.read_too_early(whole.root, uses, given, whole.others, late=whole.begins_late, foreign=whole.foreign)
-    yield from entries.mismatched(whole.root, uses)
+        yield from entries.read_too_early(whole.root, whole.accesses, given, whole.others, late=whole.begins_late, foreign=whole.foreign)
+    yield from entries.mismatched(whole.root, whole.accesses)
 
 
 RULES: tuple[Rule, ...] = (_scripts, _missing, _unreached, _several_run, _entries)

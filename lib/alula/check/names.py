@@ -29,8 +29,7 @@ class NameRules:
         """Yield dotted names, states and functions in scripts that nothing of the robot has."""
         for wiring in whole.root.walk():
             for attribute in scripts_of(wiring.element, wiring.type):
-                program = whole.scripts.program(attribute)
-                for statement in program.statements if program else ():
+                for statement in whole.scripts.statements(attribute):
                     yield from self._unguarded(attribute, statement)
                     asked: set[int] = set()
                     for node in walk(statement):

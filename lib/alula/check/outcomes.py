@@ -5,7 +5,6 @@ from __future__ import annotations
 from collections.abc import Iterator
 from dataclasses import dataclass, field
 
-from alula.check.entries import Key
 from alula.check.problems import in_value, of_value
 from alula.check.skills import Skills
 from alula.check.whole import Whole
@@ -13,14 +12,12 @@ from alula.common.suggestions import nearest, quoted
 from alula.missions.skill_types import OUTCOME_PORT
 from alula.model.execution_state import ExecutionState
 from alula.model.model import Skill
-from alula.trees.access import scripts_of, takes_script_from_entry
+from alula.trees.access import Key, scripts_of, takes_script_from_entry
 from alula.trees.blackboard import Blackboard
 from alula.trees.document import Attribute
 from alula.trees.errors import Problem
 from alula.trees.node import Wiring, pointer
-from alula.trees.palette import Direction
-from alula.trees.script.syntax import Assignment, Comparison, Conditional, Literal, Name, Node, walk
-from alula.trees.wiring import plain_inside
+from alula.trees.script.syntax import Comparison, Conditional, Literal, Name, Node, walk
 
 SWITCH, VARIABLE, CASE = "Switch", "variable", "case_"
 
@@ -83,16 +80,23 @@ class _Written:
 
     def tree(self, root: Wiring) -> None:
         """Add what a tree writes."""
-        texts: dict[Key, set[str]] = {}
         for wiring in root.walk():
-            self._ports(wiring)
-            for name, text in _assigned(wiring, self.whole):
-                if text is None:
-                    self.anything.add(wiring.blackboard.where(name))
-                else:
-                    texts.setdefault(wiring.blackboard.where(name), set()).add(text)
-        for key, several in texts.items():
-            self.ends.setdefault(key, set()).update(several)
+            skill = self.skills.of(wiring)
+            for access in self.whole.accesses.of_node(wiring):
+                if not access.write:
+                    continue
+                if skill is not None and access.value is None and access.attribute.name == OUTCOME_PORT:
+                    self.ends.setdefault(access.key, set()).update(_ends(skill))
+                    self.skills_of.setdefault(access.key, set()).add(wiring.type.name)
+                    continue
+                for text in _texts(access.value):
+                    if text is None:
+                        self.anything.add(access.key)
+                    else:
+                        self.ends.setdefault(access.key, set()).add(text)
+            for attribute in wiring.port_attributes() if wiring.type.unknown else ():
+                key = pointer(attribute.value, attribute.name)
+                self.anything.update([] if key is None else [wiring.blackboard.where(key)])
 
     def take(self, other: _Written, board: Blackboard) -> None:
         """Add what another tree writes on one blackboard."""
@@ -102,32 +106,9 @@ class _Written:
                 if key[0] is board:
                     mine.setdefault(key, set()).update(several)
 
-    def _ports(self, wiring: Wiring) -> None:
-        if wiring.is_subtree:
-            self.anything.update((child.blackboard, name) for child in wiring.children for name in plain_inside(wiring))
-            return
-        skill = self.skills.of(wiring)
-        for attribute in wiring.port_attributes():
-            port = wiring.type.ports.get(attribute.name)
-            key = pointer(attribute.value, attribute.name)
-            if port is not None and port.written_from and key is None:
-                self.anything.add(wiring.blackboard.where(attribute.value))
-            elif key is not None and skill is not None and attribute.name == OUTCOME_PORT:
-                self.ends.setdefault(wiring.blackboard.where(key), set()).update(_ends(skill))
-                self.skills_of.setdefault(wiring.blackboard.where(key), set()).add(wiring.type.name)
-            elif key is not None and (port is None or port.direction is not Direction.INPUT):
-                self.anything.add(wiring.blackboard.where(key))
 
-
-def _assigned(wiring: Wiring, whole: Whole) -> Iterator[tuple[str, str | None]]:
-    """Yield the entries that the scripts of a node write, each with a text of the file, or None for anything else."""
-    for node in _nodes(wiring, whole):
-        match node:
-            case Assignment(target=Name(name=name), value=value):
-                yield from ((name, text) for text in _texts(value))
-
-
-def _texts(value: Node) -> Iterator[str | None]:
+def _texts(value: Node | None) -> Iterator[str | None]:
+    """Yield the texts of the file that an expression may be, None for anything else."""
     match value:
         case Literal(value=str(text)):
             yield text
@@ -153,11 +134,5 @@ def _compared(wiring: Wiring, whole: Whole) -> Iterator[tuple[Attribute, str, st
             yield attribute, variable or "", attribute.value, None
 
 
-def _nodes(wiring: Wiring, whole: Whole) -> Iterator[Node]:
-    for attribute in scripts_of(wiring.element, wiring.type):
-        yield from _nodes_of(attribute, whole)
-
-
 def _nodes_of(attribute: Attribute, whole: Whole) -> Iterator[Node]:
-    program = whole.scripts.program(attribute)
-    yield from (node for statement in (program.statements if program else ()) for node in walk(statement))
+    yield from (node for statement in whole.scripts.statements(attribute) for node in walk(statement))

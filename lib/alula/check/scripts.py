@@ -2,10 +2,13 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
+
 from alula.check.problems import in_value
 from alula.trees.document import Attribute
 from alula.trees.errors import Problem
 from alula.trees.script import Program, ScriptError, parse
+from alula.trees.script.syntax import Node
 
 
 class Scripts:
@@ -22,6 +25,11 @@ class Scripts:
             self._kept.append(attribute)  # so that no other gets its id
             self._programs[id(attribute)] = self._read(attribute)
         return self._programs[id(attribute)]
+
+    def statements(self, attribute: Attribute) -> Sequence[Node]:
+        """Return the statements of the script in an attribute; none where it is wrong."""
+        program = self.program(attribute)
+        return program.statements if program else ()
 
     def _read(self, attribute: Attribute) -> Program | None:
         try:

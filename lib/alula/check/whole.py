@@ -7,6 +7,7 @@ from dataclasses import dataclass, field
 
 from alula.check.entries import Writers
 from alula.check.scripts import Scripts
+from alula.trees.access import Accesses
 from alula.trees.errors import Problem
 from alula.trees.node import Wiring
 from alula.trees.reach import Reach
@@ -18,6 +19,7 @@ class Whole:
 
     root: Wiring
     scripts: Scripts
+    accesses: Accesses
     reach: Reach
     names: Collection[str]
     """What names in scripts stand for besides entries: enums, states."""

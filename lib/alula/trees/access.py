@@ -5,12 +5,147 @@ The check of files and the search of all runs both read it here. What is in a sc
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Mapping
+from collections.abc import Callable, Collection, Iterator, Mapping, Sequence
+from dataclasses import dataclass
+from typing import TypeAlias
 
+from alula.trees.blackboard import Blackboard
 from alula.trees.document import Attribute, Element
-from alula.trees.node import Node, pointer
-from alula.trees.palette import Direction, NodeType
+from alula.trees.node import Node, Wiring, pointer
+from alula.trees.palette import Direction, NodeType, Port
 from alula.trees.reading import POSTCONDITIONS, PRECONDITIONS
+from alula.trees.script.syntax import Assignment, Call, Chain, Comparison, Conditional, Literal, Name, Prefix, children
+from alula.trees.script.syntax import Node as Part
+from alula.trees.values import ANY
+from alula.trees.wiring import plain_inside
+
+Key: TypeAlias = tuple[Blackboard, str]
+"""An entry: the blackboard that it stands on, and its name there."""
+NUMBER, TEXT, UNKNOWN = "a number", "a text", ""
+"""What a script writes; a port writes what its type is called."""
+
+
+@dataclass(frozen=True)
+class Access:
+    """An entry is read or written, at a place: ``offsets`` in the value of the attribute, None for all of it."""
+
+    key: Key
+    name: str
+    write: bool
+    attribute: Attribute
+    offsets: tuple[int, int] | None = None
+    type: str = UNKNOWN
+    unit: str = ""
+    unchecked: str = ""
+    """The type of the node that goes on where the entry has no value; empty: what reads it fails then."""
+    needed: bool = True
+    """Of a reading: the node does not do without."""
+    in_passing: bool = False
+    """Of a reading: it is read only to be written anew, as in `n += 1`."""
+    value: Part | None = None
+    """What a script writes."""
+
+
+class Accesses:
+    """All accesses to entries in a tree, in the order in which they may come first.
+
+    ``statements`` reads the script in an attribute; ``names`` stand in scripts for something else than an entry, such as enums and states.
+    """
+
+    def __init__(self, statements: Callable[[Attribute], Sequence[Part]], names: Collection[str] = ()) -> None:
+        self._statements = statements
+        self._names = names
+        self._before: dict[Wiring, list[Access]] = {}
+        self._after: dict[Wiring, list[Access]] = {}
+
+    def of(self, wiring: Wiring) -> Iterator[Access]:
+        """Yield those of a node and all below it."""
+        left = [(wiring, False)]
+        while left:
+            one, is_over = left.pop()
+            if is_over:
+                yield from self.after(one)
+                continue
+            yield from self.before(one)
+            left.append((one, True))
+            left.extend((child, False) for child in reversed(one.children))
+
+    def before(self, wiring: Wiring) -> list[Access]:
+        """Return those before its children are ticked, of a leaf those before it ends."""
+        if wiring not in self._before:
+            self._before[wiring] = list(self._first(wiring))
+        return self._before[wiring]
+
+    def after(self, wiring: Wiring) -> list[Access]:
+        """Return those of its scripts after it has ended."""
+        if wiring not in self._after:
+            self._after[wiring] = [one for attribute in scripts_after(wiring.element) for one in self._script(wiring, attribute)]
+        return self._after[wiring]
+
+    def of_node(self, wiring: Wiring) -> Iterator[Access]:
+        """Yield those of a node itself."""
+        yield from self.before(wiring)
+        yield from self.after(wiring)
+
+    def _first(self, wiring: Wiring) -> Iterator[Access]:
+        for attribute in scripts_before(wiring.element):
+            yield from self._script(wiring, attribute)
+        if wiring.is_subtree:
+            yield from _constants(wiring)
+            return
+        yield from _read_by_ports(wiring)
+        for attribute in scripts_within(wiring.element, wiring.type):
+            yield from self._script(wiring, attribute)
+        yield from _written_by_ports(wiring)
+
+    def _script(self, wiring: Wiring, attribute: Attribute) -> Iterator[Access]:
+        for statement in self._statements(attribute):
+            yield from self._part(wiring.blackboard, attribute, statement)
+
+    def _part(self, board: Blackboard, attribute: Attribute, part: Part, *, needed: bool = True) -> Iterator[Access]:
+        match part:
+            case Name():
+                if part.name not in self._names and "." not in part.name:
+                    yield Access(board.where(part.name), part.name, False, attribute, (part.offset, part.end), needed=needed)
+            case Assignment(target=Name() as target):
+                key, place = board.where(target.name), (target.offset, target.end)
+                if not part.replaces and target.name not in self._names and "." not in target.name:
+                    yield Access(key, target.name, False, attribute, place, in_passing=True)
+                yield from self._part(board, attribute, part.value)
+                yield Access(key, target.name, True, attribute, place, _written(part.value), value=part.value)
+            case _:
+                for child in children(part):
+                    if not (isinstance(part, Call) and isinstance(child, Name)):
+                        yield from self._part(board, attribute, child, needed=not _may_be_state(part, child))
+
+
+def _read_by_ports(wiring: Wiring) -> Iterator[Access]:
+    for attribute, port in _ports(wiring):
+        key = pointer(attribute.value, port.name)
+        if key is not None and port.direction is not Direction.OUTPUT:
+            # Of a port that is read and written, only a class is known to need what it reads.
+            needed = not port.optional and (port.direction is Direction.INPUT or wiring.type.make is not None)
+            unchecked = wiring.type.name if port.unchecked else ""
+            yield Access(wiring.blackboard.where(key), key, False, attribute, None, _type_name(port), port.unit, unchecked, needed)
+
+
+def _written_by_ports(wiring: Wiring) -> Iterator[Access]:
+    for attribute, port in _ports(wiring):
+        key = pointer(attribute.value, port.name)
+        if port.written_from and key is None:
+            name = attribute.value
+            yield Access(wiring.blackboard.where(name), name, True, attribute, None, _set_type(wiring, port.written_from))
+        elif key is not None and not port.written_from and port.direction is not Direction.INPUT:
+            yield Access(wiring.blackboard.where(key), key, True, attribute, None, _type_name(port), port.unit)
+
+
+def _ports(wiring: Wiring) -> Iterator[tuple[Attribute, Port]]:
+    """Yield the ports that its type has and its element gives, then outputs that it has an entry for by default."""
+    known = wiring.type.ports
+    yield from ((one, known[one.name]) for one in wiring.port_attributes() if one.name in known)
+    for port in known.values():
+        if port.direction is not Direction.INPUT and port.default and port.name not in wiring.element.attributes:
+            yield Attribute(port.name, port.default, wiring.element.place), port
 
 
 def scripts_before(element: Element) -> Iterator[Attribute]:
@@ -61,3 +196,49 @@ def _is_in_entry(attribute: Attribute) -> bool:
 
 def _present(element: Element, names: tuple[str, ...]) -> Iterator[Attribute]:
     return (element.attributes[name] for name in names if name in element.attributes)
+
+
+def _may_be_state(part: Part, child: Part) -> bool:
+    """Tell whether a bare name stands beside a dotted one: `navigation.flight_status == IN_AIR`."""
+    if not isinstance(part, Comparison) or not isinstance(child, Name):
+        return False
+    return any(isinstance(other, Name) and "." in other.name for other in part.operands)
+
+
+def _written(value: Part) -> str:
+    """Return what a script's expression gives, as far as it can be told."""
+    match value:
+        case Literal():
+            return TEXT if isinstance(value.value, str) else NUMBER
+        case Comparison() | Prefix():
+            return NUMBER
+        case Chain(operators=operators):
+            return TEXT if ".." in operators else UNKNOWN if "+" in operators else NUMBER
+        case Conditional():
+            then, otherwise = _written(value.then), _written(value.otherwise)
+            return then if then == otherwise else UNKNOWN
+        case _:
+            return UNKNOWN
+
+
+def _set_type(wiring: Wiring, source: str) -> str:
+    text = wiring.ports.get(source) or ""
+    if pointer(text, source) is not None:
+        return UNKNOWN
+    try:
+        float(text)
+    except ValueError:
+        return TEXT
+    return UNKNOWN  # a text, which any number's port reads
+
+
+def _type_name(port: Port) -> str:
+    return UNKNOWN if port.type is ANY else port.type.name
+
+
+def _constants(wiring: Wiring) -> Iterator[Access]:
+    """Yield what a subtree's use writes into the entries of the subtree: `<SubTree ID="leg" height="3"/>`."""
+    for child in wiring.children:
+        for name, text in plain_inside(wiring).items():
+            attribute = wiring.element.attributes.get(name) or Attribute(name, text, wiring.element.place)
+            yield Access((child.blackboard, name), name, True, attribute)

@@ -98,10 +98,10 @@ class Wiring:
         """Whether it may take several ticks, its children aside; None: nobody knows."""
         return self.type.may_run if self.is_whole else None
 
-    @cached_property
+    @property
     def ticking(self) -> Ticking:
         """How it ticks its children."""
-        return self.described.known_ticking() if self.described else ANY_TICKING
+        return self.type.ticking if self.is_whole else ANY_TICKING
 
     def port_attributes(self) -> Iterator[Attribute]:
         """Yield the attributes of its element that are ports."""

@@ -10,6 +10,7 @@ from typing import TYPE_CHECKING, TypeGuard
 
 from alula.common.public import public
 from alula.trees.errors import Place
+from alula.trees.ticking import ANY_TICKING, Ticking
 from alula.trees.values import ANY, STRING, PortType
 
 if TYPE_CHECKING:
@@ -120,6 +121,11 @@ class NodeType:
         """The class of its nodes where that tells how they end (`Node.is_described`), else None: they may do anything."""
         known = self.tells or self.make
         return known if _is_class(known) and known.is_described() else None
+
+    @cached_property
+    def ticking(self) -> Ticking:
+        """How its nodes tick their children."""
+        return self.described.known_ticking() if self.described else ANY_TICKING
 
     @property
     def may_run(self) -> bool | None:

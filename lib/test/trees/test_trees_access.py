@@ -5,6 +5,7 @@ from __future__ import annotations
 import pytest
 
 from alula.trees.access import (
+    Accesses,
     named_entries,
     scripts_after,
     scripts_before,
@@ -15,10 +16,12 @@ from alula.trees.access import (
 )
 from alula.trees.document import Element
 from alula.trees.factory import build_tree
+from alula.trees.node import Shared
 from alula.trees.palette import NodeType
 from alula.trees.reading import read_text
 from alula.trees.script import names_in, statements_of
 from alula.trees.standard import standard_palette
+from alula.trees.wiring import wire
 
 
 def node(line: str) -> tuple[Element, NodeType]:
@@ -57,3 +60,21 @@ def test_what_ports_name_is_told_apart_by_whether_it_is_written() -> None:
 def test_a_script_that_can_not_be_read_has_no_statements() -> None:
     assert statements_of("a := ") == statements_of("") == ()
     assert names_in([*statements_of("a := b"), *statements_of("c += 1; running(x.y)")]).read == {"b", "c"}
+
+
+def test_accesses_come_in_their_order_and_say_what_is_needed() -> None:
+    files = read_text(
+        '<root BTCPP_format="4" main_tree_to_execute="a"><BehaviorTree ID="a"><Sequence _onSuccess="n += RED">'
+        '<SetBlackboard value="{n}" output_key="m"/><SubTree ID="b" k="3" l="{m}"/></Sequence></BehaviorTree>'
+        '<BehaviorTree ID="b"><ScriptCondition code="k == l &amp;&amp; x.y == k &amp;&amp; f(k)"/></BehaviorTree></root>'
+    )
+    root = wire(files, standard_palette(), "a", Shared(int))
+    inside = root.children[1].children[0].blackboard
+    found = [(one.key, one.write, one.needed, one.in_passing) for one in Accesses(lambda one: statements_of(one.value), {"RED"}).of(root)]
+    n, m, k = (root.blackboard, "n"), (root.blackboard, "m"), (inside, "k")
+    read, written = (False, True, False), (True, True, False)
+    assert found == [
+        *((n, *read), (m, *written)),
+        *((k, *written), (k, *read), (m, *read), (k, False, False, False)),
+        *((n, False, True, True), (n, *written)),
+    ]
