@@ -45,7 +45,7 @@ ROOT = Path(__file__).resolve().parents[1]
 NODE = ROOT / "tests/support/alula_testing/base_node.py"
 FILE = """ros1: {{master: "http://{master}", address: {address}}}
 ros2: {{domain: {domain}, discovery: {discovery}}}
-managers: {{rover: python -m rover_robot.hooks}}
+managers: {{rover: "rover_robot.hooks:make_hooks"}}
 bridge: rover_bridge.yaml
 record: {{topics: [/rover/odom], disk_gb: 0.1}}
 """
@@ -302,8 +302,8 @@ def test_multicast_of_an_interface_that_does_not_take_it() -> None:
 
 
 def test_a_manager_that_runs_and_is_not_seen() -> None:
-    (found,) = dds.look_at_servers({"rover": [], "arm": []}, {"rover", "bridge"}, 7)
-    assert found.what == "the manager of rover runs here, and is not seen in domain 7"
+    (found,) = dds.look_at_servers({"rover": [], "arm": []}, {"rover"}, 7)
+    assert found.what == "the managers of rover run here, and are not seen in domain 7"
 
 
 def test_shared_memory_without_room(tmp_path: Path) -> None:

@@ -141,7 +141,8 @@ LAYER = """<launch>
     <arg name="world" value="$(env ALULA_ROBOT)/worlds/office.yaml"/>
     <arg name="rate" value="1"/>
   </include>
-  <node pkg="skillset_ros1" type="in_ros2" name="base" args="python -m rover_robot.serve base --ros-args -p use_sim_time:=true"/>
+  <node pkg="skillset_ros1" type="in_ros2" name="managers"
+        args="python -m skillset_ros2.managers base=rover_robot.hooks.base:make_hooks --ros-args -p use_sim_time:=true"/>
   <node pkg="skillset_ros1" type="in_ros2" name="ros_bridge"
         args="python -m ros_bridge --config $(env ALULA_ROBOT_STATE)/generated/rover_bridge.yaml"/>
 </launch>

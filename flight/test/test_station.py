@@ -19,7 +19,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from alula.common.deployments import Deployment, DeploymentError, Discovery, Page, PageUsers, load_deployment
+from alula.common.deployments import Deployment, DeploymentError, Discovery, Page, PageUsers, Processes, load_deployment
 from alula.common.errors import AlulaError
 from alula.common.network import free_port
 from alula.common.robots import VARIABLE as ROBOT
@@ -128,8 +128,32 @@ def test_managers_are_told_the_silences_that_the_deployment_gives_their_resource
     managers = {"base": ("python", "-m", "x"), "base2": ("python", "-m", "y")}
     given = replace(deployment, managers=managers, silences={"base.link": 4.0, "base2.estop": 1.5})
     parts = {part.name: part.words for part in parts_of(given, places, "id", {})}
-    assert parts["base"][-5:] == ("x", "--ros-args", "-p", "silence.link:=4.0", "__name:=base")
-    assert parts["base2"][-4:] == ("--ros-args", "-p", "silence.estop:=1.5", "__name:=base2")
+    assert parts["base"][-5:] == ("x", "--ros-args", "-p", "silence.base.link:=4.0", "__name:=base")
+    assert parts["base2"][-4:] == ("--ros-args", "-p", "silence.base2.estop:=1.5", "__name:=base2")
+
+
+@pytest.mark.parametrize(
+    ("processes", "words"),
+    [
+        (Processes.SINGLE, {"managers": "managers base=b:make arm=a:make --ros-args -p silence.arm.link:=4.0"}),
+        (Processes.SKILLSETS, {"base": "managers base=b:make", "arm": "managers arm=a:make --ros-args -p silence.arm.link:=4.0"}),
+        (
+            Processes.SEPARATE,
+            {
+                "base": "managers base=b:make --processes separate",
+                "arm": "managers arm=a:make --processes separate --ros-args -p silence.arm.link:=4.0",
+            },
+        ),
+    ],
+)
+def test_managers_whose_hooks_maker_is_named_share_as_many_processes_as_the_deployment_says(deployment, places, processes, words):
+    managers = {"base": ("b:make",), "gripper": ("./gripper",), "arm": ("a:make",)}
+    given = replace(deployment, managers=managers, processes=processes, silences={"arm.link": 4.0})
+    parts = {part.name: " ".join(part.words) for part in parts_of(given, places, "id", {})}
+    assert parts.keys() == set(given.parts) == {*words, "gripper"}
+    for part, said in words.items():
+        assert parts[part].endswith(f"in_ros2 python -m skillset_ros2.{said} __name:={part}")
+    assert parts["gripper"].endswith("in_ros2 ./gripper __name:=gripper")
 
 
 def test_a_silence_of_what_has_none_in_its_model_begins_nothing(robot, capsys):
@@ -194,18 +218,18 @@ def pieces(robot):
 @pytest.mark.parametrize(
     ("path", "old", "new", "part", "told"),
     [
-        ("skillsets/rover.skill", "silence = 2.0", "silence = 3.0", "rover", ["changed: resource link"]),
-        ("skillsets/rover.skill", "STUCK: apply", "JAMMED: apply", "rover", ["changed: skill drive, skill back_off"]),
-        ("skillsets/rover.skill", "resource bumper", "resource bumper2", "rover", None),
-        ("skillsets/bindings.yaml", "/rover/odom", "/rover/odometry", "rover", ["changed: binding of odometry"]),
+        ("skillsets/rover.skill", "silence = 2.0", "silence = 3.0", "managers", ["changed: resource link of rover"]),
+        ("skillsets/rover.skill", "STUCK: apply", "JAMMED: apply", "managers", ["changed: skill drive of rover, skill back_off of rover"]),
+        ("skillsets/rover.skill", "resource bumper", "resource bumper2", "managers", None),
+        ("skillsets/bindings.yaml", "/rover/odom", "/rover/odometry", "managers", ["changed: binding of rover.odometry"]),
         (
             "ros2_ws/src/rover_robot/rover_robot/hooks.py",
             "SILENT_AFTER_S = ",
             "SILENT_AFTER_S = 1 + ",
-            "rover",
+            "managers",
             ["changed: ros2_ws/src/rover_robot/rover_robot/hooks.py"],
         ),
-        ("skillsets/rover.skill", "// Drives straight on.", "// Drives on.", "rover", []),
+        ("skillsets/rover.skill", "// Drives straight on.", "// Drives on.", "managers", []),
         (BRIDGE_YAML, "cmd_vel, depth: 5", "cmd_vel, depth: 9", "bridge", ["changed: topic /rover/cmd_vel"]),
         (
             ".alula/generated/rover_bridge.yaml",
@@ -230,17 +254,17 @@ def test_a_change_of_a_model_a_binding_or_a_hook_is_named_by_what_it_is(robot, p
 
 
 def test_what_runs_is_compared_with_what_is_here_now(robot):
-    before = pieces(robot)["rover"]
+    before = pieces(robot)["managers"]
     station = Station("robot")
     assert station.differences() == {}, "nothing runs"
     words = {part.name: part for part in parts_of(station.deployment, station.places, "id", os.environ)}
     me = {"pid": os.getpid(), "start": start_of(os.getpid())}
-    runs = PartState(**me, words=words["rover"].words, graph=graph_of(words["rover"]), contents=before)
+    runs = PartState(**me, words=words["managers"].words, graph=graph_of(words["managers"]), contents=before)
     station.folder.mkdir(parents=True)
-    StationState("id", parts={"rover": runs}).save(station.folder)
+    StationState("id", parts={"managers": runs}).save(station.folder)
     assert station.differences() == {}
     edited(robot / "skillsets/rover.skill", "silence = 2.0", "silence = 3.0")
-    assert station.differences() == {"rover": ["changed: resource link"]}
+    assert station.differences() == {"managers": ["changed: resource link of rover"]}
 
 
 def test_a_part_is_started_again_that_was_started_with_something_else(kept):

@@ -20,7 +20,7 @@ from pathlib import Path
 import psutil
 
 from alula.cli.table import parse
-from alula.common.deployments import deployment_names
+from alula.common.deployments import Deployment, deployment_names
 from alula.common.errors import AlulaError
 from alula.common.files import json_line, write_text
 from alula.common.robots import RobotFolder, find_robot
@@ -51,10 +51,15 @@ def look_at_parts(station: Station) -> Iterator[Finding]:
             yield ok(PARTS, f"{part} runs, process {one.pid}{f'; it has died {one.deaths} times' if one.deaths else ''}")
     for other in deployment_names():
         beside = None if other == name else Station(other)
-        twice = [] if beside is None else sorted(set(beside.deployment.parts) & set(station.deployment.parts) - {"page", "recorder"})
+        twice = [] if beside is None else sorted(_work(beside.deployment) & _work(station.deployment))
         if beside is not None and twice and beside.is_up and beside.deployment.domain == station.deployment.domain:
             what = f"{other} is up in the same DDS domain, and serves {', '.join(twice)}, too"
             yield problem(PARTS, what, f"alula down {other}, or give one of the two another `domain`")
+
+
+def _work(deployment: Deployment) -> set[str]:
+    """Return what only one deployment in a graph can do: serve a skillset, and carry what crosses."""
+    return {*deployment.managers, *(["bridge"] if deployment.bridge else [])}
 
 
 def examine(station: Station, robot: RobotFolder) -> list[Finding]:

@@ -148,11 +148,12 @@ def look_at_graph(deployment: Deployment, running: Iterable[str]) -> Iterator[Fi
     finally:
         rclpy.try_shutdown()
     yield ok(ROS2, f"DDS domain {deployment.domain}: {f'{len(nodes)} nodes, {listed(nodes)}' if nodes else 'nobody is there'}")
-    yield from look_at_servers(servers, set(running), deployment.domain)
+    here = {name for part in running for name in deployment.served.get(part, ())}
+    yield from look_at_servers(servers, here, deployment.domain)
 
 
 def look_at_servers(servers: Mapping[str, list[str]], running: set[str], domain: int) -> Iterator[Finding]:
-    """Yield which skillsets are served twice, and which are not seen though their manager runs here."""
+    """Yield which skillsets are served twice, and which are not seen though their managers run here: those in ``running``."""
     for name, nodes in servers.items():
         if len(nodes) > 1:
             yield problem(
@@ -163,7 +164,7 @@ def look_at_servers(servers: Mapping[str, list[str]], running: set[str], domain:
         elif not nodes and name in running:
             yield problem(
                 ROS2,
-                f"the manager of {name} runs here, and is not seen in domain {domain}",
+                f"the managers of {name} run here, and are not seen in domain {domain}",
                 "alula up again: it was started in another graph; what it says is in its log (alula status)",
             )
 

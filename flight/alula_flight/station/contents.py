@@ -10,7 +10,7 @@ from pathlib import Path
 
 import yaml
 
-from alula.common.deployments import Deployment
+from alula.common.deployments import Deployment, makes_hooks
 from alula.common.robots import RobotFolder
 from alula.language.fleet import load_models
 from alula.language.robot import Robot
@@ -41,8 +41,9 @@ def with_contents(parts: Sequence[Part], deployment: Deployment, places: Places,
         pieces: dict[str, object] = {}
         if part.name == "bridge":
             pieces.update(_of_bridge(bridge_file(deployment, places)))
-        if models is not None and part.name in deployment.managers:
-            pieces.update(_of_managers(part.name, deployment.managers[part.name], models, robot))
+        if models is not None:
+            for name in deployment.served.get(part.name, ()):
+                pieces.update(_of_managers(name, deployment.managers[name], models, robot))
         found.append(replace(part, contents={name: digest(value) for name, value in pieces.items()}))
     return found
 
@@ -73,11 +74,11 @@ def _of_bridge(path: Path) -> Iterator[tuple[str, object]]:
 def _of_managers(name: str, words: Sequence[str], models: Robot, robot: RobotFolder) -> Iterator[tuple[str, object]]:
     skillset = next((one for one in models.skillsets if one.name == name), None)
     if skillset is not None:
-        yield from _of_model(skillset)
+        yield from ((f"{what} of {name}", piece) for what, piece in _of_model(skillset))
     for (owner, data), source in models.bindings.data.items():
         if owner == name:
-            yield f"binding of {data}", str(source)
-    module = words[words.index("-m") + 1] if "-m" in words[:-1] else ""
+            yield f"binding of {name}.{data}", str(source)
+    module = words[0].partition(":")[0] if makes_hooks(words) else words[words.index("-m") + 1] if "-m" in words[:-1] else ""
     package = module.partition(".")[0]
     for path in sorted(robot.root.glob(f"ros2_ws/src/*/{package}/**/*.py")) if package else ():
         yield str(path.relative_to(robot.root)), path.read_text(encoding="utf-8", errors="replace")
@@ -88,4 +89,4 @@ def _of_model(skillset: Skillset) -> Iterator[tuple[str, object]]:
     for section, what in PIECES.items():
         for one in model.pop(section):
             yield f"{what} {one['name']}", one
-    yield "types of the model", model
+    yield "types", model

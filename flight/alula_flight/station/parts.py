@@ -9,7 +9,7 @@ from dataclasses import dataclass, field
 from ipaddress import ip_address
 from pathlib import Path
 
-from alula.common.deployments import Deployment, DeploymentError, Discovery, PageUsers
+from alula.common.deployments import Deployment, DeploymentError, Discovery, PageUsers, Processes, makes_hooks
 from alula.common.processes import NAMESPACE_VARIABLE, RUN_ID_VARIABLE
 from alula.common.robots import RobotFolder
 from alula.common.runs import up_folder
@@ -118,9 +118,7 @@ def parts_of(deployment: Deployment, places: Places, run_id: str, caller: Mappin
         stats = str(places.logs / "bridge.json")
         words = ("python", "-m", "ros_bridge", "--config", str(bridge_file(deployment, places)), "--stats", stats)
         parts.append(Part("bridge", places.in_ros2("ros_bridge", *words), ours))
-    parts += [
-        Part(name, places.in_ros2(name, *words, *silence_words(deployment, name)), ours) for name, words in deployment.managers.items()
-    ]
+    parts += [Part(name, places.in_ros2(name, *manager_words(deployment, name)), ours) for name in deployment.served]
     if deployment.topics:
         parts.append(
             Part("recorder", places.in_ros1(*recording(places.bags / deployment.name, deployment.topics, all_the_time=True)), ours)
@@ -133,10 +131,15 @@ def parts_of(deployment: Deployment, places: Places, run_id: str, caller: Mappin
     return parts
 
 
-def silence_words(deployment: Deployment, skillset: str) -> list[str]:
-    """Return what the managers of a skillset are told of the silences that the deployment gives its resources."""
-    given = {name.removeprefix(f"{skillset}."): s for name, s in deployment.silences.items() if name.startswith(f"{skillset}.")}
-    return ["--ros-args", *(word for name, s in given.items() for word in ("-p", f"silence.{name}:={s!r}"))] if given else []
+def manager_words(deployment: Deployment, part: str) -> list[str]:
+    """Return the command of a process of managers; it is told the silences that the deployment gives its resources."""
+    skillsets, commands = deployment.served[part], deployment.managers
+    words = list(commands[skillsets[0]])
+    if makes_hooks(words):
+        words = ["python", "-m", "skillset_ros2.managers", *(f"{name}={commands[name][0]}" for name in skillsets)]
+        words += ["--processes", "separate"] if deployment.processes is Processes.SEPARATE else []
+    given = {name: s for name, s in deployment.silences.items() if name.partition(".")[0] in skillsets}
+    return [*words, *(["--ros-args", *(word for name, s in given.items() for word in ("-p", f"silence.{name}:={s!r}"))] if given else [])]
 
 
 def check_silences(deployment: Deployment, skillsets: Iterable[Skillset]) -> None:

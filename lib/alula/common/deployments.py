@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import re
 import shlex
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
 from enum import Enum
 from ipaddress import ip_address
@@ -19,7 +19,7 @@ from alula.common.robots import RobotError, RobotFolder, find_robot
 from alula.common.suggestions import nearest
 
 FOLDER = "deployments"
-KEYS = ("about", "ros1", "ros2", "managers", "silence", "bridge", "record", "page")
+KEYS = ("about", "ros1", "ros2", "managers", "processes", "silence", "bridge", "record", "page")
 ROS1_KEYS, ROS2_KEYS = ("master", "address"), ("domain", "discovery", "peers", "namespace")
 RECORD_KEYS, PAGE_KEYS = ("topics", "disk_gb"), ("users", "address", "port")
 LOOPBACK = "127.0.0.1"
@@ -30,6 +30,7 @@ SHORTEST_SILENCE_S, LONGEST_SILENCE_S = 1.0, 3600.0
 EnumT = TypeVar("EnumT", bound=Enum)
 _WORD = re.compile(r"[a-z][a-z0-9_]*")
 _TOPIC = re.compile(r"/[A-Za-z][A-Za-z0-9_/]*")
+_FACTORY = re.compile(r"[A-Za-z_][A-Za-z0-9_.]*:[A-Za-z_][A-Za-z0-9_]*")
 _HOST = re.compile(r"[A-Za-z0-9]([A-Za-z0-9.-]*[A-Za-z0-9])?")
 
 
@@ -43,6 +44,14 @@ class Discovery(Enum):
     LOCALHOST = "LOCALHOST"
     SUBNET = "SUBNET"
     OFF = "OFF"
+
+
+class Processes(Enum):
+    """In how many processes the managers run whose deployment or launch file names the makers of their hooks."""
+
+    SINGLE = "single"  # all in one
+    SKILLSETS = "skillsets"  # one for each skillset
+    SEPARATE = "separate"  # one for each skillset and one for each of its skills
 
 
 class PageUsers(Enum):
@@ -76,7 +85,9 @@ class Deployment:
         discovery: how far nodes of ROS 2 look for one another.
         peers: addresses of computers that are found without multicast.
         namespace: what the robot's names in ROS 2 begin with, as ``/rover``; empty: nothing.
-        managers: the commands that serve the skillsets here, each as words, by the skillset's name.
+        managers: what serves each skillset here, by its name: the maker of its hooks, one word ``MODULE:FACTORY``, or the words of a
+            command, which has a process of its own.
+        processes: in how many processes managers run whose hooks' maker is named.
         silences: seconds after which a resource whose reporter is not heard of is unknown, by its name as ``rover.estop``, where this link
             needs another time than the model says.
         bridge: the bridge's configuration: one that set-up generates, by its name, or a file of the robot; empty: it runs elsewhere.
@@ -95,6 +106,7 @@ class Deployment:
     peers: tuple[str, ...] = ()
     namespace: str = ""
     managers: Mapping[str, tuple[str, ...]] = field(default_factory=dict)
+    processes: Processes = Processes.SINGLE
     silences: Mapping[str, float] = field(default_factory=dict)
     bridge: str = ""
     topics: tuple[str, ...] = ()
@@ -102,18 +114,31 @@ class Deployment:
     page: Page | None = None
 
     @property
+    def served(self) -> Mapping[str, tuple[str, ...]]:
+        """Return the skillsets that each process of managers serves, by the part's name."""
+        together = tuple(name for name, words in self.managers.items() if self.processes is Processes.SINGLE and makes_hooks(words))
+        return {**({MANAGERS: together} if together else {}), **{name: (name,) for name in self.managers if name not in together}}
+
+    @property
     def parts(self) -> tuple[str, ...]:
         """Return the names of what runs here, in the order of the start."""
         return (
             *(["bridge"] if self.bridge else []),
-            *self.managers,
+            *self.served,
             *(["recorder"] if self.topics else []),
             *(["page"] if self.page else []),
         )
 
 
-RESERVED = ("bridge", "recorder", "page", "mission")
-"""Names of parts that no manager can have."""
+MANAGERS = "managers"
+"""The part whose process serves all skillsets that have none of their own."""
+RESERVED = ("bridge", MANAGERS, "recorder", "page", "mission")
+"""Names of parts that no skillset can have."""
+
+
+def makes_hooks(words: Sequence[str]) -> bool:
+    """Tell whether what serves a skillset is the maker of its hooks, and no command."""
+    return len(words) == 1 and _FACTORY.fullmatch(words[0]) is not None
 
 
 def deployment_names(robot: RobotFolder | None = None) -> list[str]:
@@ -160,6 +185,7 @@ def read_deployment(path: Path) -> Deployment:
         peers=tuple(_host(one, "a peer") for one in ros2["peers"].elements()) if "peers" in ros2 else (),
         namespace=_namespace(ros2["namespace"]) if "namespace" in ros2 else "",
         managers=_managers(said["managers"]) if "managers" in said else {},
+        processes=_one_of(Processes, said["processes"], "`processes`") if "processes" in said else Processes.SINGLE,
         silences=_silences(said["silence"], said.get("managers")) if "silence" in said else {},
         bridge=said["bridge"].text("`bridge`") if "bridge" in said else "",
         topics=tuple(_topic(one) for one in record["topics"].elements()) if "topics" in record else (),
@@ -249,7 +275,7 @@ def _managers(part: Located) -> dict[str, tuple[str, ...]]:
         except ValueError as error:
             raise command.wrong(f"the command of {name}: {error}") from None
         if not words:
-            raise command.wrong(f"the command of {name} is empty; write one as python -m my_robot.hooks")
+            raise command.wrong(f"what serves {name} is empty; name the maker of its hooks, as my_robot.hooks:make_hooks")
         found[name] = tuple(words)
     return found
 

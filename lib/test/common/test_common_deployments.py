@@ -27,7 +27,7 @@ WHOLE = """\
 about: two computers
 ros1: {master: "http://192.168.1.10:11311/", address: 192.168.1.20}
 ros2: {domain: 7, discovery: SUBNET, peers: [192.168.1.30], namespace: rover}
-managers: {base: "python -m rover_skills.base --processes separate", arm: ./arm}
+managers: {base: "rover_skills.base:make", arm: ./arm, lift: "rover_skills.lift:make"}
 bridge: rover_bridge.yaml
 record: {topics: [/odom, /scan], disk_gb: 2.5}
 page: {users: operators, address: 192.168.1.20, port: 8441}
@@ -52,13 +52,14 @@ def test_all_that_a_file_may_say_is_read(tmp_path):
         discovery=Discovery.SUBNET,
         peers=("192.168.1.30",),
         namespace="/rover",
-        managers={"base": ("python", "-m", "rover_skills.base", "--processes", "separate"), "arm": ("./arm",)},
+        managers={"base": ("rover_skills.base:make",), "arm": ("./arm",), "lift": ("rover_skills.lift:make",)},
         bridge="rover_bridge.yaml",
         topics=("/odom", "/scan"),
         disk_gb=2.5,
         page=Page(PageUsers.OPERATORS, "192.168.1.20", 8441),
     )
-    assert read(tmp_path, WHOLE).parts == ("bridge", "base", "arm", "recorder", "page")
+    assert read(tmp_path, WHOLE).parts == ("bridge", "managers", "arm", "recorder", "page")
+    assert read(tmp_path, f"{WHOLE}processes: skillsets\n").parts == ("bridge", "base", "arm", "lift", "recorder", "page")
 
 
 def test_what_is_left_out_does_not_run_here_and_all_binds_to_loopback(tmp_path):
@@ -96,7 +97,9 @@ def test_what_is_left_out_does_not_run_here_and_all_binds_to_loopback(tmp_path):
         ("ros1: {master: 'http://127.0.0.1:11311'}\nros2: {peers: [10.0.0.1]}\n", ":2", "not found with `discovery: LOCALHOST`"),
         ("ros1: {master: 'http://127.0.0.1:11311'}\nros2: {namespace: 1-2}\n", ":2", "`namespace` should be a name"),
         (f"{LEAST}managers: {{page: x}}\n", ":3", "`page` names no skillset"),
-        (f"{LEAST}managers: {{base: ''}}\n", ":3", "the command of base is empty"),
+        (f"{LEAST}managers: {{managers: x}}\n", ":3", "`managers` names no skillset"),
+        (f"{LEAST}managers: {{base: ''}}\n", ":3", "what serves base is empty; name the maker of its hooks"),
+        (f"{LEAST}processes: many\n", ":3", "`processes` is not many; it may be single, skillsets, separate"),
         (f"{LEAST}managers: {{base: '\"x'}}\n", ":3", "the command of base: No closing quotation"),
         (f"{LEAST}record: {{topics: odom}}\n", ":3", "should be a whole name"),
         (f"{LEAST}record: {{disk_gb: 0}}\n", ":3", "`disk_gb` should be a number from 0.1"),
@@ -143,5 +146,5 @@ def test_a_name_that_is_not_there_is_refused_with_those_that_are(tmp_path):
 def test_a_new_robots_deployment_runs_all_here_and_tells_every_key(tmp_path):
     text = files_of("rover")["deployments/robot.yaml"]
     made = read(tmp_path, text)
-    assert made.parts == ("bridge", "rover", "recorder", "page")
+    assert made.parts == ("bridge", "managers", "recorder", "page")
     assert all(f"{key}:" in text for key in (*KEYS, *ROS1_KEYS, *ROS2_KEYS, *RECORD_KEYS, *PAGE_KEYS))

@@ -14,12 +14,4 @@ setup(
     maintainer_email="developers@alula.example.org",
     description="What the drone's skills do",
     license="Apache-2.0",
-    entry_points={
-        "console_scripts": [
-            "navigation_skillset = uav_skills.navigation:main_navigation",
-            "perception_skillset = uav_skills.perception:main_perception",
-            "mapping_skillset = uav_skills.mapping:main_mapping",
-            "video_skillset = uav_skills.video:main_video",
-        ],
-    },
 )

@@ -19,7 +19,7 @@ from alula.common.record import EVENTS, FILE, RecordFollower, read_record
 from alula_testing.waits import until
 
 ALULA_ROOT = Path(__file__).resolve().parents[3]
-PARTS = ("bridge", "rover", "recorder", "page")
+PARTS = ("bridge", "managers", "recorder", "page")
 END_S = 60.0
 Run = Callable[[str], str]
 
@@ -84,8 +84,8 @@ def _two_missions(robot: Path, run: Run) -> None:
     assert processes(run) == begun
     hooks = "ros2_ws/src/rover_robot/rover_robot/hooks.py"
     (robot / hooks).write_text(f"{(robot / hooks).read_text(encoding='utf-8')}\n# Tuned on the robot.\n", encoding="utf-8")
-    assert f"rover is started again, changed: {hooks}\n" in run("alula up robot 2>&1")
-    assert [name for name, pid in processes(run).items() if pid != begun[name]] == ["rover"]
+    assert f"managers is started again, changed: {hooks}\n" in run("alula up robot 2>&1")
+    assert [name for name, pid in processes(run).items() if pid != begun[name]] == ["managers"]
     until(lambda: json.loads(run("alula skills --json"))["resources"] == known, "the new managers know the resources")
 
 

@@ -3,13 +3,12 @@
 from __future__ import annotations
 
 import argparse
-import importlib
 import sys
 from types import ModuleType
 
 from alula.model.model import Skillset
 from alula.runtime.managers import DataBindings
-from skillset_ros2.node import HooksFactory
+from skillset_ros2.managers import find_factory
 from skillset_ros2.spin import run_skillset
 
 
@@ -24,14 +23,3 @@ def main(skillset: Skillset, interfaces: ModuleType, data_bindings: DataBindings
         parser.error(f"--hooks {options.hooks}: {error}")
     again = ["--hooks", options.hooks] if options.hooks else []
     run_skillset(skillset, interfaces, hooks_factory, data_bindings=data_bindings, arguments=words, again=again)
-
-
-def find_factory(place: str) -> HooksFactory:
-    """Return the function ``MODULE:FACTORY`` that makes the hooks of a node; raise ImportError or ValueError when there is none."""
-    module, _, name = place.partition(":")
-    if not name:
-        raise ValueError("it should be MODULE:FACTORY, as rover_skills.base:make_hooks")
-    found: HooksFactory | None = getattr(importlib.import_module(module), name, None)
-    if not callable(found):
-        raise ValueError(f"{module} has no function {name}")  # noqa: TRY004 - a slip in the place that was given
-    return found

@@ -27,7 +27,7 @@ WITHOUT_PARAMETER_SERVICES = {"start_parameter_services": False}
 class SkillsetNode(Node):  # type: ignore[misc]  # rclpy has no types
     """The data manager, the resource manager and the skill managers of a skillset; the node has the skillset's name.
 
-    Parameters: ``interrupt_timeout_s``, ``hook_timeout_s``, and ``silence.RESOURCE`` in seconds for each resource that has one.
+    Parameters: ``interrupt_timeout_s``, ``hook_timeout_s``, and ``silence.SKILLSET.RESOURCE`` in seconds for each that has one.
     Hooks are called on threads of their own; the executor never waits for one.
 
     Args:
@@ -55,7 +55,7 @@ class SkillsetNode(Node):  # type: ignore[misc]  # rclpy has no types
     ) -> None:
         super().__init__(skillset.name, **WITHOUT_PARAMETER_SERVICES | node_options)
         self._simulated_time = SimulatedTime(self)
-        given_s = lambda name, model_s: float(self.declare_parameter(f"silence.{name}", model_s).value)  # noqa: E731
+        given_s = lambda name, model_s: float(self.declare_parameter(f"silence.{skillset.name}.{name}", model_s).value)  # noqa: E731
         self.skillset = skillset = with_silences(skillset, given_s)
         self.served_skills = tuple(skill.name for skill in skillset.skills)
         for name in self.served_skills:

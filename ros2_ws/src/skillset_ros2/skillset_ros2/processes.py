@@ -1,4 +1,4 @@
-"""Runs each part of a skillset in a process of its own, and restarts what has ended."""
+"""Runs each part of skillsets in a process of its own, and restarts what has ended."""
 
 from __future__ import annotations
 
@@ -9,7 +9,7 @@ import subprocess
 import sys
 import threading
 import time
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 
 RESOURCES = "resources"
 RESTART_S = 0.2
@@ -101,17 +101,25 @@ class Part:
         return code
 
 
-def supervise(skillset: str, skills: Sequence[str], words: Sequence[str], stop: threading.Event) -> int:
-    """Run all parts until ``stop``, or until one is of no use to restart; return the exit code."""
-    names = [RESOURCES, *skills]
-    parts = [Part(f"{skillset} {name}", own_command(["--part", name, *words]), stop) for name in names]
-    for part in parts:
+def supervise(skillsets: Mapping[str, Sequence[str]], words: Mapping[str, Sequence[str]], stop: threading.Event) -> int:
+    """Run all parts of skillsets until ``stop``, or until one is of no use to restart; return the exit code.
+
+    Args:
+        skillsets: the names of the skills of each.
+        words: of the command line of a part of each.
+        stop: ends it.
+    """
+    resources, skills = (
+        [Part(f"{skillset} {name}", own_command(["--part", name, *words[skillset]]), stop) for skillset, names in groups for name in names]
+        for groups in ([(skillset, [RESOURCES]) for skillset in skillsets], skillsets.items())
+    )
+    for part in (*resources, *skills):
         part.start()
     wait_for(stop)
     # The skill managers first: their functions are stopped through the resource manager.
-    for group in (parts[1:], parts[:1]):
+    for group in (skills, resources):
         for part in group:
             part.end()
         for part in group:
             part.join()
-    return next((part.code for part in parts if part.code), 0)
+    return next((part.code for part in (*resources, *skills) if part.code), 0)

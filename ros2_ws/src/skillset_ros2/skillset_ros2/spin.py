@@ -1,4 +1,4 @@
-"""The main function of a skillset's process."""
+"""The main function of a process that serves skillsets."""
 
 from __future__ import annotations
 
@@ -11,6 +11,7 @@ import threading
 import time
 import traceback
 from collections.abc import Callable, Sequence
+from dataclasses import dataclass
 from types import FrameType, ModuleType
 
 import rclpy
@@ -43,6 +44,25 @@ END_LIMIT_S = 30.0
 ALL = "all"
 
 
+@dataclass(frozen=True)
+class Served:
+    """A skillset that a process serves.
+
+    Attributes:
+        skillset: the model.
+        interfaces: the generated package ``<skillset>_interfaces``, or its module ``action``.
+        hooks_factory: makes the hooks, one a skill.
+        data_bindings: where each data of the model comes from; None: as generated.
+        words: what the command line of a process for a part of it needs besides the options here.
+    """
+
+    skillset: Skillset
+    interfaces: ModuleType
+    hooks_factory: HooksFactory
+    data_bindings: DataBindings | None = None
+    words: tuple[str, ...] = ()
+
+
 def run_skillset(
     skillset: Skillset,
     interfaces: ModuleType,
@@ -57,7 +77,15 @@ def run_skillset(
     ``arguments`` (default: the command line) are ``--processes single|separate``, ``--part NAME`` to serve a part only, and those of
     ROS: ``--ros-args -p use_sim_time:=true``. Exits with 2 when they are wrong. ``again``: what else the command line of a part needs.
     """
-    options, words = _options(skillset, sys.argv[1:] if arguments is None else arguments)
+    run_skillsets([Served(skillset, interfaces, hooks_factory, data_bindings, tuple(again))], arguments)
+
+
+def run_skillsets(served: Sequence[Served], arguments: Sequence[str] | None = None) -> None:
+    """Serve skillsets, at least one, in this process, each on an executor of its own; otherwise as `run_skillset` does.
+
+    Where managers of one of them are there already, none is served.
+    """
+    options, words = _options([one.skillset for one in served], sys.argv[1:] if arguments is None else arguments)
     stop = StopEvent()
 
     def on_signal(number: int, frame: FrameType | None) -> None:  # noqa: ARG001
@@ -68,7 +96,8 @@ def run_skillset(
     if options.parent:
         end_with(options.parent)
     if options.processes == "separate" and options.part == ALL:
-        code = supervise(skillset.name, [skill.name for skill in skillset.skills], [*again, *words], stop)
+        parts = {one.skillset.name: [skill.name for skill in one.skillset.skills] for one in served}
+        code = supervise(parts, {one.skillset.name: [*one.words, *words] for one in served}, stop)
         if code:
             sys.exit(code)
         return
@@ -76,36 +105,45 @@ def run_skillset(
     sweep_shared_memory()
     # Our own handlers: rclpy's would shut the context down before the callers were told.
     rclpy.init(args=words, signal_handler_options=SignalHandlerOptions.NO)
+    address = pipe_address(os.environ.get("ROS_DOMAIN_ID", ""), *(one.skillset.name for one in served), *words)
+    refused = _serve(options.part, served, address, stop)
+    rclpy.try_shutdown()
+    faulthandler.cancel_dump_traceback_later()
+    if refused:
+        sys.stderr.write(f"{refused}\n")
+        sys.exit(REFUSED)
+
+
+def _serve(part: str, served: Sequence[Served], address: str, stop: threading.Event) -> str:
+    """Serve until ``stop``; return why managers refuse to, or ""."""
     refusals: list[str] = []
 
     def refuse(reason: str) -> None:
         refusals.append(reason)
         stop.set()
 
-    last: Node | None = None
+    nodes: list[Node] = []
     try:
-        if options.part in {ALL, RESOURCES}:
-            last = listen_for_rivals(skillset.name)
-        names = (os.environ.get("ROS_DOMAIN_ID", ""), skillset.name, *words)
-        address = "" if options.part == ALL else pipe_address(*names)
-        node = make_part(options.part, skillset, interfaces, hooks_factory, data_bindings, address=address, stop=stop, on_rival=refuse)
-        if node is not None:
-            if last is not None:
-                # Only now: the participant in DDS, which goes with the last node, is both nodes'.
-                last.destroy_node()
-            last = node
+        if part in {ALL, RESOURCES}:
+            nodes.append(listen_for_rivals([one.skillset.name for one in served]))
+        listening = list(nodes)
+        nodes += make_parts(part, served, address=address, stop=stop, on_rival=refuse)
+        for node in listening if len(nodes) > len(listening) else ():
+            # Only now: the participant in DDS, which goes with the last node, is that of all nodes.
+            nodes.remove(node)
+            node.destroy_node()
+        parts = [node for node in nodes if node not in listening]
+        for node in parts:
             warn_of_names_outside(node)
-            spin_until(node, stop, at_stop=_limit_the_end)
+        spin_all(parts, stop)
     except SkillRuntimeError as error:
         refuse(str(error))
     finally:
-        if last is not None:
-            leave(last)
-        rclpy.try_shutdown()
-        faulthandler.cancel_dump_traceback_later()
-    if refusals:
-        sys.stderr.write(f"{refusals[0]}\n")
-        sys.exit(REFUSED)
+        for node in nodes[:-1]:
+            node.destroy_node()
+        for node in nodes[-1:]:
+            leave(node)
+    return refusals[0] if refusals else ""
 
 
 def warn_of_names_outside(node: Node) -> None:
@@ -114,15 +152,16 @@ def warn_of_names_outside(node: Node) -> None:
         node.get_logger().warning(f"not in {node.get_namespace()}: {', '.join(outside)}; hooks write names without the slash in front")
 
 
-def listen_for_rivals(skillset: str) -> Node:
-    """Return the node that has heard no heartbeats of other managers of this skillset, before anything is done that might disturb them.
+def listen_for_rivals(skillsets: Sequence[str]) -> Node:
+    """Return the node that has heard no heartbeats of other managers of skillsets, before anything is done that might disturb them.
 
     Raises:
         SkillRuntimeError: There are some.
     """
-    node = Node(skillset, enable_rosout=False, start_parameter_services=False)
-    heard: list[object] = []
-    subscription = node.create_subscription(Heartbeat, f"{skillset}/alive", heard.append, latched(1))
+    node = Node(skillsets[0], enable_rosout=False, start_parameter_services=False)
+    heard: list[str] = []
+    for name in skillsets:
+        node.create_subscription(Heartbeat, f"{name}/alive", lambda _, name=name: heard.append(name), latched(1))
     executor = NodeExecutor()
     executor.add_node(node)
     end_s = time.monotonic() + LISTEN_FIRST_S
@@ -131,45 +170,61 @@ def listen_for_rivals(skillset: str) -> Node:
     executor.shutdown(timeout_sec=0)
     if heard:
         leave(node)
-        raise SkillRuntimeError(f"managers of {skillset} are there already; end them first")
-    node.destroy_subscription(subscription)
+        raise SkillRuntimeError(f"managers of {heard[0]} are there already; end them first")
+    for subscription in list(node.subscriptions):
+        node.destroy_subscription(subscription)
     return node
 
 
+def make_parts(
+    part: str, served: Sequence[Served], *, address: str, stop: threading.Event, on_rival: Callable[[str], None]
+) -> list[SkillsetNode | HooksNode]:
+    """Make the nodes of a part of each skillset, all or none; none, too, when ``stop`` came before. Raises SkillRuntimeError."""
+    made: list[SkillsetNode | HooksNode] = []
+    try:
+        for one in served:
+            node = make_part(part, one, address=address, stop=stop, on_rival=on_rival)
+            if node is None:
+                break
+            made.append(node)
+    except BaseException as error:  # also of a maker of hooks
+        for node in made:
+            node.close(str(error))
+            node.destroy_node()
+        raise
+    return made
+
+
 def make_part(
-    part: str,
-    skillset: Skillset,
-    interfaces: ModuleType,
-    hooks_factory: HooksFactory,
-    data_bindings: DataBindings | None,
-    *,
-    address: str,
-    stop: threading.Event,
-    on_rival: Callable[[str], None],
+    part: str, served: Served, *, address: str, stop: threading.Event, on_rival: Callable[[str], None]
 ) -> SkillsetNode | HooksNode | None:
     """Make the node of a part: ``all`` managers, the ``resources``' or the hooks of a skill; None when ``stop`` came before."""
+    skillset, interfaces, bindings = served.skillset, served.interfaces, served.data_bindings
     if part == ALL:
-        return SkillsetNode(skillset, interfaces, hooks_factory, data_bindings=data_bindings, on_rival=on_rival)
+        return SkillsetNode(skillset, interfaces, served.hooks_factory, data_bindings=bindings, on_rival=on_rival)
     if part != RESOURCES:
-        return HooksNode(skillset, part, hooks_factory, address)
+        return HooksNode(skillset, part, served.hooks_factory, address)
     hooks = RemoteHooks(skillset, address, get_logger(skillset.name).error)
     # A client that finds the skillset can call all of it.
     while hooks.wait(PROCESSES_S):
         if stop.is_set():
             return None
-    return SkillsetNode(skillset, interfaces, hooks, data_bindings=data_bindings, on_rival=on_rival)
+    return SkillsetNode(skillset, interfaces, hooks, data_bindings=bindings, on_rival=on_rival)
 
 
-def _options(skillset: Skillset, arguments: Sequence[str]) -> tuple[argparse.Namespace, list[str]]:
+def _options(skillsets: Sequence[Skillset], arguments: Sequence[str]) -> tuple[argparse.Namespace, list[str]]:
     """Return the options of this command and the words for ROS."""
     words = without_roslaunch(arguments)
     split = words.index(ROS_ARGUMENTS) if ROS_ARGUMENTS in words else len(words)
-    skills = [skill.name for skill in skillset.skills]
-    parser = argparse.ArgumentParser(description=f"Serve the skillset {skillset.name}.", epilog="ROS arguments follow after --ros-args.")
+    names = ", ".join(skillset.name for skillset in skillsets)
+    parts = [RESOURCES, *(skill.name for skill in skillsets[0].skills)] if len(skillsets) == 1 else []
+    parser = argparse.ArgumentParser(description=f"Serve {names}.", epilog="ROS arguments follow after --ros-args.")
     parser.add_argument(
         "--processes", choices=["single", "separate"], default="single", help="separate: each skill manager in a process of its own"
     )
-    parser.add_argument("--part", choices=[ALL, RESOURCES, *skills], default=ALL, metavar="PART", help=f"serve {RESOURCES} or a skill only")
+    parser.add_argument(
+        "--part", choices=[ALL, *parts], default=ALL, metavar="PART", help=f"serve {RESOURCES} or a skill of one skillset only"
+    )
     parser.add_argument("--parent", type=int, default=0, metavar="PID", help="end when the process with this id, the parent, ends")
     return parser.parse_args(words[:split]), words[split:]
 
@@ -179,11 +234,19 @@ def _limit_the_end() -> None:
     faulthandler.dump_traceback_later(END_LIMIT_S, exit=True)
 
 
-def nothing_more() -> None:
-    """Do nothing more at the stop."""
+def spin_all(nodes: Sequence[SkillsetNode | HooksNode], stop: threading.Event) -> None:
+    """Spin nodes until ``stop``, and end their executions side by side: hooks may take some seconds to stop a function."""
+    threads = [threading.Thread(target=spin_until, args=(node, stop), name=node.get_name()) for node in nodes]
+    for thread in threads:
+        thread.start()
+    if threads:
+        wait_for(stop)
+        _limit_the_end()
+    for thread in threads:
+        thread.join()
 
 
-def spin_until(node: SkillsetNode | HooksNode, stop: threading.Event, *, at_stop: Callable[[], None] = nothing_more) -> None:
+def spin_until(node: SkillsetNode | HooksNode, stop: threading.Event) -> None:
     """Spin a node in a thread of its own until ``stop``; then end its executions while it still spins.
 
     A callback that raises (most are of hooks) fails what runs, as it is not known whose function is without its watch now;
@@ -216,7 +279,6 @@ def spin_until(node: SkillsetNode | HooksNode, stop: threading.Event, *, at_stop
     thread = threading.Thread(target=spin, name="executor")
     thread.start()
     wait_for(stop)
-    at_stop()
     node.close("the managers were shut down")
     drain_until_s = time.monotonic() + END_S / 2
     executor.create_task(end)

@@ -23,7 +23,7 @@ from skillset_ros2.names import latched  # noqa: E402
 
 def test_a_resource_whose_reporter_falls_silent_is_unknown(spinning):
     model = with_silence(SKILLSET, "SDK_authority", 900.0)
-    given = [Parameter("silence.SDK_authority", value=2.0)]  # as a deployment gives it
+    given = [Parameter("silence.navigation.SDK_authority", value=2.0)]  # as a deployment gives it
     hooks = lambda _: {skill.name: NavigationRecorder() for skill in model.skills}  # noqa: E731
     spinning.spin(SkillsetNode(model, navigation_actions, hooks, parameter_overrides=given))
     node = Node("silence_tester")

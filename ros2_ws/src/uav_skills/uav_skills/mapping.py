@@ -9,7 +9,6 @@ from mapping_managers.hooks import AbstractLidarMappingSkill
 
 from uav_skills.decisions import decide_mapping
 from uav_skills.functional import MappingApi
-from uav_skills.serve import serve
 from uav_skills.watched import WatchedSkill
 
 if TYPE_CHECKING:
@@ -47,12 +46,3 @@ class LidarMapping(WatchedSkill, AbstractLidarMappingSkill):  # type: ignore[mis
 def make_hooks(node: Node) -> dict[str, SkillHooks]:
     """Make the hooks of all skills of the skillset."""
     return {"lidar_mapping": LidarMapping(MappingApi(node))}
-
-
-def main_mapping() -> None:
-    """Serve the skillset `mapping` until the process is told to end."""
-    serve("mapping", make_hooks)
-
-
-if __name__ == "__main__":
-    main_mapping()

@@ -21,7 +21,6 @@ from uav_skills.calls import Reply, ignore_response
 from uav_skills.decisions import SkillEnd
 from uav_skills.functional import GuidanceApi
 from uav_skills.guided import GuidedMotion, GuidedSkill
-from uav_skills.serve import serve
 
 if TYPE_CHECKING:
     from geometry_msgs.msg import Point
@@ -228,12 +227,3 @@ def make_hooks(node: Node) -> dict[str, SkillHooks]:
     served = getattr(node, "served_skills", tuple(HOOKS))
     guidance = GuidanceApi(node, orphans={HOOKS[skill].reference for skill in served})
     return {skill: hooks(guidance) for skill, hooks in HOOKS.items()}
-
-
-def main_navigation() -> None:
-    """Serve the skillset `navigation` until the process is told to end."""
-    serve("navigation", make_hooks)
-
-
-if __name__ == "__main__":
-    main_navigation()

@@ -10,7 +10,6 @@ from perception_managers.hooks import AbstractLidarDepthmapSkill, AbstractZedDep
 from alula import SkillHooks
 from uav_skills.decisions import decide_watch
 from uav_skills.functional import DepthApi
-from uav_skills.serve import serve
 from uav_skills.watched import WatchedSkill
 
 if TYPE_CHECKING:
@@ -59,12 +58,3 @@ def make_hooks(node: Node) -> dict[str, SkillHooks]:
         "zed_depthmap": ZedDepthmap("ZED", DepthApi(node, "zed_depth")),
         "lidar_depthmap": LidarDepthmap("LiDAR", DepthApi(node, "lidar_obstacles")),
     }
-
-
-def main_perception() -> None:
-    """Serve the skillset `perception` until the process is told to end."""
-    serve("perception", make_hooks)
-
-
-if __name__ == "__main__":
-    main_perception()

@@ -10,7 +10,6 @@ from video_managers.hooks import AbstractStreamSkill
 from uav_skills.checks import check_stream
 from uav_skills.decisions import decide_stream
 from uav_skills.functional import VideoApi
-from uav_skills.serve import serve
 from uav_skills.watched import WatchedSkill
 
 if TYPE_CHECKING:
@@ -61,12 +60,3 @@ class Stream(WatchedSkill, AbstractStreamSkill):  # type: ignore[misc]  # genera
 def make_hooks(node: Node) -> dict[str, SkillHooks]:
     """Make the hooks of all skills of the skillset."""
     return {"stream": Stream(VideoApi(node))}
-
-
-def main_video() -> None:
-    """Serve the skillset `video` until the process is told to end."""
-    serve("video", make_hooks)
-
-
-if __name__ == "__main__":
-    main_video()

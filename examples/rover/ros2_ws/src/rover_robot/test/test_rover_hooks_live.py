@@ -55,10 +55,11 @@ class FakeLayer:
 
 
 class Rig:
-    """The managers' processes, the fakes, and clients."""
+    """The managers' process, the fakes, and clients."""
 
     def __init__(self):
-        self.managers = [subprocess.Popen([sys.executable, "-m", "rover_robot.serve", name]) for name in SKILLSETS]
+        hooks = [f"{name}=rover_robot.hooks.{name}:make_hooks" for name in SKILLSETS]
+        self.managers = subprocess.Popen([sys.executable, "-m", "skillset_ros2.managers", *hooks])
         self.node = rclpy.create_node("rover_test")
         self.layer = FakeLayer(self.node)
         self.clients = {name: SkillsetClient(self.node, name) for name in SKILLSETS}
@@ -85,9 +86,8 @@ class Rig:
         self.layer.doors = [(False, "over")] * len(self.layer.doors)
         self.executor.shutdown()
         self.node.destroy_node()
-        for process in self.managers:
-            process.send_signal(signal.SIGINT)
-        assert [process.wait(TIMEOUT_S) for process in self.managers] == [0] * len(self.managers)
+        self.managers.send_signal(signal.SIGINT)
+        assert self.managers.wait(TIMEOUT_S) == 0
 
 
 @pytest.fixture(scope="module")
