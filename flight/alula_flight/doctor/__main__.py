@@ -22,12 +22,13 @@ import psutil
 from alula.cli.table import parse
 from alula.common.deployments import Deployment, deployment_names
 from alula.common.errors import AlulaError
+from alula.common.fast_dds import PROFILE_VARIABLES
 from alula.common.files import json_line, write_text
 from alula.common.robots import RobotFolder, find_robot
 from alula_flight.doctor.base import foreign, look_at_master, look_at_nodes, look_at_way_back
 from alula_flight.doctor.bindings import look_at_bindings
 from alula_flight.doctor.clock import look_at_clock
-from alula_flight.doctor.dds import PROFILE_VARIABLES, look_at_graph, look_at_reach, look_at_shared_memory
+from alula_flight.doctor.dds import look_at_graph, look_at_reach, look_at_shared_memory
 from alula_flight.doctor.disk import look_at_disk
 from alula_flight.doctor.findings import AREAS, BINDINGS, CLOCK, NODES, PARTS, Finding, Level, any_problem, lines_of, note, ok, problem
 from alula_flight.doctor.names import look_at_names

@@ -23,7 +23,6 @@ from alula_flight.doctor.names import own_addresses, resolved
 if TYPE_CHECKING:
     from rclpy.node import Node
 
-PROFILE_VARIABLES = ("FASTRTPS_DEFAULT_PROFILES_FILE", "FASTDDS_DEFAULT_PROFILES_FILE")
 GROUP, PORT = "239.255.0.1", 7399
 """DDS's own group (RTPS 2.5, 9.6.2.4), and a port that no domain has."""
 MULTICAST_S, QUIET_S, FOUND_S, MOST_S = 1.0, 1.0, 5.0, 10.0

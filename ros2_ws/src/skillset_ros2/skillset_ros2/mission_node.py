@@ -25,7 +25,7 @@ from rclpy.signals import SignalHandlerOptions
 from std_msgs.msg import Header, String
 from std_srvs.srv import SetBool, Trigger
 
-from alula.common.fast_dds import leave
+from alula.common.fast_dds import leave, small_segment
 from alula.common.signals import on_end_signal
 from alula.missions.director import EXIT_CODES, START_TIMEOUT_S, End, Outcome
 from alula.missions.driver import TICK_PERIOD_S, MissionDriver
@@ -196,7 +196,8 @@ def run_mission(plan: MissionPlan, out: Path, arguments: Sequence[str] | None = 
     # rclpy's own handlers would end the communication that is needed to stop the robot.
     rclpy.init(args=words, signal_handler_options=SignalHandlerOptions.NO)
     try:
-        node = MissionNode(out, plan)
+        with small_segment():
+            node = MissionNode(out, plan)
     except (InputError, ServerError) as error:
         sys.stderr.write(f"mission: {error}\n")
         rclpy.try_shutdown()

@@ -21,7 +21,7 @@ from rclpy.node import Node
 from rclpy.signals import SignalHandlerOptions
 from skillset_interfaces.msg import Heartbeat
 
-from alula.common.fast_dds import leave
+from alula.common.fast_dds import leave, small_segment
 from alula.common.ros_arguments import ROS_ARGUMENTS, without_roslaunch
 from alula.common.shared_memory import sweep_shared_memory
 from alula.common.signals import StopEvent
@@ -122,17 +122,18 @@ def _serve(part: str, served: Sequence[Served], address: str, stop: threading.Ev
         refusals.append(reason)
         stop.set()
 
-    nodes: list[Node] = []
+    names = [one.skillset.name for one in served]
+    with small_segment():
+        first = Node(names[0], enable_rosout=False, start_parameter_services=False)
+    nodes: list[Node] = [first]
     try:
         if part in {ALL, RESOURCES}:
-            nodes.append(listen_for_rivals([one.skillset.name for one in served]))
-        listening = list(nodes)
-        nodes += make_parts(part, served, address=address, stop=stop, on_rival=refuse)
-        for node in listening if len(nodes) > len(listening) else ():
+            listen_for_rivals(first, names)
+        parts = make_parts(part, served, address=address, stop=stop, on_rival=refuse)
+        if parts:
             # Only now: the participant in DDS, which goes with the last node, is that of all nodes.
-            nodes.remove(node)
-            node.destroy_node()
-        parts = [node for node in nodes if node not in listening]
+            nodes = list(parts)
+            first.destroy_node()
         for node in parts:
             warn_of_names_outside(node)
         spin_all(parts, stop)
@@ -152,13 +153,12 @@ def warn_of_names_outside(node: Node) -> None:
         node.get_logger().warning(f"not in {node.get_namespace()}: {', '.join(outside)}; hooks write names without the slash in front")
 
 
-def listen_for_rivals(skillsets: Sequence[str]) -> Node:
-    """Return the node that has heard no heartbeats of other managers of skillsets, before anything is done that might disturb them.
+def listen_for_rivals(node: Node, skillsets: Sequence[str]) -> None:
+    """Listen for heartbeats of other managers of skillsets, before anything is done that might disturb them.
 
     Raises:
         SkillRuntimeError: There are some.
     """
-    node = Node(skillsets[0], enable_rosout=False, start_parameter_services=False)
     heard: list[str] = []
     for name in skillsets:
         node.create_subscription(Heartbeat, f"{name}/alive", lambda _, name=name: heard.append(name), latched(1))
@@ -169,11 +169,7 @@ def listen_for_rivals(skillsets: Sequence[str]) -> Node:
         executor.spin_once(timeout_sec=left_s)
     executor.shutdown(timeout_sec=0)
     if heard:
-        leave(node)
         raise SkillRuntimeError(f"managers of {heard[0]} are there already; end them first")
-    for subscription in list(node.subscriptions):
-        node.destroy_subscription(subscription)
-    return node
 
 
 def make_parts(

@@ -17,6 +17,8 @@ pytest.importorskip("mapping_interfaces.action")
 from rclpy.node import Node
 from skillset_ros2_rig import READY_S, SOON_S, until
 
+from alula.common.fast_dds import SMALL_SEGMENT_BYTES
+from alula.common.shared_memory import PORTS
 from alula.model.execution_state import ExecutionState
 from skillset_ros2 import SkillsetClient
 
@@ -71,6 +73,18 @@ def test_one_process_serves_both_and_at_its_end_stops_what_runs_and_tells_the_ca
     assert (handle.state, "shut down" in handle.message) == (S.FAILED, True)
     assert together.process.wait(SOON_S) == 0
     until(lambda: any(line.startswith(f"stopped {SKILL}") for line in together.told), "the function is stopped")
+
+
+def own_segments(pid: int) -> dict[str, int]:
+    """Return the sizes, bytes, of the segments of shared memory that a participant of this process has made: it holds their locks."""
+    held = [str(one.readlink()) for one in Path(f"/proc/{pid}/fd").iterdir()]
+    names = [Path(path.removesuffix("_el")) for path in held if path.endswith("_el") and not Path(path).name.startswith(PORTS)]
+    return {path.name: path.stat().st_size for path in names}
+
+
+def test_it_has_one_participant_with_little_shared_memory(together):
+    segments = own_segments(together.process.pid)  # that of the profile, and one that Fast DDS makes of half a megabyte
+    assert SMALL_SEGMENT_BYTES <= sum(segments.values()) < 1.2 * SMALL_SEGMENT_BYTES, segments
 
 
 @pytest.mark.parametrize("together", [("--ros-args", "-p", "navigation:raises_s:=2.0")], indirect=True)
