@@ -26,6 +26,7 @@ from alula.missions.director import Outcome
 from alula.missions.mission_file import plan_of_file
 from alula.missions.mocked import MockedMission
 from alula.missions.scenario import inputs_of
+from repair_bench.cases import copied, without_chances, without_end, without_lidar
 
 ALULA_ROOT = Path(__file__).resolve().parents[1]
 TIME_S = "600"
@@ -36,19 +37,8 @@ TIME_S = "600"
 def missions(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
     """Return a folder with the drone's missions, to be changed."""
     monkeypatch.setenv("ALULA_ROBOT", str(ALULA_ROOT))
-    for one in (ALULA_ROOT / "missions").glob("*.xml"):
-        (tmp_path / one.name).write_bytes(one.read_bytes())
+    copied(ALULA_ROOT, tmp_path)
     return tmp_path
-
-
-def without_tree(path: Path, name: str) -> str:
-    """Take a tree and its use out of a file; return what is left."""
-    text = path.read_text()
-    text, uses = re.subn(rf' *<SubTree ID="{name}"[^>]*/>\n', "", text)
-    text, trees = re.subn(rf' *<BehaviorTree ID="{name}">.*?</BehaviorTree>\n\n', "", text, flags=re.DOTALL)
-    assert (uses, trees) == (1, 1)
-    path.write_text(text)
-    return text
 
 
 def answer(capsys: pytest.CaptureFixture[str], *words: str | Path, code: int = 0) -> dict[str, object]:
@@ -59,8 +49,7 @@ def answer(capsys: pytest.CaptureFixture[str], *words: str | Path, code: int = 0
 
 @pytest.fixture
 def no_lidar(missions: Path) -> Path:
-    without_tree(missions / "mapping.xml", "lidar_navigation")
-    return missions / "mapping.xml"
+    return without_lidar(ALULA_ROOT, missions).mission
 
 
 class Repaired(NamedTuple):
@@ -75,10 +64,8 @@ class Repaired(NamedTuple):
 @pytest.fixture(scope="module")
 def repaired(tmp_path_factory: pytest.TempPathFactory) -> Repaired:
     folder = tmp_path_factory.mktemp("missions")
-    for one in (ALULA_ROOT / "missions").glob("*.xml"):
-        (folder / one.name).write_bytes(one.read_bytes())
-    mission, out = folder / "mapping.xml", folder / "repaired.xml"
-    before = without_tree(mission, "lidar_navigation")
+    mission, out = without_lidar(ALULA_ROOT, folder).mission, folder / "repaired.xml"
+    before = mission.read_text()
     said, progress = io.StringIO(), io.StringIO()
     with pytest.MonkeyPatch.context() as patch, redirect_stdout(said), redirect_stderr(progress):
         patch.setenv("ALULA_ROBOT", str(ALULA_ROOT))
@@ -159,10 +146,7 @@ def test_nothing_maps_without_the_lidar(missions: Path, capsys: pytest.CaptureFi
 
 
 def test_the_end_by_which_a_mission_gives_up_is_written_again(missions: Path, capsys: pytest.CaptureFixture[str]) -> None:
-    mission = missions / "mapping.xml"
-    mission.write_text(re.sub(r' *<SubTree ID="give_up"[^>]*/>\n', "", mission.read_text()))
-    shared = missions / "flying.xml"
-    shared.write_text(re.sub(r' *<BehaviorTree ID="give_up">.*?</BehaviorTree>\n', "", shared.read_text(), flags=re.DOTALL))
+    mission = without_end(ALULA_ROOT, missions).mission
     found = answer(capsys, mission, "--fault", "lidar", "--most-faults", "1")
     one = found["repair"]
     assert isinstance(one, dict)
@@ -231,20 +215,15 @@ def decisions(run: MockedMission) -> list[str]:
 def rover(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
     """Return a folder with the rover's missions, to be changed."""
     monkeypatch.setenv("ALULA_ROBOT", str(ALULA_ROOT / "examples/rover"))
-    for one in (ALULA_ROOT / "examples/rover/missions").glob("*.xml"):
-        (tmp_path / one.name).write_bytes(one.read_bytes())
+    copied(ALULA_ROOT / "examples/rover", tmp_path)
     return tmp_path
 
 
 @pytest.mark.long
 @pytest.mark.timeout(0)  # a minute of processor time: as long as the machine needs
 def test_a_way_that_is_blocked_gets_another_chance(rover: Path, capsys: pytest.CaptureFixture[str]) -> None:
-    answers = rover / "answers.xml"
-    once = '    <base.drive_to name="drive" target="{target}" outcome="{driven}"/>\n'
-    text, count = re.subn(r'(<BehaviorTree ID="drive">\n).*?(  </BehaviorTree>)', rf"\1{once}\2", answers.read_text(), flags=re.DOTALL)
-    assert count == 1
-    answers.write_text(text)
-    found = answer(capsys, rover / "patrol.xml", "--fault", "person")
+    mission = without_chances(ALULA_ROOT, rover).mission
+    found = answer(capsys, mission, "--fault", "person")
     assert found["answer"] == "repaired"
     one = found["repair"]
     assert isinstance(one, dict)

@@ -40,6 +40,7 @@ TYPED = [
     "tools/console_bench",
     "tools/perception_bench",
     "tools/prove_bench",
+    "tools/repair_bench",
     "tools/groot_bench",
     "tools/finding_pages",
     "tools/log_mutations",

@@ -39,6 +39,7 @@ __all__ = [
     "initial",
     "interrupt",
     "interrupting",
+    "is_ready",
     "lose",
     "progressed",
     "receive",
@@ -225,6 +226,11 @@ def unmet_preconditions(skill: Skill, states: States, data: Data) -> Iterator[Un
     for precondition in skill.preconditions:
         if judge(precondition.condition, states, data) is not True:
             yield unmet_condition(precondition.name, precondition.condition, states, data)
+
+
+def is_ready(skill: Skill, states: States, data: Data) -> bool:
+    """Tell whether all preconditions hold; ``unmet_preconditions`` says which do not, and why, which takes longer."""
+    return all(judge(one.condition, states, data) is True for one in skill.preconditions)
 
 
 def _if_fulfilled(ended: Entered, postcondition: Expression, where: str, after_effect: Situation) -> Entered:

@@ -3,18 +3,23 @@
 The mission may start and interrupt every skill at any time. The world helps it as well as it can, but the fault that has come stays: no
 state that it shows is left for one that it does not show. Where even so the skill never runs after the fault, no tree can have it run; the
 counterplay is the fault, and each request's refusal. Steps are those of the managers (`ManagersSteps`), as the proofs take them.
+
+It is played with what matters alone: the resources of the fault and of the skill, the skills and events that change these, and what lets
+those happen. What all others do changes nothing of that.
 """
 
 from __future__ import annotations
 
 from collections import deque
 from collections.abc import Collection, Iterator
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
-from alula.model.model import Skillset
+from alula.model.expressions import TRUE, And, ResourceIs, SkillRuns
+from alula.model.model import Property, PropertyKind, Skill, Skillset
 from alula.prove.limits import Deadline
 from alula.prove.mission.managers import ENDED, RUNNING, SENT, End, Failures, ManagersSteps
 from alula.prove.mission.state import Event, Execution, Kind, Managers
+from alula.prove.skillset.few import parts_around
 
 HELPFUL = Failures(refusals=False, hooks=False, aborts=False)
 Here = tuple[Managers, bool]
@@ -41,8 +46,9 @@ def played(skillset: Skillset, skill: str, states: Collection[tuple[str, str]], 
 
     Raises OutOfTimeError.
     """
-    leaves = {number: one.name for number, one in enumerate(skillset.skills)}
-    steps = ManagersSteps(skillset, leaves, HELPFUL, _as_it_is)
+    mattering = _mattering(skillset, skill, states)
+    leaves = {number: one.name for number, one in enumerate(mattering.skills)}
+    steps = ManagersSteps(mattering, leaves, HELPFUL, _as_it_is)
     number = next(leaf for leaf, name in leaves.items() if name == skill)
     first: Here = (steps.initial(), False)
     seen, todo, refused = {first}, deque([first]), dict[str, None]()
@@ -59,6 +65,25 @@ def played(skillset: Skillset, skill: str, states: Collection[tuple[str, str]], 
                 seen.add(there)
                 todo.append(there)
     return Game(won=False, refused=tuple(refused), situations=len(seen))
+
+
+def _mattering(skillset: Skillset, skill: str, states: Collection[tuple[str, str]]) -> Skillset:
+    """Return the part of a skillset that decides whether a skill can run."""
+    asked = And((SkillRuns(skill), *(ResourceIs(name, state) for name, state in states)))
+    *_, part = parts_around(skillset, Property("runs", PropertyKind.NEVER, asked))
+    return replace(
+        skillset,
+        resources=tuple(one for one in skillset.resources if one.name in part.resources),
+        skills=tuple(_without_postconditions(one) for one in skillset.skills if one.name in part.skills),
+        events=tuple(one for one in skillset.events if one.name in part.events),
+        properties=(),
+    )
+
+
+def _without_postconditions(skill: Skill) -> Skill:
+    """Return a skill without what decides only how its end is called."""
+    results = tuple(replace(one, postcondition=TRUE) for one in skill.results)
+    return replace(skill, results=results, interrupt=replace(skill.interrupt, postcondition=TRUE))
 
 
 def _moves(

@@ -9,11 +9,9 @@ from __future__ import annotations
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
 
-from alula.common.graphs import reachable_from
-from alula.model import semantics
 from alula.prove.limits import OutOfTimeError
 from alula.prove.mission.regions import Region, Regions
-from alula.prove.mission.state import Ending, Event, Kind, Managers, State
+from alula.prove.mission.state import Ending, Event, Kind, State
 from alula.prove.mission.system import System
 
 
@@ -68,7 +66,7 @@ def _assumed(one: Left) -> int:
 
 def _left(regions: Regions, region: Region, place: int, managers: int, events: Sequence[Event]) -> Left:
     system = regions.system
-    states = _states(system, place, managers)
+    states = system.resource_states(place, managers)
     end = system.ticker.memories[region.memory].end
     return Left(place, end.value if end else "", _lost(regions, place, managers), _by(system, place, events), states, tuple(events))
 
@@ -90,24 +88,9 @@ def _lost_at(regions: Regions, region: Region, place: int) -> Iterator[tuple[int
 
 def _lost(regions: Regions, place: int, number: int) -> tuple[str, ...]:
     """Return the skills of the mission that could start after power-up and can't after this, whatever the functional layer does."""
-    first = regions.system.initial().managers[place]
-    ready = [_startable(regions, place, one) for one in (first, number)]
-    return tuple(sorted(ready[0] - ready[1]))
-
-
-def _startable(regions: Regions, place: int, number: int) -> set[str]:
     system = regions.system
-    bare = system.number(Managers(system.managers_of(number).states))
-    found: set[str] = set()
-
-    def alive(one: int) -> list[int]:
-        return [number for event, number in system.moves_of(place, one) if event.kind is not Kind.DIE]
-
-    for one in reachable_from([bare], alive):
-        states = _states(system, place, one)
-        skills = system.skillsets[place].skills
-        found |= {skill.name for skill in skills if not any(semantics.unmet_preconditions(skill, states, {}))}
-    return found
+    first = system.initial().managers[place]
+    return tuple(sorted(system.startable(place, first) - system.startable(place, number)))
 
 
 # --- whose end it is ----------------------------------------------------------------------------------------------------
@@ -159,7 +142,7 @@ def _keeps(system: System, place: int, ending: Ending, after: int) -> bool:
     skillset = system.skillsets[place]
     if managers.states is None or ending.state in {"NOT_READY", "NOT_VALIDATED"}:
         return False
-    states = _states(system, place, after)
+    states = system.resource_states(place, after)
     kept = {one for one in skillset.skill(ending.skill).start.assignments if states[one.resource] == one.target}
     kept = {one for one in kept if one.target != skillset.resource(one.resource).initial}
     running = [system.leaves[one.leaf].model.name for one in managers.executions if one.phase == "running"]
@@ -168,8 +151,3 @@ def _keeps(system: System, place: int, ending: Ending, after: int) -> bool:
 
 def _said(system: System, place: int, ending: Ending) -> str:
     return f"{system.skillsets[place].name}.{ending.skill} as {ending.result or ending.state}"
-
-
-def _states(system: System, place: int, number: int) -> dict[str, str]:
-    names = (one.name for one in system.skillsets[place].resources)
-    return dict(zip(names, system.managers_of(number).states or (), strict=True))

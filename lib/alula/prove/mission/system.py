@@ -22,6 +22,7 @@ from collections.abc import Callable, Iterator, Mapping, Sequence
 from pathlib import Path
 from typing import TypeVar
 
+from alula.common.graphs import reachable_from
 from alula.missions.director import Director, Outcome
 from alula.missions.mission_file import STOP_HERE, FiledMission, plan_of_file
 from alula.missions.palette import palette_of, without_class
@@ -29,6 +30,8 @@ from alula.missions.part import MissionPart
 from alula.missions.plan import InputError, Inputs
 from alula.missions.skill_types import OUTCOME_PORT
 from alula.missions.world import states_of
+from alula.model import semantics
+from alula.model.conditions import NO_DATA
 from alula.model.execution_state import ExecutionState
 from alula.model.model import Skillset
 from alula.prove.mission.ahead import RUNS
@@ -73,6 +76,7 @@ class System:
         self._managers: list[Managers] = []
         self._numbers: dict[Managers, int] = {}
         self._moves: dict[tuple[int, int], tuple[tuple[Event, int], ...]] = {}
+        self._startable: dict[tuple[int, int], frozenset[str]] = {}
 
     @classmethod
     def read(
@@ -127,7 +131,7 @@ class System:
         other._steps = [  # noqa: SLF001 - the same class
             ManagersSteps(one, self._skills_of(one), failures, self.told_end) for one in self.skillsets
         ]
-        other._moves = {}  # noqa: SLF001 - the same class
+        other._moves, other._startable = {}, {}  # noqa: SLF001 - the same class
         return other
 
     # --- steps -------------------------------------------------------------------------------------------------------
@@ -184,6 +188,22 @@ class System:
             found = self._steps[place].moves(self._managers[number])
             self._moves[key] = tuple((event, self.number(after)) for event, after in found if after != self._managers[number])
         return self._moves[key]
+
+    def startable(self, place: int, number: int) -> frozenset[str]:
+        """Return the skills of a skillset that could start some time after these managers, if nothing ran any more and none died."""
+        at = self.number(Managers(self._managers[number].states))
+        if (place, at) not in self._startable:
+            lasting = reachable_from([at], lambda one: (after for event, after in self.moves_of(place, one) if event.kind is not Kind.DIE))
+            several = [self.resource_states(place, one) for one in lasting]
+            skills = self.skillsets[place].skills
+            found = (skill.name for skill in skills if any(semantics.is_ready(skill, states, NO_DATA) for states in several))
+            self._startable[place, at] = frozenset(found)
+        return self._startable[place, at]
+
+    def resource_states(self, place: int, number: int) -> dict[str, str]:
+        """Return the states of the resources of a skillset; its managers have not died."""
+        names = (one.name for one in self.skillsets[place].resources)
+        return dict(zip(names, self._managers[number].states or (), strict=True))
 
     def commanded(self, place: int, number: int, ticked: Ticked) -> int:
         """Return managers with what a tick has asked for under way, without ends that the tree hangs on no more."""
