@@ -4,11 +4,13 @@ from __future__ import annotations
 
 import asyncio
 import os
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Callable, Iterable, Iterator, Sequence
 from contextlib import ExitStack, contextmanager
-from functools import partial
+from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
+
+import psutil
 
 from alula.campaign.live import end_live
 from alula.campaign.plan import SIMULATOR, Campaign, PlannedRun
@@ -24,9 +26,12 @@ from alula.runtime.live.spec import RequestError
 TOGETHER = 10
 """Mock runs that are handed over at a time: a run takes tens of milliseconds."""
 CONNECT_S = 30.0
+LOOK_S = 2.0  # wall clock; how often it is looked whether there are workers
 DEATHS = 1
 """So many workers may die with the same runs before these are left for the end: runs that end their worker would end all of them."""
 
+Part = Sequence[PlannedRun]
+"""Runs that are handed over together."""
 Progress = Callable[[int], None]
 """Gets how many runs are in the table."""
 
@@ -48,60 +53,86 @@ def run(
     if not left:
         return []
     from dask import config  # late: it takes a second, and a finished campaign does not need it
-    from distributed import CancelledError, KilledWorker, as_completed
+    from distributed import CancelledError, KilledWorker
 
     # Dask samples what its workers do a hundred times a second; that is looked at nowhere.
-    with (
-        config.set({"distributed.worker.profile.enabled": False, "distributed.scheduler.allowed-failures": DEATHS}),
-        _client(campaign, len(left), dask) as client,
-    ):
+    settings = {"distributed.worker.profile.enabled": False, "distributed.scheduler.allowed-failures": DEATHS}
+    with config.set(settings), _workers(campaign, len(left), dask) as workers:
         behaviour = tuple(str(path.absolute()) for path in campaign.behaviour)
-        parts = list(_parts(left, 1 if campaign.over == SIMULATOR else TOGETHER))
-        begin = partial(
-            client.submit, rows_of, over=campaign.over, behaviour=behaviour, out=str(out.absolute()), options=options, pure=False
-        )
+        words: dict[str, Any] = {"over": campaign.over, "behaviour": behaviour, "out": str(out.absolute()), "options": options}
 
-        def take(future: Any) -> bool:
-            """Add the rows of runs that are over; tell whether there are any."""
-            try:
-                table.add(future.result())
-            except (KilledWorker, CancelledError):
-                return False
-            progress(len(table.rows))
-            return True
+        def do(parts: Iterable[Part]) -> list[Part]:
+            """Do runs, and add their rows as they come; return those of which each worker died."""
+            futures = {workers.client.submit(rows_of, part, **words, pure=False): part for part in parts}
+            died = []
+            for future in workers.finished(futures):
+                try:
+                    table.add(future.result())
+                except (KilledWorker, CancelledError):
+                    died.append(futures[future])
+                    continue
+                progress(len(table.rows))
+            return died
 
         try:
-            futures = {begin(part): part for part in parts}
-            died = [futures[future] for future in as_completed(futures) if not take(future)]
-            for part in died:  # one after another: whichever ends its worker now is alone there
-                take(begin(part))
+            for part in do(_parts(left, 1 if campaign.over == SIMULATOR else TOGETHER)):
+                do([part])  # whichever ends its worker now is alone there
         finally:
             if campaign.over == SIMULATOR:
                 end_live([planned for planned in left if planned.number not in table.rows], out)
     return [planned.number for planned in left if planned.number not in table.rows]
 
 
+@dataclass
+class _Workers:
+    """The workers of a scheduler; ``cluster`` is this machine's own, None: they are somebody else's."""
+
+    client: Any
+    cluster: Any = None
+    count: int = 0
+
+    def finished(self, futures: Iterable[Any]) -> Iterator[Any]:
+        """Yield futures as they are finished. Workers of this machine that have died, and that Dask does not start again, are replaced."""
+        from distributed import TimeoutError as StillOpenError
+        from distributed import wait
+
+        left, gone = set(futures), 0
+        while left:
+            try:
+                done, left = wait(left, timeout=LOOK_S, return_when="FIRST_COMPLETED")
+            except StillOpenError:
+                gone = gone + 1 if self.cluster is not None and not self._alive() else 0
+                if gone > 1:  # Dask itself needs a moment to start another one
+                    self.cluster.scale(0)
+                    self.cluster.scale(self.count)
+                    gone = 0
+                continue
+            yield from done
+
+    def _alive(self) -> bool:
+        """Tell whether any process of a worker lives: one that dies in its first moment is not started again by Dask."""
+        return any(worker.pid and psutil.pid_exists(worker.pid) for worker in self.cluster.workers.values())
+
+
 @contextmanager
-def _client(campaign: Campaign, runs: int, dask: str | None) -> Iterator[Any]:
+def _workers(campaign: Campaign, runs: int, dask: str | None) -> Iterator[_Workers]:
     """Connect to the scheduler at an address, or to one of this machine's own; raises AnalysisError."""
     from distributed import Client, LocalCluster
 
     with ExitStack() as stack:
         try:
-            if dask is None:
-                workers = min(campaign.at_once or os.cpu_count() or 1, runs)
+            if dask is not None:
+                workers = _Workers(stack.enter_context(Client(dask, timeout=CONNECT_S)))
+            else:
+                count = min(campaign.at_once or os.cpu_count() or 1, runs)
                 # Loopback only: nothing of a campaign can be reached from outside.
                 cluster = stack.enter_context(
-                    LocalCluster(
-                        n_workers=workers, threads_per_worker=1, host="127.0.0.1", dashboard_address="127.0.0.1:0", silence_logs=50
-                    )
+                    LocalCluster(n_workers=count, threads_per_worker=1, host="127.0.0.1", dashboard_address="127.0.0.1:0", silence_logs=50)
                 )
-                client = stack.enter_context(Client(cluster))
-            else:
-                client = stack.enter_context(Client(dask, timeout=CONNECT_S))
+                workers = _Workers(stack.enter_context(Client(cluster)), cluster, count)
         except (OSError, TimeoutError, ValueError) as error:
             raise AnalysisError(f"--dask {dask}: can't be used: {error}") from None
-        yield client
+        yield workers
 
 
 def offer_of(campaign: Campaign) -> RunOffer:
