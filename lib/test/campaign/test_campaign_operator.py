@@ -48,3 +48,9 @@ def test_what_an_operator_does_not_do_is_refused():
         acts_of(parse_faults("operator:dance@3"))
     with pytest.raises(AnalysisError, match="operator can't be 'dance'"):
         load_mocked_scenario("mapping").check(PlannedRun(0, "mapping", 0, ("operator:dance@3",)).requests)
+
+
+def test_the_mocks_know_a_stick_that_is_moved_from_a_pilot_who_takes_over_or_lands():
+    outcomes = {way: row_of(f"pilot:{way}@10-13") for way in ("stick", "takes")} | {"lands": row_of("pilot:lands@10")}
+    assert {way: row["outcome"] for way, row in outcomes.items()} == {"stick": "accomplished", "takes": "given_up", "lands": "given_up"}
+    assert outcomes["lands"]["landed"] is True
