@@ -4,15 +4,19 @@ from __future__ import annotations
 
 import contextlib
 import signal
+from collections.abc import Sequence
 from dataclasses import asdict, dataclass
 from pathlib import Path
 
 from alula.common.run_log import END, note, read
+from alula.report.facts import Death
 
 OPERATOR, SUPERVISOR, FRONT, SIGNAL = "operator", "supervisor", "front", "signal"
 """Who ends a run; SIGNAL: a program or a person outside of it."""
 TOLD_TO_END = "told to end by "
 """How the reason of a mission begins that was ended by a signal: who had it sent, and why, is for the run to say."""
+CLOCK_STANDS = "the mission clock stands still"
+"""How the reason begins of a mission that heard no clock any more: it does not know who brought it."""
 
 
 @dataclass(frozen=True)
@@ -42,6 +46,14 @@ def note_end(out: Path, ended: ReportedEnd) -> None:
 def true_reason(reason: str | None, ended: ReportedEnd | None) -> str | None:
     """Return why a mission was aborted: who ended the run in place of the signal that the mission got; the mission's reason otherwise."""
     return ended.sentence() if ended is not None and (reason or "").startswith(TOLD_TO_END) else reason
+
+
+def with_dead(reason: str | None, died: Sequence[Death]) -> str | None:
+    """Return the reason of a mission that heard no clock with the processes that had died for good; any other as it is."""
+    gone = ", ".join(f"{one['name']} died ({one['how']})" for one in died if one["when_s"] is not None and one["again_s"] is None)
+    if reason is None or not gone or not reason.startswith(CLOCK_STANDS):
+        return reason
+    return reason.replace(CLOCK_STANDS, f"{CLOCK_STANDS}: {gone}", 1)
 
 
 def read_end(out: Path) -> ReportedEnd | None:

@@ -11,7 +11,7 @@ from alula.common.operator import PAUSE, is_operator
 from alula.common.robots import page_words, robots_of_fleet
 from alula.common.run_log import ACT, read
 from alula.common.scenarios import load_scenario
-from alula.report.ends import read_end, true_reason
+from alula.report.ends import read_end, true_reason, with_dead
 from alula.report.facts import Death, RunFacts
 from alula.report.files import Problems, ReportError, mapping, read_json, sequence
 from alula.report.history import History
@@ -71,7 +71,9 @@ def read_outcome(facts: RunFacts, history: History, problems: Problems) -> tuple
         problems.note(
             "the replay stopped before the mission's end" if facts.replay_of else "the mission's process ended before the mission did"
         )
-    return outcome, true_reason(reason or None, read_end(facts.out_dir)) if outcome == "aborted" else reason or None
+    if outcome != "aborted":
+        return outcome, reason or None
+    return outcome, with_dead(true_reason(reason or None, read_end(facts.out_dir)), facts.died)
 
 
 def read_bridge(facts: RunFacts, problems: Problems) -> dict[str, object] | None:

@@ -10,7 +10,7 @@ import pytest
 
 from alula.common.run_log import FILE, note_wait
 from alula.report.deaths import Death
-from alula.report.ends import FRONT, OPERATOR, SIGNAL, SUPERVISOR, ReportedEnd, ended_by_signal, note_end, read_end, true_reason
+from alula.report.ends import FRONT, OPERATOR, SIGNAL, SUPERVISOR, ReportedEnd, ended_by_signal, note_end, read_end, true_reason, with_dead
 from alula.report.facts import RunFacts
 from alula.report.files import Problems
 from alula.report.summary import read_outcome
@@ -104,6 +104,18 @@ def test_a_flight_that_left_no_outcome_still_tells_what_flew() -> None:
     lines = verdict_lines(summary, [Death("mission", "signal SIGKILL", 12.0)], OUT)
     assert lines[1] == "the mission came to no outcome: mission died; /runs/one/logs tells why"
     assert lines[3].startswith("  landed: no, duration 12.0 s")
+
+
+def test_a_mission_that_heard_no_clock_tells_which_processes_had_died_for_good() -> None:
+    for_good, again = (
+        {"name": name, "when_s": 3.0, "how": "signal SIGKILL", "again_s": again_s} for name, again_s in (("a", None), ("b", 4.0))
+    )
+    said = "the mission clock stands still; the robot was not at rest within 30 s"
+    told = "the mission clock stands still: a died (signal SIGKILL); the robot was not at rest within 30 s"
+    assert with_dead(said, [for_good, again]) == told
+    assert with_dead(said, [again]) == said
+    assert with_dead("the tree raised KeyError", [for_good]) == "the tree raised KeyError"
+    assert with_dead(None, [for_good]) is None
 
 
 SIGINT, SIGTERM = "told to end by SIGINT", "told to end by SIGTERM"
