@@ -145,6 +145,15 @@ def test_a_campaign_is_judged_flight_by_flight_beside_the_mocks(tmp_path: Path, 
         (campaign / f"run-{row['run']:05d}/summary.json").write_text(json.dumps(summary), encoding="utf-8")
     (campaign / "runs.jsonl").write_text("".join(json.dumps(row) + "\n" for row in rows), encoding="utf-8")
     (campaign / "campaign.json").write_text(json.dumps({"runs": [{"world": None}, {"world": None}]}), encoding="utf-8")
+    page = tmp_path / "page.md"
+    page.write_text("before\n\n<!-- flights -->\nold\n<!-- /flights -->\nafter\n", encoding="utf-8")
+    assert main([str(campaign), "--into", str(page)]) == 1
+    assert page.read_text(encoding="utf-8").startswith("before\n\n<!-- flights -->\n\n2 flights: 2 degraded.")
+    assert page.read_text(encoding="utf-8").endswith(" |\n\n<!-- /flights -->\nafter\n")
+    page.write_text("no place\n", encoding="utf-8")
+    assert main([str(campaign), "--into", str(page)]) == 2
+    assert page.read_text(encoding="utf-8") == "no place\n"
+    capsys.readouterr()
     assert main([str(campaign)]) == 1
     said = capsys.readouterr().out
     assert said.startswith("2 flights: 2 degraded. A cause was told in 2, true in 2. Wrong: 1 collisions, 1 not at rest in the end.")

@@ -58,6 +58,8 @@ class Coverage:
     does not say their outcome."""
     answers: Sequence[MissionAnswers] = ()
     """Of each mission, flown beside proved."""
+    again: Mapping[int, str] = field(default_factory=dict)
+    """What a run with trouble was asked for, in the words of ``alula run``: its scenario, its own seed, its faults."""
 
     @property
     def unknown(self) -> list[str]:
@@ -74,7 +76,7 @@ class Coverage:
         tried = [cover.as_dict() for cover in self.covers if cover.times]
         never = [vars(way) for way in self.never]
         answers = [mission.as_dict() for mission in self.answers]
-        whole = {"runs": self.runs, "outcomes": dict(self.outcomes), "troubled": list(self.troubled)}
+        whole = {"runs": self.runs, "outcomes": dict(self.outcomes), "troubled": list(self.troubled), "again": dict(self.again)}
         return {**whole, "tried": tried, "never": never, "answers": answers}
 
 
@@ -83,12 +85,16 @@ def cover(rows: Iterable[Row], ways: Iterable[Way], answers: Sequence[MissionAns
     covers = {way: Cover(way) for way in ways}
     outcomes: Counter[str] = Counter()
     troubled: list[int] = []
+    again: dict[int, str] = {}
     runs = 0
     for row in rows:
         runs += 1
         outcomes[str(row["outcome"])] += 1
         if is_troubled(row):
             troubled.append(int(row["run"]))
+            again[troubled[-1]] = " ".join(
+                [str(row["scenario"]), f"--seed {row.get('seed', 0)}", *(f"--fail {fault}" for fault in row["faults"])]
+            )
         for asked in row["faults"]:  # one that never came, because the run was over before, has not been tried
             way = Way(FAULT, name_of(parse_fault(asked)))
             covers.setdefault(way, Cover(way))
@@ -96,7 +102,7 @@ def cover(rows: Iterable[Row], ways: Iterable[Way], answers: Sequence[MissionAns
             way = Way(failure["kind"], failure["name"])
             _count(covers.setdefault(way, Cover(way)), row, str(failure["answered_by"]), failure["after_s"])
     ordered = sorted(covers.values(), key=lambda one: (KINDS.index(one.way.kind), one.way.name))
-    return Coverage(ordered, runs, dict(outcomes.most_common()), troubled, answers)
+    return Coverage(ordered, runs, dict(outcomes.most_common()), troubled, answers, again)
 
 
 def is_troubled(row: Row) -> bool:

@@ -57,6 +57,7 @@ def as_text(coverage: Coverage) -> str:
     troubled = ", ".join(map(str, coverage.troubled[:20])) + (", ..." if len(coverage.troubled) > 20 else "")
     lines += ["", f"{coverage.runs} runs: {counted(dict(coverage.outcomes))}"]
     lines += [f"runs with trouble: {len(coverage.troubled)}{f' ({troubled})' if troubled else ''}"]
+    lines += [f"  {run}: alula run {words}" for run, words in list(coverage.again.items())[:20]]
     return "\n".join(lines) + "\n"
 
 
@@ -90,11 +91,12 @@ def as_page(coverage: Coverage, title: str) -> str:
     rows = [_row(cover, most) for cover in coverage.covers if cover.times]
     never = [f'<tr class="never"><td colspan="6">{escape(way.kind)}: {escape(way.name)}</td></tr>' for way in coverage.never]
     troubled = ", ".join(map(str, coverage.troubled)) or "none"
+    again = "".join(f"<li>{run}: <code>alula run {escape(words)}</code></li>" for run, words in coverage.again.items())
     answers = "\n".join(map(_answers, coverage.answers))
     return (
         f'<!doctype html>\n<html lang="en"><meta charset="utf-8"><title>{escape(title)}</title><style>{_STYLE}</style>\n'
         f"<h1>{escape(title)}</h1>\n<p>{coverage.runs} runs: {escape(counted(dict(coverage.outcomes)))}. "
-        f"Runs with trouble: {escape(troubled)}.</p>\n"
+        f"Runs with trouble: {escape(troubled)}.</p>\n{f'<ul>{again}</ul>' if again else ''}\n"
         f"<h2>What failed, and the mission's responses</h2>\n<table><tr>{head}</tr>\n{chr(10).join(rows)}</table>\n{answers}"
         f"<h2>Never tried ({len(never)})</h2>\n<table>{chr(10).join(never)}</table>\n</html>\n"
     )

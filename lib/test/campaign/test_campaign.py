@@ -233,11 +233,12 @@ def test_the_coverage_counts_answers_and_keeps_the_worst():
     rows = [
         row(0, failures=[failure], faults=["zed:dark@900"]),
         row(1, failures=[{**failure, "after_s": 0.7}, {**failure, "answered_by": "come down", "after_s": 0.1}], min_clearance_m=0.4),
-        row(2, failures=[{**failure, "kind": PROCESS, "name": "mission"}], outcome="given_up", conforms=False),
+        row(2, failures=[{**failure, "kind": PROCESS, "name": "mission"}], outcome="given_up", conforms=False, seed=7),
     ]
     coverage = cover(rows, [way, never])
     told = coverage.as_dict()
     late = {"kind": FAULT, "name": "zed:dark"}
+    assert told["again"] == {2: "mapping --seed 7"}
     assert told["tried"][1] == {
         "kind": INVARIANT,
         "name": "a.b c",
