@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import fcntl
 import json
 from collections.abc import Collection, Iterable, Mapping
 from pathlib import Path
@@ -27,7 +28,7 @@ class Table:
     """The rows in a folder. What a crash has cut off is done again.
 
     Raises:
-        AnalysisError: the folder has another campaign in it, or can't be used.
+        AnalysisError: the folder has another campaign in it, one is being done there, or it can't be used.
     """
 
     def __init__(self, folder: Path, campaign: Campaign) -> None:
@@ -35,13 +36,14 @@ class Table:
         self.rows: dict[int, Row] = {}
         try:
             folder.mkdir(parents=True, exist_ok=True)
-            self._claim(folder, campaign)
+            self._plan = self._claim(folder, campaign)
             self._read({planned.number for planned in campaign.runs})
             self._file: BinaryIO = self._path.open("ab")
         except OSError as error:
             raise AnalysisError(f"{folder}: can't hold a campaign: {error.strerror or error}") from None
 
-    def _claim(self, folder: Path, campaign: Campaign) -> None:
+    def _claim(self, folder: Path, campaign: Campaign) -> BinaryIO:
+        """Take the folder for this process, as long as it has the returned file open: two campaigns in it would do each run twice."""
         plan = folder / PLAN
         asked = json.loads(json.dumps(campaign.as_dict()))
         if not plan.is_file():
@@ -50,6 +52,15 @@ class Table:
             write_json(plan, asked)
         elif _json(plan.read_bytes()) != asked:
             raise AnalysisError(f"{folder}: holds another campaign; choose another folder with --out, or remove this one")
+        claim = plan.open("rb")
+        try:
+            fcntl.flock(claim, fcntl.LOCK_EX | fcntl.LOCK_NB)
+        except BlockingIOError:
+            claim.close()
+            raise AnalysisError(
+                f"{folder}: a campaign is being done there; wait for its end, or choose another folder with --out"
+            ) from None
+        return claim
 
     def _read(self, numbers: Collection[int]) -> None:
         """Read the rows that are whole, and leave no others in the file."""
@@ -69,6 +80,7 @@ class Table:
     def finish(self) -> None:
         """Put the rows in the order of the runs: however often it was interrupted, the table is the same."""
         self._file.close()
+        self._plan.close()
         write_text(self._path, b"".join(_line(self.rows[number]) for number in sorted(self.rows)).decode())
 
 

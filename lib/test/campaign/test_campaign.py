@@ -284,6 +284,8 @@ def test_a_row_that_was_cut_off_is_flown_again_and_another_campaign_is_kept_out(
     campaign = load_campaign(campaign_file(tmp_path / "a.yaml", DRAWN))
     table = Table(tmp_path / "out", campaign)
     table.add([row(3), row(1)])
+    with pytest.raises(AnalysisError, match="a campaign is being done there; wait for its end"):
+        Table(tmp_path / "out", campaign)
     table.finish()
     path = tmp_path / "out" / ROWS
     assert [json.loads(line)["run"] for line in path.read_text(encoding="utf-8").splitlines()] == [1, 3]
@@ -292,6 +294,7 @@ def test_a_row_that_was_cut_off_is_flown_again_and_another_campaign_is_kept_out(
     assert set(again.rows) == {1}
     again.add([row(3)])
     again.finish()
+    assert again.rows.keys() == {1, 3}
     assert len(path.read_text(encoding="utf-8").splitlines()) == 2
     with pytest.raises(AnalysisError, match="holds another campaign"):
         Table(tmp_path / "out", load_campaign(campaign_file(tmp_path / "b.yaml", DRAWN.replace("12", "13"))))
