@@ -34,6 +34,7 @@ TYPED = [
     "bridge/ros_bridge/ros_bridge",
     "tools/bridge_tools",
     "tools/skill_bench",
+    "tools/decision_bench",
     "tools/start_bench",
     "tools/folder_bench",
     "tools/flight_bench",

@@ -1,0 +1,1 @@
+"""What the decision side of a robot takes while nothing is asked of it."""
