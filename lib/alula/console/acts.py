@@ -150,7 +150,7 @@ def start(wanted: WantedRun) -> Path:
             length, since_s = said.stat().st_size, time.monotonic()
         late = time.monotonic() - since_s >= SILENT_S
         if late:
-            _end(process)
+            end(process)
         if process.poll() is not None:
             words = said.read_text(encoding="utf-8", errors="replace").strip().splitlines()
             last = words[-1] if words else "it said nothing" if late else f"alula run ended with {process.returncode}"
@@ -160,8 +160,8 @@ def start(wanted: WantedRun) -> Path:
     return out
 
 
-def _end(process: subprocess.Popen[bytes]) -> None:
-    """End a run that prepares itself, with all that it has started."""
+def end(process: subprocess.Popen[bytes]) -> None:
+    """End what a page has started, with all that it has started itself."""
     for one in (signal.SIGTERM, signal.SIGKILL):
         with contextlib.suppress(ProcessLookupError):
             os.killpg(process.pid, one)

@@ -3,15 +3,19 @@
 from __future__ import annotations
 
 import contextlib
+import json
 from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
-from alula.common.runs import NoRunError, Run, is_deployment, load_run
+from alula.common.robots import RobotError, find_robot
+from alula.common.runs import NoRunError, Run, is_deployment, live_runs, load_run, robot_of
+from alula.common.scenarios import ScenarioError
 from alula.console import acts
 from alula.console.link import ActError, Link, Mission, PerRun
 from alula.console.manual_control import QUESTIONS, ManualControl
+from alula.console.searches import Searches, words_for
 from alula.runtime.live.options import RunOption
 
 ON_THE_FLIGHT = frozenset({"abort", "pause", "resume", "off"})
@@ -37,6 +41,7 @@ class Commands:
     def __init__(self, link: Link, options: Callable[[], Sequence[RunOption]], name_of: Callable[[Path], str]) -> None:
         self._options = options
         self._name_of = name_of
+        self.searches = Searches()
         self._missions: PerRun[Mission] = PerRun(link.connect)
         self._controls: PerRun[ManualControl] = PerRun(lambda run: ManualControl(link.listen(run)))
         self._acts: Mapping[str, Callable[[Asked, Path | None], Done]] = {
@@ -46,6 +51,8 @@ class Commands:
             "resume": lambda asked, run: self._told("resume", asked, run, lambda mission: mission.set_paused(paused=False)),
             "off": self._off,
             "skill": self._skill,
+            "search": self._search,
+            "stop search": self._stop_search,
         }
 
     def do(self, command: str, asked: Asked, run: Path | None) -> Done:
@@ -90,15 +97,42 @@ class Commands:
         what, answer = self.manual_control_of(folder).do(asked)
         return Done(folder, what, answer, noted=asked.get("act") not in QUESTIONS)
 
-    def _confirmed(self, asked: Asked, run: Path | None, *, mission: bool = False) -> Path:
-        """Return the run that a command means; raise ActError unless the request names the very run that is shown; ``mission``: one's."""
+    def _search(self, asked: Asked, run: Path | None) -> Done:
+        """Look for what could have been done about a fault; beside a mission under way only where that is asked for."""
+        folder = self._shown(asked, run)
+        if asked.get("beside") is not True and any(not is_deployment(one.folder) for one in live_runs()):
+            raise ActError("a mission under way on this computer would miss the processor; wait for its end, or ask for a search beside it")
+        self.searches.start(folder, str(asked.get("fault")), _words_of_search(folder, asked.get("fault")))
+        return Done(folder, "search", f"what could have been done about {asked['fault']} is being looked for", noted=False)
+
+    def _stop_search(self, asked: Asked, run: Path | None) -> Done:
+        folder = self._shown(asked, run)
+        self.searches.stop(folder, str(asked.get("fault")))
+        return Done(folder, "stop search", "it ends with what it has", noted=False)
+
+    def _shown(self, asked: Asked, run: Path | None) -> Path:
+        """Return the run that a command means; raise ActError unless the request names the very run that is shown."""
         if run is None or asked.get("run") != self._name_of(run):
             raise ActError("the run that is shown is another one by now; look again")
-        if not is_live(run):
-            raise ActError("this run is over")
-        if mission and is_deployment(run):
-            raise ActError("this is what stays up between missions: choose the mission's run; alula down ends what stays up")
         return run
+
+    def _confirmed(self, asked: Asked, run: Path | None, *, mission: bool = False) -> Path:
+        """Return the run under way that a command means, as ``_shown``; ``mission``: one's."""
+        folder = self._shown(asked, run)
+        if not is_live(folder):
+            raise ActError("this run is over")
+        if mission and is_deployment(folder):
+            raise ActError("this is what stays up between missions: choose the mission's run; alula down ends what stays up")
+        return folder
+
+
+def _words_of_search(folder: Path, fault: object) -> list[str]:
+    """Return the command that answers a fault of a run; raise ActError where the run does not say of which mission it is."""
+    try:
+        scenario = str(json.loads((folder / "run.json").read_text(encoding="utf-8"))["scenario"])
+        return words_for(robot_of(folder) or find_robot(), scenario, fault)
+    except (OSError, ValueError, KeyError, RobotError, ScenarioError) as error:
+        raise ActError(f"what was flown is not known: {error}") from error
 
 
 def _runs_of(folders: set[Path]) -> set[Run]:

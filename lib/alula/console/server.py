@@ -146,6 +146,7 @@ class Console:
             try:
                 yield server
             finally:
+                await asyncio.to_thread(self._commands.searches.close)
                 for task in [*looking, *(task for _, task in self._feeds.values())]:
                     task.cancel()
                 await asyncio.to_thread(self._commands.keep, set(), set())
@@ -278,6 +279,11 @@ class Console:
             shown = {"problems": [f"{type(error).__name__}: {error}"], "skillsets": []}
         return json.dumps({"manual": {"run": self._name_of(run), **shown}})
 
+    def _searches(self, run: Path) -> str:
+        """Return what is known of what could have been done in a run."""
+        found = {fault: asdict(one) for fault, one in self._commands.searches.found(run).items()}
+        return json.dumps({"searches": {"run": self._name_of(run), "found": found}})
+
     def _run_of(self, viewer: Viewer) -> Path | None:
         """Return the run that a viewer watches: the one that it chose, or the one that is shown first."""
         chosen = next((folder for folder in self._runs if self._name_of(folder) == viewer.run), None)
@@ -314,7 +320,7 @@ class Console:
 
     async def _send(self, viewer: Viewer, hello: Mapping[str, Any]) -> None:
         """Send what the viewer lacks, and how things are, until it is gone."""
-        place, due = place_of(hello), 0.0
+        place, due, searches = place_of(hello), 0.0, ""
         clock = asyncio.get_running_loop().time
         with contextlib.suppress(ConnectionClosed):
             while True:
@@ -328,6 +334,9 @@ class Console:
                     if clock() >= due:
                         due = clock() + STATUS_S
                         await asyncio.wait_for(viewer.connection.send(json.dumps({"status": self._status(viewer, run, feed)})), STUCK_S)
+                        if run is not None and (found := self._searches(run)) != searches:
+                            searches = found
+                            await asyncio.wait_for(viewer.connection.send(found), STUCK_S)
                         if viewer.manual and run in self._manual:
                             await asyncio.wait_for(viewer.connection.send(self._manual[run]), STUCK_S)
                 except TimeoutError:

@@ -12,6 +12,7 @@ from typing import Any
 
 from alula.common.faults import DIED, FaultChange, FaultError, FaultRequest, parse_fault
 from alula.common.record import EVENTS, MISSION, OPERATOR, TREE
+from alula.common.scenarios import ScenarioError, load_scenario
 from alula.records.causes.branches import Trees
 from alula.records.causes.chains import Judgement, KnownFault, Scene, Step, chain_of, reaction_in, reacts_until_s
 from alula.records.causes.effects import EffectsByFault
@@ -106,7 +107,7 @@ class Causes:
         return {
             "departed_s": self._departed_s(events),
             "back_s": _back_s(events),
-            "faults": [_fault(one) for one in faults],
+            "faults": [{**_fault(one), "repair": self._repair(one.name)} for one in faults],
             "failures": [_failure(one, faults, scene, failures) for one in failures],
         }
 
@@ -120,6 +121,19 @@ class Causes:
             with contextlib.suppress(AnalysisError):
                 self._effects = effects_of_robot()
         return self._effects
+
+    def _repair(self, fault: str) -> str:
+        """Return the command that tells what could have been done about a fault; empty where none does.
+
+        Faults are asked for as the robot's file has them, and missions that are files.
+        """
+        if fault not in self._known_effects().known:
+            return ""
+        try:
+            mission = load_scenario(str((self._facts.get(RUN) or {}).get("scenario"))).mission
+        except ScenarioError:
+            return ""
+        return f"alula repair {mission} --fault {fault}" if mission.endswith(".xml") else ""
 
     def _faults(self, events: list[EngineEvent]) -> list[KnownFault]:
         """Return what failed: as the summary tells; without one, what the recordings tell or what was asked for, traced."""

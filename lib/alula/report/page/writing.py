@@ -17,7 +17,9 @@ from alula.report.page.following import RunFollower
 PARTS = Path(__file__).parent / "program"
 MAX_PICTURES = 400
 """In a report: 3 MB of it at most."""
-PROGRAM = ("dom", "fold", "robot", "account", "state", "tree", "timeline", "map", "figures", "pictures", "operator", "manual", "main")
+PROGRAM = (
+    "dom", "fold", "robot", "account", "state", "tree", "timeline", "map", "figures", "pictures", "operator", "manual", "repairs", "main",
+)  # fmt: skip
 """Files of the program, in the order in which they need each other."""
 
 

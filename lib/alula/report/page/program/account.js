@@ -16,7 +16,7 @@ const REACTION_S = 3; // for so long an act of the controller, or a death, goes 
 
 const NO_CAUSES = { departed_s: null, back_s: null, faults: [], failures: [] };
 
-/** What is known of failures: {departed_s, back_s, faults: [{name, text, mark, began, ended, t, until, detected, resource}], failures: [{key, skill, t, text, fault, chain, reacts_until, reaction}]}. */
+/** What is known of failures: {departed_s, back_s, faults: [{name, text, mark, began, ended, t, until, detected, resource, repair}], failures: [{key, skill, t, text, fault, chain, reacts_until, reaction}]}. */
 const causesOf = (run) => run.facts["/causes"] ?? NO_CAUSES;
 const faultsOf = (run) => causesOf(run).faults;
 const failures = (run) => causesOf(run).failures;
@@ -168,7 +168,7 @@ function operatorTold(run, say) {
 /** Whether the run had no mission, and only served its skills. */
 const served = (run) => (run.facts["/summary"]?.outcome ?? last(run.mission.v)?.outcome) === "served";
 
-/** A row for each failure, and one for the whole mission: [{what, why, t, until, done, cost}]; the last has no t. */
+/** A row for each failure, and one for the whole mission: [{what, why, t, until, done, cost, fault, repair}]; the last has no t. */
 function answers(run) {
   const rows = [];
   const failed = failures(run);
@@ -213,7 +213,7 @@ function failureRow(run, fault, own, failed) {
   if (recovered && recovery.moving_again_s != null) cost.push(`the robot moved on after ${seconds(recovery.moving_again_s - (recovery.failure_s ?? recovery.detected_s), 2)}`);
   const endings = own.map(({ text }) => text);
   const what = fault ? fault.text : endings.shift().replace(/\.$/, ""); // each ending is told once
-  return { what, why: endings.join(" "), failed: true, t: since, until: fault?.until ?? null, done: done.join("; ") || "nothing followed", cost: cost.join("; ") };
+  return { what, why: endings.join(" "), failed: true, t: since, until: fault?.until ?? null, done: done.join("; ") || "nothing followed", cost: cost.join("; "), fault: fault?.name, repair: fault?.repair };
 }
 
 /** The skills that were started between two moments, in their order, as "wait, dock"; empty where there are none. */

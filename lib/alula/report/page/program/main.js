@@ -35,7 +35,7 @@ function show() {
 }
 
 function showAccount() {
-  const news = `${run.news} ${run.over}`;
+  const news = `${run.news} ${run.over} ${repairs.news}`;
   if (showAccount.news === news) return;
   showAccount.news = news;
   const { text, tone, reason } = headline(run);
@@ -54,10 +54,13 @@ function showAccount() {
   const zero = origin(run);
   const go = (t) => el("button", { type: "button", onclick: () => choose(t), "aria-label": `go to ${seconds(t - zero)}` }, seconds(t - zero, 2));
   rewrite(byId("lines"), account(run), ({ t, text: sentence, kind }) => el("li", { class: kind }, go(t), el("span", {}, sentence)));
-  const rows = answers(run);
+  const rows = answers(run).map((row) => ({ ...row, phase: row.repair ? repairs.phase(row.fault) : "" }));
   const cell = (label, ...content) => el("td", { "data-label": label }, ...content);
-  rewrite(byId("answers").tBodies[0], rows, ({ what, why, t, until, done, cost }) => el("tr", {}, el("th", { scope: "row" }, what, why ? el("p", { class: "hint" }, why) : null), cell("when", ...(t === null ? [] : [go(t)]), ...(until == null ? [] : [" until ", go(until)])), cell("what was done", done), cell("what it cost", cost)));
+  rewrite(byId("answers").tBodies[0], rows, ({ what, why, t, until, done, cost, fault, repair }) => el("tr", {}, el("th", { scope: "row" }, what, why ? el("p", { class: "hint" }, why) : null), cell("when", ...(t === null ? [] : [go(t)]), ...(until == null ? [] : [" until ", go(until)])), cell("what was done", done), cell("what it cost", cost), repair ? cell("what could have been done", el("code", {}, ...repair.split(" ").flatMap((word) => [el("span", {}, word), " "])), repairs.of(fault)) : el("td", {})));
   byId("answers").hidden = !rows.length;
+  const answered = new Map(rows.filter(({ phase }) => phase === "answered").map(({ fault, repair }) => [fault, repair]));
+  rewrite(byId("repairs"), [...answered], ([fault, repair]) => repairs.whole(fault, repair));
+  byId("answers").classList.toggle("unrepaired", !rows.some(({ repair }) => repair));
   const chains = failures(run).map(({ chain }) => chain);
   rewrite(byId("chains"), chains.length ? chains : [null], (chain) => (chain ? el("ol", { class: "chain" }, ...chain.map(({ step, t, text: sentence }) => el("li", {}, el("b", {}, step), go(t), el("span", {}, sentence)))) : el("p", {}, "No skill failed.")));
   rewrite(byId("problems"), run.facts["/summary"]?.problems ?? [], (sentence) => el("li", {}, sentence));
@@ -222,6 +225,7 @@ class Link {
     sessionStorage.setItem("alula-key", this.key);
     this.name = `viewer ${this.key.slice(0, 4)}`;
     this.bar = new OperatorBar((asked) => this.send(asked), (name) => this.watch(name));
+    repairs.bar = this.bar;
     this.manual = new ManualControlView((asked) => this.send(asked), (...words_) => this.bar.armed(...words_));
     byId("link").hidden = false;
     this.open();
@@ -273,6 +277,8 @@ class Link {
       if (said.status.deployment && this.opened !== said.status.run) [this.opened, this.manual.box.open] = [said.status.run, true]; // once: it is what there is to see
       this.bar.show(said.status, last(run.start.v), last(run.held.v) ?? null, run.departure !== null);
     }
+    if (said.searches) this.searches = said.searches;
+    if (said.status && repairs.show(this.searches?.run === said.status.run ? this.searches.found : {}, said.status.underWay.length > 0)) draw();
     if (said.status && (!said.status.live || this.manual.run !== said.status.run)) this.manual.forget();
     if (said.manual && said.manual.run === this.status?.run) this.manual.show(said.manual);
     this.judge();

@@ -2,7 +2,7 @@
 // finger: two presses in turn, and for everything off a word that is typed. The acts on a run under way stay in sight.
 
 const ARMED_MS = 4000;
-const CALLED = { resume: "go on", off: "everything off", take: "take over" };
+const CALLED = { resume: "go on", off: "everything off", take: "take over", search: "what could have been done", "stop search": "stop" };
 const SIGNS = { pause: "M1 1h4v10h-4zM7 1h4v10h-4z", resume: "M2 1v10l9 -5z", abort: "M6 11l-5 -6h3v-4h4v4h3z" };
 const DOUBT_MS = 3000; // an answer takes some milliseconds; after so long the operator is told that it is late
 
