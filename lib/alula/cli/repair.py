@@ -6,12 +6,11 @@ Ends with 0 when a branch was proved, or none is needed; 1: it is impossible, or
 from __future__ import annotations
 
 import argparse
-import signal
 import sys
 from collections.abc import Sequence
 from pathlib import Path
-from types import FrameType
 
+from alula.cli.ctrl_c import ctrl_c_stops
 from alula.cli.saying import warner
 from alula.cli.table import parse
 from alula.common.errors import AlulaError
@@ -21,7 +20,7 @@ from alula.odds.errors import OddsError
 from alula.odds.odds import Odds, odds_of
 from alula.odds.robot import graph_of
 from alula.prove.limits import Deadline, OutOfTimeError
-from alula.repair.repairing import Answer, Question, Search
+from alula.repair.repairing import Question, Search
 from alula.repair.subject import Subject
 from alula.repair.telling import as_dict, as_text
 
@@ -49,7 +48,9 @@ def run(given: argparse.Namespace) -> int:
     subject = Subject.read(given.file, tell)
     using = tuple(one.strip() for part in given.using for one in part.split(",") if one.strip())
     question = Question(given.fault, given.finding, given.within, using, given.most_faults, given.goal, given.never)
-    answer = _answer(Search(subject, question, Deadline.after(given.time, tell), tell))
+    search = Search(subject, question, Deadline.after(given.time, tell), tell)
+    with ctrl_c_stops(search.stop):
+        answer = search.run()
     repair = answer.repair
     odds = None
     if repair is not None:
@@ -60,20 +61,6 @@ def run(given: argparse.Namespace) -> int:
         tell(f"{given.out} has it")
     sys.stdout.write(json_line(as_dict(answer, odds)) if given.json else as_text(answer, odds))
     return 0 if repair is not None or answer.survives_already else NONE
-
-
-def _answer(search: Search) -> Answer:
-    """Search; Ctrl-C ends it with the best so far, a second one at once."""
-
-    def stop(_number: int, _frame: FrameType | None) -> None:
-        search.stop()
-        signal.signal(signal.SIGINT, before)
-
-    before = signal.signal(signal.SIGINT, stop)
-    try:
-        return search.run()
-    finally:
-        signal.signal(signal.SIGINT, before)
 
 
 def _odds(path: Path, before: Path, changed: Path) -> tuple[Odds, Odds] | None:

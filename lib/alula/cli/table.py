@@ -109,6 +109,7 @@ GROUPS: dict[str, Sequence[Command]] = {
         _models("check", "check skill models and missions: errors and warnings with their places, then proofs", models.check),
         _models("odds", "tell how likely a mission is accomplished, degraded, given up, or neither", models.odds),
         _models("repair", "write the fallback branch that a mission lacks for a fault or a counterexample, proved", models.repair),
+        _models("plan", "write a mission that reaches a goal, from nothing, proved", models.plan),
         _models("tree", "draw a mission; with answers tick it without any robot", models.tree),
         _models("palette", "write a robot's skills as a TreeNodesModel for Groot2", models.palette),
         _models("generate", "make interfaces, managers and the bridge's configuration from a robot's skill models", models.generate),

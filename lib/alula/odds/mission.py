@@ -90,6 +90,12 @@ class MissionSteps:
         known = any(one.name == name.partition(".")[0] for one in self._system.skillsets)
         return self._system.resource(state.state, name) if known else None
 
+    def resources(self, state: Place) -> dict[str, str]:
+        """Return the states of all resources that the mission hangs on, by ``skillset.resource``."""
+        names = [f"{of.name}.{one.name}" for of in self._system.skillsets for one in of.resources]
+        found = ((name, self._system.resource(state.state, name)) for name in names)
+        return {name: known for name, known in found if known is not None}
+
     def holds(self, state: Place, condition: Expression) -> bool:
         """Tell whether a condition of a mission's property is true."""
         return true_in(self._system, condition, state.state)

@@ -29,7 +29,13 @@ def ignore(_line: str) -> None:
 
 
 def mission_of(
-    path: Path, world: str = "", others: Figures | None = None, *, warn: Warn = ignore, changed: Path | None = None
+    path: Path,
+    world: str = "",
+    others: Figures | None = None,
+    *,
+    warn: Warn = ignore,
+    changed: Path | None = None,
+    models: Sequence[Skillset] | None = None,
 ) -> tuple[Callable[[str], System], Callable[[System], MissionSteps], Figures]:
     """Return what reads a mission's file of this robot, as for ``look_at``, what can happen to it then, and the figures that it hangs on.
 
@@ -39,17 +45,17 @@ def mission_of(
         others: figures in the place of the robot's.
         warn: is told what can't be read.
         changed: another file with the same mission, changed, which is looked at with this one's inputs.
+        models: in the place of the robot's.
 
     Raises:
         AlulaError: a file is missing or wrong, with its place.
     """
     robot = find_robot()
-    models = models_of(robot, warn)
+    models = models_of(robot, warn) if models is None else models
     figures, effects = _of_faults(robot, models)
     failures = Failures(refusals=False, hooks=False, aborts=False)
     part, departure = part_of(robot, warn), _departure(robot, models)
-    mocks = load_behaviour(robot.behaviour_files, models)
-    brought, at_first = _brought(mocks), {_named(place, state) for one in mocks.timeline for place, state in one.states.items()}
+    brought, at_first = brought_about(robot, models)
     scenario = by_mission().get(path.resolve())
     inputs = None if scenario is None else inputs_of(scenario, world)
     file = changed or path
@@ -104,8 +110,17 @@ def _of_faults(robot: RobotFolder, models: Sequence[Skillset]) -> tuple[Figures,
     return (Figures(), {}) if file is None else (load_figures(file, models), load_effects(file, models).known)
 
 
+def brought_about(robot: RobotFolder, models: Sequence[Skillset]) -> tuple[Brought, frozenset[tuple[str, str]]]:
+    """Return what the mocks of skills bring about, as the functional layer does, and what comes by itself after power-up.
+
+    Raises AlulaError where a file of mocks can't be read.
+    """
+    mocks = load_behaviour(robot.behaviour_files, models)
+    at_first = frozenset(_named(place, state) for one in mocks.timeline for place, state in one.states.items())
+    return _brought(mocks), at_first
+
+
 def _brought(mocks: Behaviour) -> Brought:
-    """Return what the mocks of skills bring about: the functional layer does the same."""
     found: dict[str, set[tuple[str, str]]] = {}
     for (skillset, skill), several in mocks.rules.items():
         for change in (change for rule in several for change in rule.changes or ()):

@@ -5,6 +5,7 @@ from __future__ import annotations
 import copy
 from collections.abc import Iterator
 from dataclasses import dataclass
+from enum import IntEnum
 from textwrap import wrap
 
 from alula.repair.subject import Subject, with_property, without_properties_of
@@ -14,7 +15,17 @@ from alula.trees.reading import node_name
 
 WIDTH = 140
 STEP = "  "
+HOLE = "Hole"
+"""Where the node that a branch answers for stands in what is put around it."""
 FALLBACKS = frozenset({"Fallback", "ReactiveFallback"})
+
+
+class Rank(IntEnum):
+    """What a branch leads to; those that lead to better are tried first."""
+
+    GOES_ON = 0
+    ENDS_WELL = 1
+    GIVES_UP = 2
 
 
 @dataclass(frozen=True)
@@ -27,7 +38,8 @@ class Branch:
         at: the place of the node that it answers for.
         why: lines for a comment: for which situation it is, and why each step is there.
         wraps: the node stands in no Fallback yet, so that one is put around it.
-        around: ``use`` is put around the node.
+        around: ``use`` is put around the node: in the place of its ``HOLE``, if it has nodes in it.
+        rank: what it leads to.
     """
 
     use: Element
@@ -36,11 +48,18 @@ class Branch:
     why: tuple[str, ...]
     wraps: bool = False
     around: bool = False
+    rank: Rank = Rank.GOES_ON
 
     @property
     def size(self) -> int:
         """How many nodes it has."""
-        return 1 if self.tree is None else sum(1 for _ in self.tree.iterate())
+        use = sum(one.tag != HOLE for one in self.use.iterate()) if self.around or self.tree is None else 0
+        return use + (0 if self.tree is None else sum(1 for _ in self.tree.iterate()))
+
+    @property
+    def order(self) -> tuple[int, int]:
+        """By what branches are sorted: what they lead to, then how many nodes they add."""
+        return self.rank, self.size + self.wraps
 
     @property
     def key(self) -> tuple[str, ...]:
@@ -49,15 +68,19 @@ class Branch:
         return "".join(self.use.pieces()), tree, str(self.at)
 
     @property
+    def use_id(self) -> str:
+        """The ID of its tree."""
+        return next(one.get("ID") for one in self.use.iterate() if one.tag == "SubTree")
+
+    @property
     def name(self) -> str:
         """What it is called."""
         return node_name(self.use)
 
     def as_xml(self) -> str:
         """Return the subtree as it will stand in the file."""
-        if self.around:
-            return "\n".join(_lines(self.use, 0))
-        return "" if self.tree is None else "\n".join(_lines_of_tree(self))
+        around = list(_lines(self.use, 0)) if self.around else []
+        return "\n".join([*around, *(_lines_of_tree(self) if self.tree is not None else [])])
 
     def written(self, subject: Subject, leave_out: tuple[str, ...] = (), more: str = "") -> tuple[str, list[str]]:
         """Return the mission's file with it, and the properties that ask for nodes of these names, which are left out.
@@ -105,7 +128,7 @@ def _insert(document: Document, branch: Branch) -> None:
     parent = parent_of(root, element)
     use = clone(branch.use)
     if branch.around:
-        _put_around(parent, element, use)
+        _put_around(parent, element, use if use.children else _with_hole(use))
     elif parent.tag in FALLBACKS:
         lead = _lead(parent, element)
         place = parent.content.index(element)
@@ -120,18 +143,32 @@ def _insert(document: Document, branch: Branch) -> None:
 
 
 def _wrap(parent: Element, element: Element, use: Element, name: str) -> None:
-    fallback = node("Fallback", name=name)
-    _put_around(parent, element, fallback)
-    fallback.content[2:2] = [fallback.content[0], use]
+    _put_around(parent, element, node("Fallback", node(HOLE), use, name=name))
+
+
+def _with_hole(use: Element) -> Element:
+    use.content, use.empty = [node(HOLE)], False
+    return use
 
 
 def _put_around(parent: Element, element: Element, outer: Element) -> None:
+    """Put an element into the hole of another one, which takes its place."""
     lead = _lead(parent, element)
-    place = parent.content.index(element)
-    _shift(element, STEP)
-    outer.empty = False
-    outer.content = [lead + STEP, element, lead]
-    parent.content[place] = outer
+    parent.content[parent.content.index(element)] = outer
+    _lay_out(outer, element, lead)
+
+
+def _lay_out(outer: Element, inner: Element, lead: str, depth: int = 1) -> None:
+    """Give each node that is new a line of its own, and put another one into the hole, further indented."""
+    content: list[Element | str] = []
+    for child in outer.children:
+        if child.tag == HOLE:
+            content += [lead + STEP, inner]
+            _shift(inner, STEP * depth)
+        else:
+            content += [lead + STEP, child]
+            _lay_out(child, inner, lead + STEP, depth + 1)
+    outer.content = [*content, lead] if content else outer.content
 
 
 def _shift(element: Element, by: str) -> None:
@@ -153,16 +190,23 @@ def _lead(parent: Element, element: Element) -> str:
 # --- layout -------------------------------------------------------------------------------------------------------------
 
 
+def tree_lines(name: str, top: Element) -> list[str]:
+    """Return the lines of a tree as they stand in a file, without its indentation."""
+    return [f'<BehaviorTree ID="{name}">', *(STEP + one for one in _lines(top, 2)), "</BehaviorTree>"]
+
+
 def _lines_of_tree(branch: Branch) -> list[str]:
     assert branch.tree is not None  # noqa: S101 - who asks has one
     said = [f"{STEP}{line}" for one in branch.why for line in wrap(one, WIDTH - 2 * len(STEP))]
     comment = ["<!--", *said, "-->"] if said else []
-    tree = [f'<BehaviorTree ID="{branch.use.get("ID")}">', *(STEP + one for one in _lines(branch.tree, 2)), "</BehaviorTree>"]
-    return [*comment, *tree]
+    return [*comment, *tree_lines(branch.use_id, branch.tree)]
 
 
 def _lines(element: Element, level: int) -> Iterator[str]:
     """Yield an element's lines, the longest broken before an attribute, as authors do."""
+    if element.tag == HOLE:
+        yield f"<!-- {element.get('name')} -->"
+        return
     words = [f"{one.name}={quoted(one.value)}" for one in element.attributes.values()]
     head = f"<{element.tag}"
     end = "/>" if not element.children else ">"

@@ -63,6 +63,7 @@ class Fate:
         survives: it is always accomplished, degraded or not.
         safe: it always ends, and the robot is at rest, at home or somebody else's then.
         run: what happens in a run after which it can't be accomplished any more.
+        states: those of the resources then.
         situations: how many were looked at.
     """
 
@@ -71,6 +72,7 @@ class Fate:
     survives: bool
     safe: bool
     run: tuple[str, ...]
+    states: Mapping[str, str]
     situations: int
 
     def as_dict(self) -> dict[str, object]:
@@ -93,10 +95,12 @@ def fate_of(
     most: int | None = None,
     goal: Expression | None = None,
     strikes: int = MOST_FAULTS,
+    reached: Expression | None = None,
 ) -> Fate | None:
     """Return it; None: there are more situations than ``most``. ``rest`` are states of resources in which a robot is safe.
 
-    With a ``goal``, a mission survives, too, when it comes to be true after the faults. Faults end skills badly ``strikes`` times.
+    With a ``goal``, a mission survives, too, when it comes to be true after the faults; what has to be ``reached`` is true at a good end.
+    Faults end skills badly ``strikes`` times.
 
     Raises OutOfTimeError.
     """
@@ -115,7 +119,9 @@ def fate_of(
         if most is not None and len(before) > most:
             return None
         outcome = steps.outcome(here.place)
-        if outcome in GOOD or (goal is not None and here.come == len(faults) and steps.holds(here.place, goal)):
+        if (outcome in GOOD and (reached is None or steps.holds(here.place, reached))) or (
+            goal is not None and here.come == len(faults) and steps.holds(here.place, goal)
+        ):
             good.append(here)
         if outcome is not None:
             ends_at_rest.append(here)
@@ -131,7 +137,8 @@ def fate_of(
     hopeful, ending = (reachable_from(several, lambda one: leading.get(one, ())) for several in (good, ends_at_rest))
     lost = next((one for one in before if one not in hopeful), None)
     safe = safe and len(ending) == len(before)
-    return Fate(tuple(faults), frozenset(outcomes), lost is None, safe, () if lost is None else _run(before, lost), len(before))
+    run, states = ((), {}) if lost is None else (_run(before, lost), steps.resources(lost.place))
+    return Fate(tuple(faults), frozenset(outcomes), lost is None, safe, run, states, len(before))
 
 
 def needs(steps: MissionSteps, skillsets: Sequence[Skillset], skill: str, deadline: Deadline) -> bool:

@@ -53,11 +53,19 @@ def _what(finding: Diagnostic) -> tuple[str, str]:
 class Judge:
     """Looks at a mission, and at what is made of it."""
 
-    def __init__(self, subject: Subject, deadline: Deadline, goal: Expression | None = None, strikes: int = MOST_FAULTS) -> None:
+    def __init__(
+        self,
+        subject: Subject,
+        deadline: Deadline,
+        goal: Expression | None = None,
+        strikes: int = MOST_FAULTS,
+        reached: Expression | None = None,
+    ) -> None:
         self._subject = subject
         self._strikes = strikes
         self._deadline = deadline
         self._goal = goal
+        self._reached = reached
 
     def check(self, text: str, *, prove: bool = True, also: bool = False) -> Judgement:
         """Return what `check` tells of a text of the mission's file; raises OutOfTimeError.
@@ -102,13 +110,14 @@ class Judge:
         def fate(faults: Sequence[str], most: int | None) -> Fate | None:
             self._deadline.doing = f"looking at the runs with {' and then '.join(faults) or 'no fault'}"
             subject = self._subject
-            return fate_of(steps, subject.skillsets, faults, self._deadline, subject.at_rest, most, self._goal, self._strikes)
+            rest, skillsets = subject.at_rest, subject.skillsets
+            return fate_of(steps, skillsets, faults, self._deadline, rest, most, self._goal, self._strikes, self._reached)
 
         return fate
 
     def _steps(self, text: str) -> MissionSteps:
         with self._subject.copy(text) as path:
-            read, steps_of, _ = mission_of(self._subject.flown_as, changed=path)
+            read, steps_of, _ = mission_of(self._subject.flown_as, changed=path, models=self._subject.skillsets)
             return steps_of(read(""))
 
 

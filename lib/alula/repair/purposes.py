@@ -1,21 +1,21 @@
-"""What skills are for, as far as models and mocks tell it already.
+"""What skills are for: their roles, as models say them, and what follows from models and mocks without being said.
 
 - A skill that has a successful result achieves something; one that has none is there to run: it watches, or holds something.
 - What a skill takes when it starts, it holds while it runs.
-- Skills of one kind with the same inputs stand for one another: they achieve the same result with the same resource, or they watch for the
-  same skillset. Each may need what the other does not.
+- Skills of one role with the same inputs stand for one another. Where one of two has no role, they do when they achieve the same result
+  with the same resource, or watch for the same skillset. Each may need what the other does not.
 - What one of them holds and its stand-in does not has to be held by another skill beside it.
 - What a skill brings about in the functional layer is what its mock says (``then`` of ``mock.yaml``).
 """
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Collection, Iterator, Mapping, Sequence
 from dataclasses import dataclass
 
 from alula.model.conditions import NO_DATA, judge
 from alula.model.expressions import ResourceIs
-from alula.model.model import Resource, ResultKind, Skill, Skillset
+from alula.model.model import Resource, Skill, Skillset
 
 
 @dataclass(frozen=True)
@@ -40,15 +40,21 @@ class Purpose:
         return f"{self.skillset.name}.{self.skill.name}"
 
     @property
+    def roles(self) -> frozenset[str]:
+        """What its model calls it."""
+        return frozenset(one.name for one in self.skill.provides)
+
+    @property
     def inputs(self) -> Mapping[str, str]:
         """The types of its inputs, by their names."""
         return {one.name: one.type for one in self.skill.inputs}
 
 
 class Purposes:
-    """What the skills of a robot are for."""
+    """What the skills of a robot are for; ``brought``: what their mocks bring about in the functional layer."""
 
-    def __init__(self, skillsets: Sequence[Skillset]) -> None:
+    def __init__(self, skillsets: Sequence[Skillset], brought: Mapping[str, Collection[tuple[str, str]]] | None = None) -> None:
+        self.brought = brought or {}
         self.known = {f"{of.name}.{one.name}": _purpose(of, one) for of in skillsets for one in of.skills}
 
     def stand_ins(self, name: str) -> list[Purpose]:
@@ -60,7 +66,12 @@ class Purposes:
     def alike(self, name: str) -> list[Purpose]:
         """Return the skills that may be for the same, also those that no branch is made of: their inputs and good results are the same."""
         mine = self.known[name]
-        return [one for one in self._of(mine) if one.name != name and (one.inputs, one.achieves) == (mine.inputs, mine.achieves)]
+        same = {one.name for one in self._of(mine) if (one.inputs, one.achieves) == (mine.inputs, mine.achieves)}
+        return [one for one in self.known.values() if one.name != name and (one.name in same or mine.roles & one.roles)]
+
+    def watching(self, role: str) -> list[Purpose]:
+        """Return the skills that fill a role while they run."""
+        return [one for one in self.known.values() if not one.achieves and role in one.roles]
 
     def holders(self, needed: Purpose, instead: Purpose) -> list[Purpose] | None:
         """Return skills that hold what ``needed`` holds and ``instead`` does not, one for each resource; None: nothing holds one."""
@@ -84,11 +95,13 @@ class Purposes:
 
 
 def _purpose(skillset: Skillset, skill: Skill) -> Purpose:
-    achieves = frozenset(one.name for one in skill.results if skill.kind_of(one.name) is ResultKind.SUCCESS)
+    achieves = frozenset(one.name for one in skill.successes)
     return Purpose(skillset, skill, achieves, {one.resource: one.target for one in skill.start.assignments})
 
 
 def _stands_for(one: Purpose, other: Purpose) -> bool:
+    if one.roles and other.roles:
+        return bool(one.roles & other.roles) and one.inputs == other.inputs
     if one.skillset.name != other.skillset.name or bool(one.achieves) != bool(other.achieves) or one.inputs != other.inputs:
         return False
     if not other.achieves:

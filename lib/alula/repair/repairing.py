@@ -26,10 +26,11 @@ from alula.prove.mission.run import MissionRun
 from alula.prove.mission.system import System
 from alula.repair.branches import Branch
 from alula.repair.errors import RepairError
+from alula.repair.failing import Failing, failing_by
 from alula.repair.fates import MOST_FAULTS, Fate
 from alula.repair.game import played
 from alula.repair.judging import Judge, Judgement, run_of
-from alula.repair.patterns import Failing, Patterns, failing_by
+from alula.repair.patterns import MOST_NODES, Patterns
 from alula.repair.subject import Subject, with_property, without_properties_of
 from alula.trees.document import Element
 from alula.trees.node import Node
@@ -57,6 +58,9 @@ class Question:
         most_faults: how many faults may come, the first one included.
         goal: a condition, written as in properties, that is as good as an accomplished mission; empty: there is none.
         never: what no run of the repaired mission may come to.
+        reached: what has to be true at the end of an accomplished mission; None: nothing is asked.
+        most_nodes: of a branch.
+        others: whether it is told what becomes of the mission by other faults.
     """
 
     fault: str = ""
@@ -66,6 +70,9 @@ class Question:
     most_faults: int = MOST_FAULTS
     goal: str = ""
     never: str = ""
+    reached: Expression | None = None
+    most_nodes: int = MOST_NODES
+    others: bool = True
 
     @property
     def never_asked(self) -> str:
@@ -136,9 +143,9 @@ class Search:
         self._deadline = deadline
         self._deadlines = [deadline]
         self._tell = tell
-        self._goal = _condition(question.goal) if question.goal else None
-        self._judge = Judge(subject, deadline, self._goal, question.most_faults)
-        self._patterns = Patterns(subject, question.using, question.most_faults)
+        self._goal = condition_of("--goal", question.goal) if question.goal else None
+        self._judge = Judge(subject, deadline, self._goal, question.most_faults, question.reached)
+        self._patterns = Patterns(subject, question.using, question.most_faults, question.most_nodes)
         self._refuted: set[frozenset[str]] = set()
         self._stopped = False
         self._missing = tuple(subject.names_asked())
@@ -174,7 +181,7 @@ class Search:
         if reasons and (fate is None or fate.safe):
             return Answer(tuple(failing), fate, None, impossible=True, reasons=tuple(reasons))
         repair, tried = self._first_proved(before, failing, fate, finding)
-        if repair is not None:
+        if repair is not None and self._question.others:
             repair = self._with_fates(text, repair)
         return Answer(tuple(failing), fate, repair, bool(reasons), tuple(reasons), tried, self._stopped)
 
@@ -225,11 +232,11 @@ class Search:
     ) -> tuple[Repair | None, int]:
         """Return the first branch that is proved, and how many were tried."""
         tried = 0
-        several = [one for leaf in failing for one in self._patterns.branches(leaf, within=self._question.within)]
+        several = [one for leaf in failing for one in self._patterns.branches(leaf, self._question.within, fate.states if fate else None)]
         branches: dict[tuple[str, ...], Branch] = {}
         for one in several:
             branches.setdefault(one.key, one)  # two leaves may have the same answer
-        for branch in sorted(branches.values(), key=lambda one: one.size + one.wraps):
+        for branch in sorted(branches.values(), key=lambda one: one.order):
             if self._is_refuted(branch):
                 continue
             tried += 1
@@ -276,7 +283,7 @@ class Search:
         """Return why no tree can have done what a skill is for that the mission needs; empty where one might."""
         lines: list[str] = []
         try:
-            if not failing.states or not self._judge.needs(text, failing.skill):
+            if not failing.states or failing.degrades or not self._judge.needs(text, failing.skill):
                 return []
         except OutOfTimeError:
             return []
@@ -325,7 +332,7 @@ class Search:
         before: dict[tuple[str, ...], Fate] = {}
         after: dict[tuple[str, ...], Fate] = {}
         self._deadlines.append(Deadline.after(self._deadline.left_s() * SHARE, self._deadline.tell))
-        judge = Judge(self._subject, self._deadlines[-1], self._goal, self._question.most_faults)
+        judge = Judge(self._subject, self._deadlines[-1], self._goal, self._question.most_faults, self._question.reached)
         with suppress(OutOfTimeError):
             was, now = judge.fates(text), judge.fates(stripped)
             for faults in (*singles, *pairs):
@@ -336,8 +343,8 @@ class Search:
         return replace(repair, before=before, after=after, not_looked_at=not_looked_at)
 
 
-def _condition(text: str) -> Expression:
-    """Read a condition, as those of a mission's properties; raises RepairError."""
+def condition_of(option: str, text: str) -> Expression:
+    """Read a condition, as those of a mission's properties; ``option`` is what gives it. Raises RepairError."""
     source = Source("", f"goal: eventually {text}".replace("'", '"'))
     with suppress(SyntaxFault):
         cursor = Cursor(source)
@@ -345,7 +352,7 @@ def _condition(text: str) -> Expression:
         if cursor.at_end and not source.diagnostics:
             return one.condition
     why = f": {source.diagnostics[0].message}" if source.diagnostics else ""
-    raise RepairError(f"--goal '{text}': can't be read as a condition, such as outcome given_up or running(skillset.skill){why}")
+    raise RepairError(f"{option} '{text}': can't be read as a condition, such as outcome given_up or running(skillset.skill){why}")
 
 
 def _told(fate: Fate | None) -> str:

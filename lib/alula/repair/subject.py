@@ -20,6 +20,8 @@ from alula.language.messages import Messages, messages_of
 from alula.missions.part import MissionPart
 from alula.missions.scenario import by_mission, flown
 from alula.model.model import Skillset
+from alula.odds.mission import Brought
+from alula.odds.robot import brought_about
 from alula.prove.mission.accepted import DESCRIPTION
 from alula.prove.mission.wanted import PROPERTY
 from alula.records.causes.effects import FaultEffects
@@ -42,6 +44,8 @@ class Subject:
         flown_as: the mission's file that a scenario has inputs for: this one, else one with a main tree of the same name; else this one.
         library: that of this scenario.
         faults: what each fault of the robot brings about.
+        brought: by a skill, the states that its success brings about in the functional layer.
+        at_first: the states that come by themselves after power-up.
     """
 
     path: Path
@@ -54,6 +58,8 @@ class Subject:
     part: MissionPart
     messages: Messages
     faults: Mapping[str, FaultEffects]
+    brought: Brought
+    at_first: frozenset[tuple[str, str]]
 
     @classmethod
     def read(cls, path: Path, tell: Warn) -> Subject:
@@ -67,7 +73,8 @@ class Subject:
         source = read_source(path)
         flown_as, scenario = _flown_as(path, parse_document(source, str(path)).root)
         tree = TreeSource(path) if scenario is None else flown(path, scenario)
-        return cls(path, flown_as, source, tree.library, tree.read(), robot, models, part_of(robot, tell), messages_of(robot), faults)
+        part, messages = part_of(robot, tell), messages_of(robot)
+        return cls(path, flown_as, source, tree.library, tree.read(), robot, models, part, messages, faults, *brought_about(robot, models))
 
     def tree(self, path: Path) -> TreeSource:
         """Return where the mission, or a copy of it with changes, is read from."""

@@ -6,6 +6,7 @@ from collections.abc import Sequence
 
 from alula.odds.odds import Odds
 from alula.odds.telling import WORDS
+from alula.repair import planning
 from alula.repair.fates import Fate
 from alula.repair.repairing import Answer, Repair
 
@@ -89,3 +90,33 @@ def _range(odds: Odds, name: str) -> str:
 
 def _fate(fate: Fate) -> str:
     return "survives" if fate.survives else "ends safely" if fate.safe else "unsafe"
+
+
+# --- plans --------------------------------------------------------------------------------------------------------------
+
+
+def plan_as_text(answer: planning.Answer) -> str:
+    """Return lines for a terminal."""
+    if answer.plan is None:
+        when = " before the search was ended" if answer.stopped else ""
+        head = "impossible" if answer.impossible else f"unknown: none of {answer.tried} courses was proved{when}"
+        return "\n".join([head, *(f"  {one}" for one in answer.reasons)]) + "\n"
+    plan = answer.plan
+    lines = [f"planned, proved by check: {', then '.join(plan.steps)}; {plan.nodes} nodes", "", plan.text]
+    lines += [f"  {fault:<34} {_fate(fate)}" for fault, fate in plan.fates.items()]
+    if plan.left_out:
+        lines.append(f"  not looked at: {', '.join(plan.left_out)}")
+    return "\n".join(lines) + "\n"
+
+
+def plan_as_dict(answer: planning.Answer) -> dict[str, object]:
+    """Return what `--json` prints."""
+    kind = "planned" if answer.plan else "impossible" if answer.impossible else "unknown"
+    found: dict[str, object] = {"answer": kind, "tried": answer.tried, "stopped": answer.stopped, "reasons": list(answer.reasons)}
+    if answer.plan is None:
+        return found
+    plan = answer.plan
+    found["plan"] = {"xml": plan.text, "steps": list(plan.steps), "nodes": plan.nodes}
+    found["not_looked_at"] = list(plan.left_out)
+    found["fates"] = [one.as_dict() for one in plan.fates.values()]
+    return found

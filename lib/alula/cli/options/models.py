@@ -95,11 +95,32 @@ def repair(parser: ArgumentParser) -> None:
     completed_by(parser.add_argument("--fault", default="", metavar="NAME", help="the fault that is to be survived"), "faults")
     parser.add_argument("--finding", type=int, default=0, metavar="N", help="the counterexample of `alula check` that is to be answered")
     parser.add_argument("--goal", default="", metavar="CONDITION", help="what is as good as an accomplished mission, as in properties")
-    parser.add_argument("--never", default="", metavar="CONDITION", help="what no run of the repaired mission may come to")
     parser.add_argument("--within", default="", metavar="NODE", help="where the branch has to stand (default: anywhere)")
+    _search(parser, "the mission with the branch")
+    json_option(parser, "the branch")
+
+
+def plan(parser: ArgumentParser) -> None:
+    """Add what ``alula plan`` takes."""
     parser.add_argument(
-        "--using", action="append", default=[], metavar="SKILLS", help="skills that may stand for the one that fails (default: all)"
+        "skillsets",
+        nargs="?",
+        type=Path,
+        metavar="SKILLSETS",
+        help="a robot's folder, or its skillsets (default: the current folder's robot)",
     )
+    goal = "what is to be reached: skillset.resource == STATE, several with and, or, not; or a role that skills provide"
+    parser.add_argument("--goal", default="", metavar="CONDITION", help=goal)
+    start = "what is so at first: skillset.resource == STATE, several with and (default: as after power-up)"
+    parser.add_argument("--from", dest="start", default="", metavar="CONDITION", help=start)
+    _search(parser, "the mission")
+    json_option(parser, "the mission")
+
+
+def _search(parser: ArgumentParser, what: str) -> None:
+    """Add what both searches for branches take."""
+    parser.add_argument("--never", default="", metavar="CONDITION", help="what no run of the mission may come to")
+    parser.add_argument("--using", action="append", default=[], metavar="SKILLS", help="skills that may be added (default: all)")
     parser.add_argument(
         "--most-faults",
         type=int,
@@ -109,8 +130,7 @@ def repair(parser: ArgumentParser) -> None:
         help="how many faults may come, one after another: 1 or 2 (default 2)",
     )
     parser.add_argument("--time", type=float, default=REPAIR_S, metavar="SECONDS", help=f"time limit (default {REPAIR_S:g})")
-    parser.add_argument("--out", type=Path, metavar="FILE", help="write the mission with the branch there (default: nothing is written)")
-    json_option(parser, "the branch")
+    parser.add_argument("--out", type=Path, metavar="FILE", help=f"write {what} there (default: nothing is written)")
 
 
 def tree(parser: ArgumentParser) -> None:

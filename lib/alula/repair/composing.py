@@ -1,0 +1,140 @@
+"""Trees of skills: a skill with what its inputs come from, with the roles that it needs filled beside it, and one skill after another."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+
+from alula.missions.skill_types import type_of
+from alula.model.model import Parameter
+from alula.model.units import told_unit
+from alula.repair.branches import node
+from alula.repair.courses import Course, Courses, Here, Wanted
+from alula.repair.naming import plain
+from alula.repair.purposes import Purpose
+from alula.trees.document import Element
+from alula.trees.node import pointer
+from alula.trees.palette import Direction, Palette
+from alula.trees.reading import TreeFiles, node_name, type_name
+from alula.trees.values import ANY
+
+TOLD_WITHIN_S = "5"
+"""How long the functional layer has to tell what a skill has brought about, seconds: drivers tell it a moment later."""
+
+
+@dataclass(frozen=True)
+class Sources:
+    """Where the inputs of skills come from: other uses in the files, the mission's own inputs, what a part of a tree writes itself.
+
+    Attributes:
+        files: the mission's trees.
+        palette: of its nodes.
+        asks: whether an input that comes from nowhere becomes one of the tree's own, of its name.
+    """
+
+    files: TreeFiles
+    palette: Palette
+    asks: bool = False
+
+    def leaf(self, purpose: Purpose, known: Mapping[str, str], within: Element | None = None) -> Element | None:
+        """Return a leaf with ``known`` values of inputs and others found for it; None where an input comes from nowhere."""
+        values = {one.name: known.get(one.name) or self._binding(within, purpose, one) for one in purpose.skill.inputs}
+        if any(value is None and not one.default for one, value in zip(purpose.skill.inputs, values.values(), strict=True)):
+            return None
+        made = node(purpose.name, name=plain(purpose.name))
+        for name, value in values.items():
+            if value is not None:
+                made.set(name, value)
+        return made
+
+    @property
+    def ports(self) -> list[str]:
+        """The names of the mission's inputs."""
+        model = self.files.models.get(self.files.main)
+        return [] if model is None else [one.name for one in model.ports.values() if one.direction is Direction.INPUT]
+
+    def _binding(self, within: Element | None, purpose: Purpose, parameter: Parameter) -> str | None:
+        trees = self.files.trees.values()
+        same = [one.get(parameter.name) for tree in trees for one in tree.iterate() if type_name(one) == purpose.name]
+        if any(same):
+            return next(one for one in same if one)
+        named = [one for one in self.ports if parameter.name in one.split("_")]
+        if named:
+            return f"{{{named[0]}}}"
+        return self._written(within, parameter) or (f"{{{parameter.name}}}" if self.asks else None)
+
+    def _written(self, within: Element | None, parameter: Parameter) -> str | None:
+        kind, unit = type_of(parameter.type), told_unit(parameter.comment)
+        found: list[str] = []
+        for one in within.iterate() if within is not None else ():
+            known = self.palette.get(type_name(one))
+            for port in known.ports.values() if known else ():
+                alike = port.type.name == kind.name and port.type is not ANY and port.unit == unit
+                entry = pointer(one.get(port.name), port.name)
+                if port.direction is Direction.OUTPUT and alike and entry:
+                    found.append(f"{{{entry}}}")
+        return found[0] if found else None
+
+
+@dataclass(frozen=True)
+class Composer:
+    """Makes trees of courses.
+
+    Attributes:
+        sources: of inputs.
+        courses: what tells which skills can fill a role.
+        alternatives: each skill of a role that can run is tried, one after another; else the first one alone.
+        attempts: how often a skill is started at most that does not succeed.
+    """
+
+    sources: Sources
+    courses: Courses
+    alternatives: bool = False
+    attempts: int = 1
+
+    def after_one_another(
+        self, course: Course, wanted: Wanted | None, known: Mapping[str, str], reused: Mapping[str, Element]
+    ) -> list[Element]:
+        """Return the nodes of a course in their order, none where an input comes from nowhere.
+
+        ``reused``: what stands for a skill, by its name. What the functional layer tells of a step is waited for before the next one.
+        """
+        found: list[Element] = []
+        for number, step in enumerate(course.steps):
+            made = self.step(step, course.heres[number], known, reused.get(step.name))
+            if made is None:
+                return []
+            found.append(made)
+            told = " && ".join(f"{name} == {state}" for name, state in course.told_between(number, wanted))
+            if told:
+                found.append(node("Awaits", name=f"{plain(step.name)} is told", if_=told, within=TOLD_WITHIN_S))
+        return found
+
+    def step(self, purpose: Purpose, here: Here, known: Mapping[str, str], instead: Element | None = None) -> Element | None:
+        """Return a skill with what it needs beside it; ``instead``: a node that stands for it."""
+        leaf = instead if instead is not None else self.sources.leaf(purpose, known)
+        several = [[leaf]] if leaf is not None else []
+        for role in purpose.skill.needs:
+            providers = self.courses.providers(here, role.name)
+            watching = [one for one in (self.sources.leaf(each, {}) for each in providers) if one is not None]
+            several = [[*one, watch] for one in several for watch in (watching if self.alternatives else watching[:1])]
+        ways = [_watched(one[0], one[1:]) for one in several]
+        if not ways:
+            return None
+        made = ways[0] if len(ways) == 1 else node("Fallback", *ways, name=f"{plain(purpose.name)}, or else")
+        if self.attempts == 1:
+            return made
+        return node("RetryUntilSuccessful", made, name=f"{plain(purpose.name)} again", num_attempts=str(self.attempts))
+
+
+def _watched(leaf: Element, watching: Sequence[Element]) -> Element:
+    """Return a node that runs while others do, once these make progress; it ends with the first of them that ends."""
+    if not watching:
+        return leaf
+    made = type(leaf)(leaf.tag, leaf.place, dict(leaf.attributes), list(leaf.content), empty=leaf.empty)  # may stand in several ways
+    name = node_name(leaf)
+    sees = " && ".join(f"progress({one.tag}) >= 1" for one in watching)
+    wait = node("WaitFor", name=f"{' and '.join(node_name(one) for one in watching)} at work", if_=sees)
+    inner = node("Sequence", wait, made, name=f"then {name}")
+    called = f"{name} with {' and '.join(node_name(one) for one in watching)}"
+    return node("Parallel", *watching, inner, name=called, success_count="1", failure_count="1")

@@ -1,0 +1,55 @@
+"""What fails in a mission by a fault, and has to be answered."""
+
+from __future__ import annotations
+
+import re
+from dataclasses import dataclass
+from fnmatch import fnmatchcase
+
+from alula.prove.mission.system import System
+from alula.repair.purposes import broken_by
+from alula.repair.subject import Subject
+from alula.trees.node import Node
+
+_DEGRADED = re.compile(r"\bdegraded\s*:=")
+
+
+@dataclass(frozen=True)
+class Failing:
+    """What is to be answered: a leaf, and the states with which its skill can't run (``skillset.resource``, state).
+
+    ``results`` are those by which the fault ends it.
+    """
+
+    leaf: Node
+    skill: str
+    states: tuple[tuple[str, str], ...] = ()
+    fault: str = ""
+    results: tuple[str, ...] = ()
+
+    @property
+    def degrades(self) -> bool:
+        """Tell whether the author says that the mission is degraded once it has failed: another end than giving up may be good then."""
+        return _DEGRADED.search(self.leaf.wiring.element.get("_onFailure")) is not None
+
+    @property
+    def words(self) -> str:
+        """Return it as comments say it."""
+        by = f" by the fault {self.fault}" if self.fault else ""
+        return f"{self.skill} ('{self.leaf.name}') fails{by}"
+
+
+def failing_by(fault: str, subject: Subject, system: System) -> list[Failing]:
+    """Return the leaves of the mission's main tree that a fault ends, each once for each place in the files."""
+    effects = subject.faults[fault]
+    states = [tuple(one.rsplit(" ", 1)) for one in sorted(effects.states)]
+    found: dict[int, Failing] = {}
+    for leaf in system.leaves:
+        name = f"{leaf.skillset}.{leaf.model.name}"
+        mine = tuple((at.partition(".")[2], state) for at, state in states if at.partition(".")[0] == leaf.skillset)
+        broken = tuple((at, state) for at, state in mine if broken_by(leaf.model, at, state))
+        results = tuple(one.name for one in leaf.model.results if any(fnmatchcase(f"{name} {one.name}", end) for end in effects.ends))
+        if (broken or results) and leaf in system.trees[0].nodes:
+            full = tuple((f"{leaf.skillset}.{at}", state) for at, state in broken)
+            found.setdefault(id(leaf.wiring.element), Failing(leaf, name, full, fault, results))
+    return list(found.values())

@@ -1,0 +1,151 @@
+"""Branches made of courses of skills: what makes it possible that something runs again, and the way to where a mission says it is safe."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Mapping
+from itertools import islice
+
+from alula.model.expressions import And
+from alula.repair.branches import HOLE, Branch, Rank, node
+from alula.repair.composing import Composer, Sources
+from alula.repair.courses import Course, Courses, Here, States, initial_states
+from alula.repair.failing import Failing
+from alula.repair.naming import another, plain
+from alula.repair.purposes import Purpose, Purposes, asked_of_others
+from alula.repair.subject import Subject
+from alula.trees.document import Element
+from alula.trees.node import Node
+from alula.trees.reading import node_name, type_name
+
+AGAIN_S = "1"
+"""How long after a failure a node gets its other chance, seconds."""
+SAFE = "safe"
+"""A mission's input that has this word in its name says where the robot may be left."""
+MOST_COURSES = 3
+
+
+class Remedies:
+    """Makes branches of courses from the situation in which something has failed."""
+
+    def __init__(self, subject: Subject, purposes: Purposes, sources: Sources, courses: Courses, attempts: int) -> None:
+        self._subject = subject
+        self._purposes = purposes
+        self._sources = sources
+        self._courses = courses
+        self._composer = Composer(sources, courses)
+        self._attempts = attempts
+
+    def around(self, place: Node, failing: Failing, states: States) -> Iterator[Branch]:
+        """Yield the node with other chances, each after skills that make true what the failed one needs."""
+        purpose = self._purposes.known[failing.skill]
+        skill = purpose.skill
+        several = [*(one.condition for one in skill.preconditions), *(one.condition for one in skill.invariants)]
+        if not several:
+            return
+        wanted = (purpose.skillset.name, several[0] if len(several) == 1 else And(tuple(several)))
+        here = Here(self._at_rest(states))
+        if here.fulfils(wanted):
+            return
+        courses = list(islice(self._courses.to(here.states, lambda one: one.heres[-1].fulfils(wanted)), MOST_COURSES))
+        for course in (one for one in courses if failing.skill not in {step.name for step in one.steps}):
+            for reused in self._reused(course, failing):
+                steps = self._composer.after_one_another(course, wanted, {}, reused)
+                if steps:
+                    yield self._again_after(place, failing, course, steps)
+
+    def at_the_safe_place(self, place: Node, failing: Failing, states: States) -> Iterator[Branch]:
+        """Yield the way to the place that the mission calls safe, by each skill that may do what one of its own skills does."""
+        safe = next((one for one in self._sources.ports if SAFE in one.split("_")), None)
+        if safe is None or not failing.states:
+            return
+        trees = self._subject.files.trees.values()
+        used = {type_name(one) for tree in trees for one in tree.iterate()} & set(self._purposes.known)
+        roles = {role for name in used for role in self._purposes.known[name].roles}
+        here = Here(self._at_rest(states))
+        for purpose in self._purposes.known.values():
+            if (
+                self._courses.may_use(purpose)
+                and purpose.roles & roles
+                and len(purpose.inputs) == 1
+                and self._courses.after(here, purpose) is not None
+            ):
+                (given,) = purpose.inputs
+                step = self._composer.step(purpose, here, {given: f"{{{safe}}}"})
+                if step is not None:
+                    code, name = "@degraded := true; @stopping := true", f"{plain(purpose.name)} to safety"
+                    yield self._end(place, failing, purpose, step, name, code, Rank.ENDS_WELL)
+
+    def other_ways(self, place: Node, failing: Failing, states: States) -> Iterator[Branch]:
+        """Yield what does the same as a skill of a part with another skill of its role, and what that one needs beside it."""
+        here = Here(self._at_rest(states))
+        acting = [one for one in place.wiring.element.iterate() if type_name(one) in self._purposes.known]
+        several = [one for one in acting if self._purposes.known[type_name(one)].achieves]
+        if len(several) != 1 or not failing.states or not any(type_name(one) == failing.skill for one in acting):
+            return
+        (leaf,) = several
+        for purpose in self._purposes.stand_ins(type_name(leaf)):
+            if self._courses.may_use(purpose) and self._courses.after(here, purpose) is not None:
+                step = self._composer.step(purpose, here, {name: leaf.get(name) for name in purpose.inputs})
+                if step is not None:
+                    yield self._end(place, failing, purpose, step, f"{plain(purpose.name)} instead", "@degraded := true", Rank.GOES_ON)
+
+    # --- parts -------------------------------------------------------------------------------------------------------
+
+    def _at_rest(self, states: States) -> dict[str, str]:
+        """Return the states of all resources once the skills that ran have given theirs back."""
+        found = initial_states(self._subject.skillsets, self._subject.at_first)
+        extern = {
+            f"{of.name}.{one.name}" for of in self._subject.skillsets for one in of.resources if any(a.extern for a in one.transitions)
+        }
+        return found | {name: state for name, state in states.items() if name in extern}
+
+    def _reused(self, course: Course, failing: Failing) -> Iterator[Mapping[str, Element]]:
+        """Yield which trees of the files stand for skills of a course: each that has one of them and no other part in it, then none."""
+        steps = {one.name for one in course.steps}
+        for name, tree in self._subject.files.trees.items():
+            skills = [type_name(one) for one in tree.iterate() if type_name(one) in self._purposes.known]
+            mine = [one for one in skills if one in steps]
+            if len(mine) == 1 and len(set(skills)) <= 2 and failing.skill not in skills:
+                yield {mine[0]: node("SubTree", ID=name, name=plain(name), _autoremap="true")}
+        yield {}
+
+    def _again_after(self, place: Node, failing: Failing, course: Course, steps: list[Element]) -> Branch:
+        element = place.wiring.element
+        words = [plain(one.name) for one in course.steps]
+        tree = another("_and_".join("_".join(one.split()) for one in words), self._subject.files.trees)
+        degraded = node("Script", name="degraded", code="@degraded := true")
+        top = node("Sequence", degraded, *steps, name=f"{' and '.join(words)}, degraded")
+        guard = self._missing(course)
+        if guard:
+            top.set("_failureIf", guard)
+        use = node("SubTree", ID=tree, name=" and ".join(words), _autoremap="true")
+        name = f"{node_name(element)}, or {words[-1]} first"
+        fallback = node("Fallback", node(HOLE, name=node_name(element)), node("ForceFailure", use, name="then again"), name=name)
+        last = course.steps[-1]
+        needed = " && ".join(f"{last.skillset.name}.{resource.name} == {state}" for resource, state in asked_of_others(last))
+        again = f"{node_name(element)} again"
+        if needed:
+            retry = node("RetryAfter", fallback, name=again, attempts=str(self._attempts), wait=AGAIN_S, if_=needed)
+        else:
+            retry = node("RetryUntilSuccessful", fallback, name=again, num_attempts=str(self._attempts))
+        names = ", then ".join(one.name for one in course.steps)
+        why = (f"When {failing.words}: {names} bring about what it needs, and it gets another chance.", *_told(course.steps))
+        return Branch(retry, top, element.place, why, around=True)
+
+    def _missing(self, course: Course) -> str:
+        """Return when a course can't begin: what its first skill needs of the functional layer is not there."""
+        first = course.steps[0]
+        return " || ".join(f"{first.skillset.name}.{resource.name} != {state}" for resource, state in asked_of_others(first))
+
+    def _end(self, place: Node, failing: Failing, purpose: Purpose, step: Element, name: str, code: str, rank: Rank) -> Branch:
+        """Return a step as a branch that is for the failed one alone: where what shows the fault is not there, it fails."""
+        shown = " && ".join(f"{at} != {state}" for at, state in failing.states)
+        top = node("Sequence", node("Script", name="degraded", code=code), step, name=f"{name}, degraded", _failureIf=shown)
+        tree = another("_".join(name.split()), self._subject.files.trees)
+        ends = "" if rank is Rank.GOES_ON else "the mission ends, degraded, at the place that it calls safe: "
+        why = (f"When {failing.words}: {ends}{purpose.name} does it.", *_told([purpose]))
+        return Branch(node("SubTree", ID=tree, name=name, _autoremap="true"), top, place.wiring.element.place, why, rank=rank)
+
+
+def _told(steps: list[Purpose] | tuple[Purpose, ...]) -> list[str]:
+    return [f"{one.name} needs {' and '.join(role.name for role in one.skill.needs)} meanwhile." for one in steps if one.skill.needs]

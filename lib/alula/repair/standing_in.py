@@ -1,0 +1,223 @@
+"""Branches that do what failed with other skills, which stand for those that can't run."""
+
+from __future__ import annotations
+
+from collections.abc import Collection, Iterator, Mapping, Sequence
+from dataclasses import dataclass
+from itertools import islice, product
+
+from alula.model.conditions import NO_DATA, judge
+from alula.prove.mission.accepted import DESCRIPTION
+from alula.repair.branches import Branch, clone, node, parent_of
+from alula.repair.composing import Sources
+from alula.repair.failing import Failing
+from alula.repair.naming import Renaming, another, assigned, plain
+from alula.repair.purposes import Purpose, Purposes, asked_of_others, broken_by
+from alula.repair.subject import Subject, texts_of
+from alula.trees.document import Element
+from alula.trees.node import Node
+from alula.trees.reading import is_port, node_name, type_name
+
+
+class StandIns:
+    """Makes branches of other skills: their inputs are the same, what they need is asked before, and what the others held is held."""
+
+    def __init__(self, subject: Subject, purposes: Purposes, sources: Sources, using: Collection[str]) -> None:
+        self._subject = subject
+        self._purposes = purposes
+        self._sources = sources
+        self._using = using
+        self._texts = texts_of(subject.files.documents[0].root)
+        self._trees = subject.files.trees
+
+    def beside(self, place: Node, failing: Failing) -> Iterator[Branch]:
+        """Yield branches that may stand beside a node in which something fails."""
+        element = place.wiring.element
+        tree = self._trees.get(element.get("ID")) if element.tag == "SubTree" else None
+        top = element if tree is None else tree.children[0]
+        mine = failing.leaf.wiring.element.place
+        if not any(one.place == mine for one in top.iterate()):
+            return
+        others = dict.fromkeys(type_name(one) for one in top.iterate() if type_name(one) in self._purposes.known)
+        choices = [(one, [None, *self._stand_ins(one, ())]) for one in others if one != failing.skill]
+        for stand_in in self._stand_ins(failing.skill, failing.states):
+            several = product(*(options for _, options in choices))
+            for chosen in sorted(several, key=lambda one: sum(option is not None for option in one)):
+                instead = {failing.skill: stand_in}
+                instead |= {name: other for (name, _), other in zip(choices, chosen, strict=True) if other is not None}
+                yield from self._with(top, place, instead, failing)
+
+    def _stand_ins(self, skill: str, states: Sequence[tuple[str, str]]) -> list[Purpose]:
+        found = self._purposes.stand_ins(skill)
+        broken = [one for one in found for at, state in states if _is_broken(one, at, state)]
+        return [one for one in found if one not in broken and (not self._using or one.name in self._using)]
+
+    def _with(self, top: Element, place: Node, instead: Mapping[str, Purpose], failing: Failing) -> Iterator[Branch]:
+        """Yield a branch with these skills instead of others; what has to be held is brought about first, where a skill does that."""
+        held = {name: self._purposes.holders(self._purposes.known[name], one) for name, one in instead.items()}
+        if any(one is None for one in held.values()):
+            return
+        holders = [holder for several in held.values() for holder in several or ()]
+        making = _Making(self._subject, self._sources, self._purposes, self._texts)
+        several = (making.made(top, instead, held, bringing=one) for one in ((True, False) if holders else (False,)))
+        fitting = (one for one in several if one is not None and self._has_what_it_needs(one.top, place, failing))
+        yield from (self._as_branch(one, place, instead, failing) for one in islice(fitting, 1))
+
+    def _has_what_it_needs(self, top: Element, place: Node, failing: Failing) -> bool:
+        """Tell whether each role that a skill needs is filled by another one, in the branch or beside it."""
+        inside = {type_name(one) for one in top.iterate()} & set(self._purposes.known)
+        beside = {name for name in _run_beside(place) if name != failing.skill} & set(self._purposes.known)
+        filled = {role for name in inside | beside for role in self._purposes.known[name].roles}
+        return all(role.name in filled for name in inside for role in self._purposes.known[name].skill.needs)
+
+    def _as_branch(self, made: _Made, at: Node, instead: Mapping[str, Purpose], failing: Failing) -> Branch:
+        place = at.wiring.element
+        renaming = Renaming(failing.skill.rpartition(".")[2], instead[failing.skill].skill.name, self._texts)
+        guard = self._guard(made.top, failing)
+        degraded = node("Script", name="degraded", code="@degraded := true")
+        name = renaming.name(node_name(place))
+        top = node("Sequence", degraded, made.top, name=name if name != node_name(made.top) else f"{name}, degraded")
+        if guard:
+            top.set("_failureIf", guard)
+        tree_name = renaming.identifier(place.get("ID")) if place.tag == "SubTree" else "_".join(name.lower().split())
+        tree_name = another("".join(sign for sign in tree_name if sign.isalnum() or sign == "_"), self._trees)
+        use = node("SubTree", ID=tree_name, name=name, _autoremap="true")
+        why = (f"When {failing.words}, {made.why[0]}", *made.why[1:])
+        return Branch(use, top, place.place, why)
+
+    def _guard(self, top: Element, failing: Failing) -> str:
+        """Return when the branch is not for it: what its skills need and only the functional layer gives is not there, or was lost."""
+        terms: dict[str, None] = {}
+        for one in top.iterate():
+            purpose = self._purposes.known.get(type_name(one))
+            for resource, state in asked_of_others(purpose) if purpose else ():
+                watching = self._watching(purpose, resource.name) if purpose else []
+                if watching:
+                    terms[f"{purpose.skillset.name}.{resource.name} != {state}"] = None  # type: ignore[union-attr]  # it has one
+                    terms |= {f"failed('{name}')": None for name in watching if self._was_there(name, failing)}
+        return " || ".join(terms)
+
+    @staticmethod
+    def _watching(purpose: Purpose, resource: str) -> list[str]:
+        """Return the invariants of a skill that a state of a resource breaks."""
+        states = purpose.skillset.resource(resource).states
+        return [
+            one.name
+            for one in purpose.skill.invariants
+            if any(judge(one.condition, {resource: state}, NO_DATA) is False for state in states)
+        ]
+
+    def _was_there(self, invariant: str, failing: Failing) -> bool:
+        """Tell whether a leaf beside the failing one can end by an invariant: then something else failed, which is not answered here."""
+        place = failing.leaf.parent
+        leaves = [one for one in (place.iterate() if place is not None else ()) if type_name(one.wiring.element) in self._purposes.known]
+        names = {type_name(one.wiring.element) for one in leaves} - {failing.skill}
+        return any(invariant == one.name for name in names for one in self._purposes.known[name].skill.invariants)
+
+
+def _run_beside(place: Node) -> Iterator[str]:
+    """Yield the skills that run beside a node."""
+    at = place
+    while at.parent is not None:
+        if at.parent.wiring.element.tag == "Parallel":
+            yield from (type_name(one.wiring.element) for child in at.parent.children if child is not at for one in child.iterate())
+        at = at.parent
+
+
+@dataclass(frozen=True)
+class _Made:
+    top: Element
+    why: tuple[str, ...]
+
+
+class _Making:
+    """Makes a copy of a part of a tree with other skills."""
+
+    def __init__(self, subject: Subject, sources: Sources, purposes: Purposes, texts: Sequence[str]) -> None:
+        self._subject = subject
+        self._sources = sources
+        self._purposes = purposes
+        self._texts = texts
+
+    def made(
+        self, original: Element, instead: Mapping[str, Purpose], held: Mapping[str, list[Purpose] | None], *, bringing: bool
+    ) -> _Made | None:
+        top = node("Top", clone(original))
+        leaves: list[Element] = []
+        why: list[str] = []
+        for name, purpose in instead.items():
+            renaming = Renaming(name.rpartition(".")[2], purpose.skill.name, self._texts)
+            for one in [one for one in top.iterate() if type_name(one) == name]:
+                one.tag = purpose.name
+                leaves.append(one)
+            why.append(f"{purpose.name} stands for {name}{_as_it_needs(purpose)}.")
+            for one in list(top.iterate()):
+                _rename(one, renaming, name, purpose.name)
+        for name, purpose in instead.items():
+            for holder in held[name] or ():
+                for leaf in [one for one in leaves if one.tag == purpose.name]:
+                    added = self._hold(top, leaf, holder, bringing=bringing)
+                    if added is None:
+                        return None
+                    leaves += added
+                (resource,) = holder.holds
+                why.append(f"{holder.name} holds {resource} meanwhile, as {name} did.")
+                brought = self._purposes.bringers(holder)[:1] if bringing else []
+                why += [f"{one.name} comes before it: what is held is brought about first." for one in brought]
+        names = assigned([(one.tag, node_name(one)) for one in leaves], self._subject.names_asked())
+        for number, name in names.items():
+            leaves[number].set("name", name)
+        return _Made(top.children[0], tuple(why))
+
+    def _hold(self, top: Element, leaf: Element, holder: Purpose, *, bringing: bool) -> list[Element] | None:
+        """Have a skill hold something while a leaf runs; return the leaves that are new, None where their inputs come from nowhere."""
+        child, sequence = leaf, parent_of(top, leaf)
+        while sequence.tag not in {"Sequence", "Top"}:
+            child, sequence = sequence, parent_of(top, sequence)
+        if sequence.tag == "Top":
+            child = leaf
+            sequence = parent_of(top, leaf)
+        held = self._sources.leaf(holder, {}, top)
+        if held is None:
+            return None
+        new = [held]
+        first: list[Element] = []
+        if bringing:
+            bringers = self._purposes.bringers(holder)
+            known = {name: held.get(name) for name in holder.inputs}
+            first = [one for purpose in bringers[:1] if (one := self._sources.leaf(purpose, known, top)) is not None]
+            if not first or sequence.tag != "Sequence":
+                return None
+            new += first
+        place = sequence.content.index(child)
+        before = sequence.content[place - 1] if place else ""
+        asked = f"running({holder.name})"
+        if isinstance(before, Element) and before.tag == "WaitFor":
+            sequence.content.remove(before)
+            asked, place = f"{asked} && {before.get('if')}", place - 1
+        wait = node("WaitFor", name=f"{plain(holder.name)} runs", if_=asked)
+        within = node("Sequence", wait, child, name=f"{node_name(child)}, held")
+        parallel = node("Parallel", held, within, name=f"{node_name(leaf)} with {plain(holder.name)}", success_count="1", failure_count="1")
+        sequence.content[place : place + 1] = [*first, parallel]
+        return new
+
+
+def _is_broken(purpose: Purpose, at: str, state: str) -> bool:
+    skillset, _, resource = at.partition(".")
+    return purpose.skillset.name == skillset and broken_by(purpose.skill, resource, state) is not None
+
+
+def _as_it_needs(purpose: Purpose) -> str:
+    needs = [f"{purpose.skillset.name}.{resource.name} == {state}" for resource, state in asked_of_others(purpose)]
+    return f": it needs {', '.join(needs)}" if needs else ""
+
+
+def _rename(element: Element, renaming: Renaming, old: str, new: str) -> None:
+    """Have an element of a copy name the other skill."""
+    for name, attribute in element.attributes.items():
+        if name == "name":
+            element.set(name, renaming.name(attribute.value))
+        elif name == DESCRIPTION:
+            element.set(name, "")
+        elif old in attribute.value and not (is_port(name) and attribute.value.startswith("{")):
+            element.set(name, attribute.value.replace(old, new))
