@@ -71,7 +71,7 @@ def judged(campaign: Path, words: Words) -> Iterator[Judged]:
     mocks = Mocks()
     for line in (campaign / "runs.jsonl").read_text(encoding="utf-8").splitlines():
         row = json.loads(line)
-        folder = max(campaign.glob(f"run-{row['run']:05d}*"), key=lambda one: one.stat().st_mtime)
+        folder = campaign / row["folder"]
         summary = json.loads((folder / "summary.json").read_text(encoding="utf-8")) if (folder / "summary.json").is_file() else {}
         truth = with_radio(truth_of(folder), row["faults"])
         world = campaign / f"world-{row['scenario']}.yaml"

@@ -15,6 +15,8 @@ from flight_judge.truth import Broken, Truth
 
 LATE_S = 6.0
 """A fault that has ended can still be the cause for so long: monitors wait up to 3 s, and a motion is given up within 5.1 s."""
+EARLY_S = 0.06
+"""The managers' clock ticks at 50 Hz: what they tell may be stamped some ticks before what caused it."""
 CLOCK_BY, CLOCK_S = "ros_bridge", 0.5
 """The process that brings the clock to the mission, and how long after its end the clock has stopped."""
 RADIO = ("radio", "control")
@@ -107,7 +109,7 @@ def cause_of(claim: Claim, truth: Truth, words: Words) -> str:
     begin_s, end_s = _failed(claim, truth)
     for one in truth.broken:
         pattern = words.get(f"{one.what}:{one.how}") or words.get(one.what)
-        there = one.at_s <= end_s and begin_s <= one.until_s + LATE_S
+        there = one.at_s <= end_s + EARLY_S and begin_s <= one.until_s + LATE_S
         if there and pattern is not None and pattern.search(claim.reason):
             return f"{one.what}:{one.how}"
     return ""

@@ -9,13 +9,12 @@ from pathlib import Path
 
 from alula.campaign.mocked_scenarios import load_mocked_scenario
 from alula.common.faults import MOCKED, FaultError, FaultRequest, changes_of, parse_fault, spans_of
-from alula.common.operator import acts_of, is_operator
 from alula.common.public import public
 from alula.common.robots import RobotFolder, find_robot, load_robot_folder, meaning
 from alula.common.run_log import note_mocked
 from alula.missions.driver import TICK_PERIOD_S
 from alula.missions.mission_file import plan_of_file
-from alula.missions.mocked import LATENCY_S, LIMIT_S, Listener, MockedMission
+from alula.missions.mocked import LATENCY_S, LIMIT_S, Listener, MockedMission, check_faults
 from alula.missions.part import MissionPart
 from alula.missions.plan import Inputs, MissionPlan
 from alula.mock import Behaviour, load_behaviour
@@ -167,10 +166,7 @@ class Mission:
         """
         requests = _requests(faults)
         try:
-            acts_of(requests)
-            for fault in requests:
-                if not is_operator(fault):
-                    self.behaviour.fault(fault)
+            check_faults(requests, self.behaviour, [one.name for one in self.skillsets])
         except SkillRuntimeError as error:
             raise FaultError(str(error)) from None
         folder = None if out is None else Path(out).expanduser().absolute()

@@ -9,11 +9,10 @@ from pathlib import Path
 
 from alula.campaign.flown import FlownAnswer, Ticks
 from alula.common.faults import FaultError, FaultRequest
-from alula.common.operator import acts_of, is_operator
 from alula.common.robots import RobotError, find_robot
 from alula.common.scenarios import Scenario, ScenarioError, load_scenario
 from alula.missions.director import End
-from alula.missions.mocked import MockedMission
+from alula.missions.mocked import MockedMission, check_faults
 from alula.missions.plan import InputError, Inputs, MissionPlan
 from alula.missions.scenario import check_names, inputs_of, plan_of
 from alula.mock import Behaviour
@@ -64,10 +63,7 @@ class MockedScenario:
             AnalysisError: there is none of this name.
         """
         try:
-            acts_of(faults)
-            for fault in faults:
-                if not is_operator(fault):
-                    self.behaviour.fault(fault)
+            check_faults(faults, self.behaviour, self.scenario.skillsets)
         except (FaultError, SkillRuntimeError) as error:
             raise AnalysisError(str(error)) from None
 

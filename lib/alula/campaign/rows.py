@@ -167,6 +167,7 @@ def _simulated(planned: PlannedRun, options: Sequence[str], out: Path) -> Row:
         found["landed"] = None
     found |= {"open": [one["id"] for one in summary.get("skills") or () if one["id"] not in ended]}
     found |= {"problems": summary.get("problems") or [], "died": summary.get("died") or [], "exit_code": done.returncode}
+    found["folder"] = folder.name
     models = models_of(names)
     left = _Evidence(run.events, places_in(record), with_told_ends(run.events, record))
     return _row(planned, found, left, Monitor(models), ways_to_fail(models))

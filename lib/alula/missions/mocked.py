@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import contextlib
 import time
-from collections.abc import Mapping, Sequence
+from collections.abc import Collection, Mapping, Sequence
 from functools import partial
 from pathlib import Path
 from typing import Protocol
@@ -30,6 +30,28 @@ LIMIT_S = 3600.0
 """Mission clock after which a mission that goes round in circles is aborted, unless it has another limit."""
 STOP_S = 600.0
 """Mission clock after which a mission that was aborted is left, whether it has stopped or not."""
+
+
+KILLED = "killed"
+"""How managers fail that are ended without a word, as ``mapping:killed``; mocks do not start them again."""
+
+
+def kills_managers(fault: FaultRequest, skillsets: Collection[str]) -> bool:
+    """Tell whether a fault ends the managers of one of these skillsets."""
+    return fault.what in skillsets and fault.how == KILLED
+
+
+def check_faults(faults: Sequence[FaultRequest], behaviour: Behaviour, skillsets: Collection[str]) -> None:
+    """Refuse what can't fail in a mission over mocks with these skillsets.
+
+    Raises:
+        FaultError: an operator does no such thing.
+        SkillRuntimeError: the behaviour has no such fault.
+    """
+    acts_of(faults)
+    for fault in faults:
+        if not is_operator(fault) and not kills_managers(fault, skillsets):
+            behaviour.fault(fault)
 
 
 class Listener(Recorder, Protocol):
@@ -82,12 +104,14 @@ class MockedMission:
         self.end: End | None = None
         """How it ended; None before."""
         self.wall_s = 0.0
+        names = [one.name for one in skillsets]
         self._acts = acts_of(faults)
+        self._kills = [fault for fault in faults if kills_managers(fault, names)]
         self._faults = tuple(faults)
         self._departure = departure_of_robot()
         self._departed_s: float | None = None
         for fault in faults:
-            if not is_operator(fault):
+            if not is_operator(fault) and fault not in self._kills:
                 self.robot.fail(fault)
         self._tick_period_s = tick_period_s
         self._limit_s = limit_s
@@ -156,8 +180,9 @@ class MockedMission:
 
     @property
     def open_executions(self) -> list[str]:
-        """Return what has not ended."""
-        return [str(execution) for managers in self.world.managers.values() for execution in managers.engine.executions]
+        """Return what has not ended; what managers had that were killed has ended with them."""
+        living = [managers for managers in self.world.managers.values() if managers.alive]
+        return [str(execution) for managers in living for execution in managers.engine.executions]
 
     def state(self, skillset: str, resource: str) -> str:
         """Return the state of a resource."""
@@ -171,7 +196,9 @@ class MockedMission:
     @property
     def faults(self) -> dict[str, float]:
         """When each fault came first, and the operator acted, seconds of mission clock; those that came to nothing are missing."""
-        return {**self.robot.faults, **on_time(self._faults, self._departed_s)}
+        zero_s = self._departed_s
+        killed = {} if zero_s is None else {f"{one.what}:{KILLED}": zero_s + (one.begin_s or 0.0) for one in self._kills}
+        return {**self.robot.faults, **killed, **on_time(self._faults, zero_s)}
 
     @property
     def notes(self) -> list[str]:
@@ -194,6 +221,8 @@ class MockedMission:
             self._departed_s = event.stamp_s
             for act in self._acts:
                 self.world.clock.after(act.since_s, partial(self._act, act.command))
+            for fault in self._kills:
+                self.world.clock.after(fault.begin_s or 0.0, partial(self.world.kill, fault.what))
         if isinstance(event, ExecutionEvent) and event.state is ExecutionState.REQUESTED:
             self.places[event.id] = next((path for leaf, path in self._leaves if leaf.handle and leaf.handle.id == event.id), ())
         self._driver.event(event)

@@ -54,3 +54,13 @@ def test_the_mocks_know_a_stick_that_is_moved_from_a_pilot_who_takes_over_or_lan
     outcomes = {way: row_of(f"pilot:{way}@10-13") for way in ("stick", "takes")} | {"lands": row_of("pilot:lands@10")}
     assert {way: row["outcome"] for way, row in outcomes.items()} == {"stick": "accomplished", "takes": "given_up", "lands": "given_up"}
     assert outcomes["lands"]["landed"] is True
+
+
+def test_managers_that_are_killed_over_mocks_are_answered_as_in_flight():
+    row = row_of("mapping:killed@9")
+    assert (row["outcome"], row["landed"], is_troubled(row)) == ("given_up", True, False)
+    assert row["reason"].startswith("mapping.lidar_mapping: FAILED (the managers of mapping have gone")
+    (killed,) = [one for one in row["failures"] if one["kind"] == "fault"]
+    assert (killed["name"], killed["at_s"]) == ("mapping:killed", 9.0)
+    with pytest.raises(AnalysisError, match="there is no fault 'mapping'"):
+        load_mocked_scenario("mapping").check(PlannedRun(0, "mapping", 0, ("mapping:hung@3",)).requests)

@@ -51,6 +51,7 @@ def test_a_flight_of_the_simulator_becomes_a_row_and_keeps_its_folder(recorded_f
     folder = tmp_path / "out" / "run-00004-2"  # what a crash has left half done stays as it is
     assert asked[0] == f"run mapping --seed 7 --world {tmp_path / 'hill.yaml'} --fail zed@6 --fail lidar@9 --rate 0 --out {folder}"
     assert (folder / "skills.mcap").is_file()
+    assert row["folder"] == folder.name
     found = (row["outcome"], row["landed"], row["collisions"], row["min_clearance_m"], row["open"], row["exit_code"], row["conforms"])
     assert found == ("degraded", True, 0, 1.2, ["b"], 0, True)
     answers = {failure["name"]: failure["answered_by"] for failure in row["failures"]}
