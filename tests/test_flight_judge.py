@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import json
 import math
+import struct
 from dataclasses import replace
 from pathlib import Path
 
@@ -137,6 +138,21 @@ def test_the_drones_words_cover_all_that_its_campaigns_draw() -> None:
     for file in ("uav-simulator.yaml", "uav-simulator-short.yaml"):
         assert {fault.what for run in load_campaign(CAMPAIGNS / file).runs for fault in run.requests} <= words.keys()
     assert words.keys() >= dict(load_scenario("inspection").faults).keys() | dict(load_scenario("mapping").faults).keys()
+
+
+def test_a_drive_is_read_by_the_rovers_topics(tmp_path: Path) -> None:
+    store = get_typestore(Stores.ROS1_NOETIC)
+    with Writer(tmp_path / "functional.bag") as bag:
+        poses = bag.add_connection("/truth/odom", "nav_msgs/msg/Odometry", typestore=store)
+        states = bag.add_connection("/truth/state", "std_msgs/msg/String", typestore=store)
+        # Serialised by hand: header, child frame, position, and zeros up to the end of the twist's covariance.
+        header = struct.pack("<IIIi", 0, 7, 0, 3) + b"map" + struct.pack("<i", 0)
+        bag.write(poses, 7_000_000_000, header + struct.pack("<ddd", 1.0, 2.0, 0.0) + bytes(8 * (4 + 36 + 6 + 36)))
+        told = json.dumps({"departed_s": 4.0, "collisions": 1, "faults": [{"sensor": "laser", "mode": "dead", "t_s": 6.0}]})
+        text = store.types["std_msgs/msg/String"](told)
+        bag.write(states, 7_000_000_000, store.serialize_ros1(text, "std_msgs/msg/String"))
+    truth = truth_of(tmp_path)
+    assert (truth.lift_off_s, truth.collisions, truth.at_rest, truth.broken) == (4.0, 1, True, (Broken("laser", "dead", 2.0),))
 
 
 def test_a_campaign_is_judged_flight_by_flight_beside_the_mocks(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:

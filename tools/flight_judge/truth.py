@@ -16,7 +16,10 @@ from rosbags.rosbag1 import Reader
 from rosbags.rosbag1.reader import ReaderError
 from rosbags.typesys import Stores, get_typestore
 
-POSE, STATE = "/sim/true_pose", "/sim/state"
+POSES, STATES = {"/sim/true_pose", "/truth/odom"}, {"/sim/state", "/truth/state"}
+"""The simulators' topics of the drone and the rover: geometry_msgs/PoseStamped or nav_msgs/Odometry, and JSON in std_msgs/String."""
+DEPARTED = ("lift_off_s", "departed_s")
+"""When the robot departed, absolute seconds of mission clock."""
 REST_S = 1.0
 """Of the last so many seconds the motion is looked at, ..."""
 REST_M = 0.05
@@ -57,16 +60,17 @@ def truth_of(folder: Path) -> Truth:
     try:
         with Reader(folder / "functional.bag") as bag:
             store = get_typestore(Stores.ROS1_NOETIC)
-            for connection, _, raw in bag.messages(one for one in bag.connections if one.topic in {POSE, STATE}):
+            for connection, _, raw in bag.messages(one for one in bag.connections if one.topic in POSES | STATES):
                 message: Any = store.deserialize_ros1(raw, connection.msgtype)
-                if connection.topic == STATE:
+                if connection.topic in STATES:
                     state = json.loads(message.data)
                 else:
-                    stamp, at = message.header.stamp, message.pose.position
+                    pose = message.pose if hasattr(message.pose, "position") else message.pose.pose
+                    stamp, at = message.header.stamp, pose.position
                     poses.append((stamp.sec + stamp.nanosec * 1e-9, at.x, at.y, at.z))
     except (ReaderError, OSError, ValueError):
         pass
-    lift_off_s = state.get("lift_off_s")
+    lift_off_s = next((state[name] for name in DEPARTED if state.get(name) is not None), None)
     lines = list(_lines(folder / "run_log.jsonl"))
     told = [one for one in state.get("faults") or () if "t_s" in one]
     told += [one for one in lines if one.get("kind") == INJECTED]
