@@ -27,6 +27,8 @@ case "$1" in
     export ROS_VERSION=1 ROS_PYTHON_VERSION=3 ROS_ETC_DIR="${ROS_ETC_DIR:-/etc/ros}"
     export ROS_PACKAGE_PATH="${robot_packages1:+$robot_packages1:}$ALULA_STATE/ros1/src:${ALULA_UNDERLAY_PACKAGES:+$ALULA_UNDERLAY_PACKAGES:}/usr/share"
     export CMAKE_PREFIX_PATH="${_robot:+$_robot/ros1/devel:}$ALULA_STATE/ros1/devel:$_below/usr"
+    # As a workspace's own set-up does: nodes of Alula, which run under its Python, load the robot's messages by their names.
+    [ -z "$_robot" ] || export PYTHONPATH="$_robot/ros1/devel/lib/python3/dist-packages"
     # The usual master where the caller exports none: `alula run` has to tell the two cases apart.
     [ -n "${ROS_MASTER_URI:-}" ] || export ROS_MASTER_URI=http://127.0.0.1:11311 ALULA_USUAL_MASTER=http://127.0.0.1:11311
     # Loopback, unless the caller has given this machine a name: roscpp takes no peers by name beside a loopback address.

@@ -149,7 +149,7 @@ READY = (
     Step("transition", resource="SDK_authority", state="AVAILABLE"),
     Step("transition", resource="homepoint_status", state="VALID"),
 )
-FLYING = (*READY, Step("transition", resource="flight_status", state="IN_AIR"))
+FLYING = (*READY, Step("transition", resource="link", state="UP"), Step("transition", resource="flight_status", state="IN_AIR"))
 
 
 def states(trace: dict[str, Any], label: str) -> list[str]:
@@ -352,6 +352,7 @@ STATES = {
     "axes_authority": ["AVAILABLE", "USED"],
     "flight_status": ["ON_GROUND", "IN_AIR"],
     "homepoint_status": ["INVALID", "VALID"],
+    "link": ["UNKNOWN", "UP", "DOWN"],
 }
 BEHAVIOURS = st.one_of(
     st.just(Behaviour()),

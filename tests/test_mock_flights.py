@@ -63,7 +63,8 @@ def test_a_behaviour_that_can_not_be_read_leaves_nothing_behind(tmp_path: Path) 
         (["--behaviour", str(behaviour)], f"{behaviour}:2: navigation.land has no result CRASHED; it has LANDED, BLOCKED, ABORTED"),
         (
             ["--fail", "camera@3"],
-            "there is no fault 'camera' in the behaviour; it has zed, lidar, pilot, control, barometer, gps, imu, barometer:wrong",
+            "there is no fault 'camera' in the behaviour; it has "
+            "link:silent, zed, lidar, pilot, control, link, barometer, gps, imu, barometer:wrong",
         ),
     ):
         flight = start_flight(tmp_path / "run", "--mock", *more)

@@ -16,7 +16,7 @@ from alula.cli import expect
 from alula.cli import run as over_mocks
 from alula.cli.replay import CANNOT_REPLAY, OTHERWISE, SAME
 from alula.common.faults import parse_fault
-from alula.common.record import DATA, DECISIONS, FILE, MISSION, Entry, RecordWriter, read_record
+from alula.common.record import DATA, DECISIONS, EVENTS, FILE, MISSION, Entry, RecordWriter, read_record
 from alula.common.scenarios import load_scenario
 from alula.missions.director import Outcome
 from alula.missions.mocked import MockedMission
@@ -260,6 +260,32 @@ def test_a_stamp_that_can_not_be_is_refused_and_not_waited_for(nominal, tmp_path
     said = capsys.readouterr().err
     assert "a stamp there is damaged" in said
     assert said.count("\n") == 1
+
+
+def without_the_link(run: Path, folder: Path) -> Path:
+    """Write the record of a run as it was before the model had the resource link, and return its folder."""
+    folder.mkdir()
+    writer = RecordWriter(folder / FILE)
+    for entry in read_record(run):
+        if entry.topic != EVENTS or entry.value.get("resource") != "link":
+            writer.write(entry.topic, entry.stamp_ns, entry.value)
+    writer.close()
+    return folder
+
+
+def test_a_resource_that_the_record_never_mentions_is_as_mocks_have_it_when_the_robot_is_ready(nominal, zed_dead, tmp_path, capsys):
+    for run in (nominal, zed_dead):
+        older = without_the_link(run, tmp_path / f"older_{run.parent.name}")
+        assert main([str(older)]) == SAME
+        assert f"{len(requests(run))} decisions, all as they were" in capsys.readouterr().err
+
+
+def test_a_mission_that_never_started_for_want_of_a_resource_does_not_start_in_a_replay(tmp_path):
+    fly(tmp_path / "run", "link:silent")
+    assert requests(tmp_path / "run") == []
+    assert main([str(tmp_path / "run"), "--out", str(tmp_path / "again")]) == SAME
+    assert requests(tmp_path / "again") == []
+    assert ending(tmp_path / "again") == ending(tmp_path / "run")
 
 
 def test_data_that_the_model_does_not_have_are_left_out_and_noted(nominal, tmp_path):

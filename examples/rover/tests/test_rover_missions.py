@@ -81,6 +81,29 @@ def test_when_turning_does_not_help_it_calls_for_help():
     assert end.outcome is Outcome.GIVEN_UP
 
 
+@pytest.mark.parametrize("scenario", ["deliver", "patrol"])
+@pytest.mark.parametrize("fault", ["link", "link:silent"])
+def test_a_lost_link_is_waited_for_and_the_work_goes_on(scenario, fault):
+    mission, end, ended, facts = drive(scenario, f"{fault}@20-50")
+    assert end.outcome is Outcome.DEGRADED
+    stopped = [number for number, one in enumerate(ended) if one[1] == "keeps_link"]
+    assert len(stopped) == 1, "it asks for no motion before the link is back"
+    assert [one for one in ended[stopped[0] :] if one[0] == "ask"] == [], "nobody is asked to let it past"
+    assert mission.state("base", "base_status") == "DOCKED"
+    if scenario == "deliver":
+        assert facts["delivered"] == 3
+    else:
+        assert facts["rounds_done"] == 2
+
+
+def test_a_link_that_stays_away_ends_the_mission_with_that_cause():
+    mission, end, ended, _ = drive("patrol", "link@20")
+    assert end.outcome is Outcome.GIVEN_UP
+    assert "keeps_link" in end.reason
+    assert mission.state("base", "wheels") == "FREE"
+    assert [one for one in ended if one[1] in {"keeps_link", "linked"}] == [("follow_corridor", "keeps_link")]
+
+
 def test_a_door_that_stays_shut_has_it_take_the_other_way(tmp_path):
     shut = "skills: {cargo.open_door: [{when: door == 'kitchen', result: SHUT}]}"
     _, end, ended, facts = drive("deliver", behaviour=shut, tmp_path=tmp_path)

@@ -19,6 +19,7 @@ def test_models_and_missions_have_no_findings():
     [
         ("keeps_pose: resource = (pose_status == GOOD) violation = release", "never_lost_at_speed"),
         ("keeps_authority: resource = (authority == MISSION) violation = release", "never_against_the_operator"),
+        ("keeps_link: resource = (link == UP) violation = release", "never_unsupervised"),
     ],
 )
 def test_a_property_fails_without_its_invariant(invariant, property_, tmp_path):

@@ -60,6 +60,8 @@ def test_listings_1_and_2(navigation):
 
 SLAM = ("UNKNOWN", "OK", "LOST")
 STATUS = [("UNKNOWN", "OK"), ("UNKNOWN", "BROKEN"), ("OK", "UNKNOWN"), ("OK", "BROKEN"), ("BROKEN", "OK"), ("BROKEN", "UNKNOWN")]
+LINK = [("UNKNOWN", "UP"), ("UNKNOWN", "DOWN"), ("UP", "DOWN"), ("DOWN", "UP"), ("UP", "UNKNOWN"), ("DOWN", "UNKNOWN")]
+"""The last two are of its silence."""
 
 
 @pytest.mark.parametrize(
@@ -69,6 +71,7 @@ STATUS = [("UNKNOWN", "OK"), ("UNKNOWN", "BROKEN"), ("OK", "UNKNOWN"), ("OK", "B
         ("navigation", "flight_status", ("ON_GROUND", "IN_AIR"), [("ON_GROUND", "IN_AIR"), ("IN_AIR", "ON_GROUND")], []),
         ("navigation", "homepoint_status", ("INVALID", "VALID"), [("INVALID", "VALID"), ("VALID", "INVALID")], []),
         ("navigation", "position_status", ("KNOWN", "LOST"), [("KNOWN", "LOST"), ("LOST", "KNOWN")], []),
+        ("navigation", "link", ("UNKNOWN", "UP", "DOWN"), LINK, []),
         ("mapping", "imu_status", ("OK", "BROKEN"), [("OK", "BROKEN")], [("BROKEN", "OK")]),
         ("perception", "zed_status", ("UNKNOWN", "OK", "BROKEN"), STATUS, []),
         ("perception", "lidar_status", ("UNKNOWN", "OK", "BROKEN"), STATUS, []),

@@ -92,7 +92,7 @@ CASES = {
     "order: [fly RUNNING]": "failing: it never happens",
     "order: [land RUNNING, land RUNNING]": "failing: it does not happen after",
     "order: [{what: takeoff RUNNING, at_s: 3, tolerance_s: 0.5}]": "s, -5.500 s off",
-    "complete: true": "failing: navigation.takeoff RUNNING besides (navigation event 5 at -2.500 s), and ",
+    "complete: true": "failing: navigation.takeoff RUNNING besides (navigation event 6 at -2.500 s), and ",
     "states: [{at_s: 60, perception.zed_status: OK, perception.lidar_status: BROKEN}]": (
         "failing: perception.zed_status is BROKEN since perception event 5 at 30.340 s, perception.lidar_status is OK since "
     ),

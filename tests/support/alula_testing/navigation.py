@@ -16,7 +16,7 @@ from alula_testing.recorder import Recorder
 from alula_testing.waits import until
 
 S = ExecutionState
-FLYING = {"SDK_authority": "AVAILABLE", "homepoint_status": "VALID", "flight_status": "IN_AIR"}
+FLYING = {"SDK_authority": "AVAILABLE", "homepoint_status": "VALID", "link": "UP", "flight_status": "IN_AIR"}
 
 
 class Navigation(Protocol):

@@ -50,9 +50,10 @@ def skills() -> dict[str, Any]:
         assert client.wait_for_server(timeout_sec=WAIT_S)
         return awaited(client.send_goal_async(goal, feedback_callback=heard.append))
 
-    known: list[bool] = []  # whether it knows where it is
+    known: list[bool] = []  # whether it knows where it is, and its dead man hears the managers
+    needed = {("pose_status", "GOOD"), ("link", "UP")}
     latched = QoSProfile(depth=1, durability=DurabilityPolicy.TRANSIENT_LOCAL)
-    look = lambda told: known.append(any((one.name, one.state) == ("pose_status", "GOOD") for one in told.resources))  # noqa: E731
+    look = lambda told: known.append(needed <= {(one.name, one.state) for one in told.resources})  # noqa: E731
     node.create_subscription(ResourceStates, "/base/resource_states", look, latched)
     alive: list[Any] = []  # managers say so once they take requests
     node.create_subscription(Heartbeat, "/base/alive", alive.append, latched)

@@ -1,11 +1,17 @@
-"""Mocks fitted from a record: what a skill did with the same inputs it does again, as long as it took and with the same result."""
+"""Mocks fitted from a record: what a skill did with the same inputs it does again, as long as it took and with the same result.
+
+Extern transitions are the record's. Resources that it never mentions are as mocks have them once the robot is ready: the model has got them
+since, or they have not changed while the mission ran.
+"""
 
 from __future__ import annotations
 
 from collections import defaultdict
 from collections.abc import Mapping
+from dataclasses import replace
 from typing import Any
 
+from alula.common.record import EVENTS
 from alula.mock import Behaviour, Ending, Rule
 from alula.model.execution_state import ExecutionState
 from alula.records.replay.comparison import alike
@@ -19,6 +25,23 @@ def fitted(recorded: Recorded) -> Behaviour:
         if answer.state is ExecutionState.TERMINATED and answer.duration_s is not None:
             rules[answer.skillset, answer.skill].append(_rule(answer, answer.duration_s))
     return Behaviour(rules={place: tuple(found) for place, found in rules.items()})
+
+
+def with_untold(recorded: Recorded, behaviour: Behaviour) -> Behaviour:
+    """Return the behaviour for a replay: of its timeline only what no event of the record is about, at once at the beginning.
+
+    Nothing is left of it where the mission has decided nothing: then it may be just that which was not told.
+    """
+    events = [entry.value for entry in recorded.entries if entry.topic == EVENTS]
+    told = {(event.get("skillset"), event.get("resource")) for event in events}
+
+    def of(one: Behaviour) -> Behaviour:
+        states = [{place: state for place, state in event.states.items() if place not in told} for event in one.timeline]
+        events = [replace(event, after_s=0.0, states=left) for event, left in zip(one.timeline, states, strict=True)]
+        timeline = tuple(event for event in events if event.states and event.anchor is None) if recorded.decisions else ()
+        return replace(one, timeline=timeline, beside=tuple(map(of, one.beside)))
+
+    return of(behaviour)
 
 
 def _rule(answer: RecordedEnd, duration_s: float) -> Rule:

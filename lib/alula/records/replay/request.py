@@ -20,7 +20,7 @@ from alula.model.model import Skillset
 from alula.records.errors import AnalysisError
 from alula.records.mocks import behaviour_of
 from alula.records.models import robot_skillsets
-from alula.records.replay.fitting import fitted
+from alula.records.replay.fitting import fitted, with_untold
 from alula.records.replay.recorded import Recorded, ReplayError
 from alula.runtime.core.errors import SkillRuntimeError
 
@@ -88,13 +88,16 @@ def _number(recorded: Recorded, name: str, value: object) -> float:
 
 
 def behaviour_for(recorded: Recorded, skillsets: Sequence[Skillset], files: Sequence[Path]) -> Behaviour:
-    """Return what mocks do where the record has no answer: as the record fits, then the files, then the robot's own."""
+    """Return what mocks do where the record has no answer: as the record fits, then the files, then the robot's own.
+
+    Of what they have happen by the clock there is only what the record tells nothing of.
+    """
     names = frozenset(skillset.name for skillset in skillsets)
     try:
         own = behaviour_of(find_robot(), files).of(names)
     except (SkillRuntimeError, RobotError, AnalysisError) as error:
         raise ReplayError(str(error)) from error
-    return replace(fitted(recorded).over(own), faults=own.faults)
+    return replace(with_untold(recorded, fitted(recorded).over(own)), faults=own.faults)
 
 
 def faults_for(behaviour: Behaviour, texts: Sequence[str]) -> list[FaultRequest]:

@@ -91,14 +91,14 @@ class ReplayedRobot:
     """Virtual time, the mock robot, and which execution is which of the record: the base of replays of every depth.
 
     Args:
-        behaviour: of the mocks; what it has happen by the clock is left out, as the record tells it.
+        behaviour: of the mocks; what it has happen by the clock is what the record tells nothing of.
         start_s: mission clock at the beginning.
     """
 
     def __init__(self, behaviour: Behaviour, *, start_s: float) -> None:
         self.world = LocalWorld(start_s=start_s)
         self.host = ReplayHost(self.world)
-        self.robot = MockRobot(replace(behaviour, timeline=()), self.host)
+        self.robot = MockRobot(behaviour, self.host)
         self.handles: dict[str, SkillHandle] = {}
         self.faults: list[FaultRequest] = []
         self.differs: Callable[[str], None] = lambda _: None

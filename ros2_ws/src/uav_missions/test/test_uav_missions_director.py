@@ -18,6 +18,7 @@ READY = {
     "SDK_authority": "AVAILABLE",
     "flight_status": "ON_GROUND",
     "homepoint_status": "VALID",
+    "link": "UP",
     "zed_status": "OK",
     "lidar_status": "OK",
 }
@@ -50,6 +51,8 @@ def test_nothing_starts_before_the_vehicle_is_ready_and_the_wait_is_bounded():
     [
         ("SDK_authority", "UNAVAILABLE"),
         ("homepoint_status", "INVALID"),
+        ("link", "UNKNOWN"),
+        ("link", "DOWN"),
         ("flight_status", "IN_AIR"),
         ("zed_status", "UNKNOWN"),
         ("lidar_status", "UNKNOWN"),
@@ -82,6 +85,7 @@ def test_a_skillset_that_can_not_be_called_keeps_the_mission_from_starting():
         "the autopilot is ready and ours to command",
         "the home point is valid",
         "the position is known",
+        "the vehicle's computer is heard of",
         "the vehicle is on the ground",
         "the state of the ZED is known",
         "the LiDAR works",

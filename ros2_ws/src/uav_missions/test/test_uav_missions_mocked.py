@@ -132,6 +132,33 @@ def test_a_position_that_is_not_known_keeps_the_mission_on_the_ground():
     assert "the position is not known" in end.reason
 
 
+@pytest.mark.parametrize(
+    ("fault", "at_s", "motion"),
+    [("link", 10, "goto_straight"), ("link", 48.8, "rotate_head"), ("link", 55, "goto"), ("link:silent", 10, "goto_straight")],
+)
+def test_a_lost_link_ends_the_legs_and_what_is_in_the_air_is_landed_once_the_vehicle_is_heard_of(fault, at_s, motion):
+    away_s = 12.0
+    mission = make(f"{fault}@{at_s:g}-{at_s + away_s:g}", "zed@30")
+    end = mission.run()
+    assert end.outcome is Outcome.GIVEN_UP
+    assert f"navigation.{motion}: RESOURCE_INVARIANT_VIOLATED keep_link" in end.reason
+    assert (motion, "RESOURCE_INVARIANT_VIOLATED", "keep_link") in executions(mission)
+    assert executions(mission)[-2:] == [("hover", "TERMINATED", "DONE"), ("land", "TERMINATED", "LANDED")]
+    states = {event.to_state: event.stamp_ns / 1e9 for event in mission.events if getattr(event, "resource", "") == "link"}
+    lost_s, back_s = states["DOWN" if fault == "link" else "UNKNOWN"], states["UP"]
+    asked_s = [event.stamp_ns / 1e9 for event in mission.events if getattr(event, "skill", "") and event.state.value == "REQUESTED"]
+    assert back_s - lost_s == pytest.approx(away_s)
+    assert [one for one in asked_s if lost_s < one < back_s] == [], "nothing is asked of a vehicle that is not heard of"
+    assert landed(mission)
+
+
+def test_a_link_that_stays_away_ends_the_mission_with_that_cause():
+    mission = make("link:silent@10")
+    end = mission.run()
+    assert end.outcome is Outcome.GIVEN_UP
+    assert "keep_link (link is UNKNOWN, after link UP -> UNKNOWN (extern): not heard of for 2 s)" in end.reason
+
+
 def test_an_imu_that_fails_degrades_the_map_and_is_said():
     mission = make("imu@8")
     end = mission.run()
@@ -251,7 +278,9 @@ def test_a_folder_that_goes_away_in_flight_does_not_end_it(tmp_path):
 
 
 def test_a_wrong_request_writes_nothing(tmp_path):
-    with pytest.raises(AlulaError, match="there is no fault 'camera' in the behaviour; it has zed, lidar, pilot, control"):
+    with pytest.raises(
+        AlulaError, match="there is no fault 'camera' in the behaviour; it has link:silent, zed, lidar, pilot, control, link"
+    ):
         MISSION.run("camera@8", out=tmp_path / "run")
     assert not (tmp_path / "run").exists()
 

@@ -94,6 +94,7 @@ class World:
             "SDK_authority": "AVAILABLE",
             "flight_status": "ON_GROUND",
             "position_status": "KNOWN",
+            "link": "UP",
             "height_status": "AGREED",
             "imu_status": "OK",
         }

@@ -18,6 +18,7 @@ READY = {
     ("navigation", "SDK_authority"): "AVAILABLE",
     ("navigation", "homepoint_status"): "VALID",
     ("navigation", "flight_status"): "ON_GROUND",
+    ("navigation", "link"): "UP",
     ("perception", "zed_status"): "OK",
     ("perception", "lidar_status"): "OK",
     ("video", "link"): "UP",
