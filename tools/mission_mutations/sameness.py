@@ -28,9 +28,9 @@ from alula.prove.mission.regions import Closure, Region, Regions, Sets
 from alula.prove.mission.state import Event
 from alula.prove.mission.system import System
 from alula.prove.mission.ticking import TICK, Outcome
-from alula.trees.access import scripts_of
+from alula.trees.access import scripts_of, written_entries
 from alula.trees.document import Attribute, Element
-from alula.trees.node import Node, pointer
+from alula.trees.node import Node
 from alula.trees.palette import Direction
 from alula.trees.reading import read_files, type_name
 from alula.trees.script import statements_of
@@ -124,12 +124,7 @@ class Seen:
         self._number = shown.number
         self._system = regions.system
         self._keys = keys_of(regions.system)
-        self._ports = {
-            str(pointer(node.wiring.ports.get(port.name, ""), port.name)).removeprefix("@")
-            for node in self._system.nodes
-            for port in node.wiring.type.ports.values()
-            if port.direction is not Direction.INPUT
-        }
+        self._ports = {node.blackboard.where(key) for node in self._system.nodes for key in written_entries(node).values()}
         self._values = {number: value for number, node in enumerate(self._system.nodes) if (value := self._deals(node)) is not None}
         self.values = tuple(self._values.values())
         ready = read_files(path).trees.get(READY)
@@ -188,21 +183,21 @@ class Seen:
         """Return a node that writes on the blackboard, or gives inputs to what it asks for, as its file has it."""
         element, wiring = node.wiring.element, node.wiring
         writes = any(port.direction is not Direction.INPUT for port in wiring.type.ports.values() if port.name in wiring.ports)
-        if not (writes or isinstance(node, SkillNode) or any(map(self._computes, scripts_of(element, wiring.type)))):
+        if not (writes or isinstance(node, SkillNode) or any(self._computes(node, one) for one in scripts_of(element, wiring.type))):
             return None
         return (node.name, *_attributes(element))
 
-    def _computes(self, script: Attribute) -> bool:
+    def _computes(self, node: Node, script: Attribute) -> bool:
         """Tell whether a script writes values that the search does not keep as they are."""
         parts = [part for statement in statements_of(script.value) for part in walk(statement)]
-        return any(not self._kept(part) for part in parts if isinstance(part, Assignment))
+        return any(not self._kept(node, part) for part in parts if isinstance(part, Assignment))
 
-    def _kept(self, part: Assignment) -> bool:
+    def _kept(self, node: Node, part: Assignment) -> bool:
         """Tell whether an entry gets a value of the file, and never any other."""
-        name = part.target.name.removeprefix("@") if isinstance(part.target, Name) else ""
+        key = node.blackboard.where(part.target.name) if isinstance(part.target, Name) else None
         reads = self._system.reads
-        others = {target for _, target in reads.flows} | {source for source, _ in reads.flows} | reads.counted
-        return isinstance(part.value, Literal) and name in reads.names and name not in others and name not in self._ports
+        others = reads.counted.union(reads.flows, *reads.flows.values())
+        return isinstance(part.value, Literal) and key in reads.names and key not in others and key not in self._ports
 
     def closure(self, place: int, closure: Closure) -> int:
         """Return the number of all that managers can be, with all that can happen in them."""

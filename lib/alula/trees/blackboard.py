@@ -7,7 +7,7 @@ has written it, and keeps it.
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Iterator, Mapping
 
 from alula.trees.errors import TickError
 from alula.trees.values import ANY, DOUBLE, STRING, PortType, shown
@@ -92,6 +92,16 @@ class Blackboard:
                 break
             board, key = step
         return board, key
+
+    def candidates(self, key: str) -> Iterator[tuple[Blackboard, str]]:
+        """Yield where an entry may be, from here up: the first of these that there is, as long as nothing takes it away."""
+        board = self
+        if key.startswith("@"):
+            board, key = self.root, key[1:]
+        yield board, key
+        while (step := board._outside(key)) is not None:  # noqa: SLF001 - the same class
+            board, key = step
+            yield board, key
 
     def get(self, key: str) -> object:
         """Return a value, None when there is none."""

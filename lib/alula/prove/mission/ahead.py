@@ -10,9 +10,9 @@ from collections.abc import Hashable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
 
 from alula.prove.mission.reading import OUTCOME, Read
-from alula.trees.access import takes_script_from_entry
-from alula.trees.ends import ENDS
+from alula.trees.access import Key, takes_script_from_entry
 from alula.trees.node import Node
+from alula.trees.reach import Reach
 from alula.trees.status import RUNNING, SKIPPED
 from alula.trees.ticking import Order, Ticking
 from alula.trees.tree import Tree
@@ -31,9 +31,9 @@ class Ahead:
 
     nodes: frozenset[int]
     everything: bool
-    kept: frozenset[str]
-    named: frozenset[str]
-    written: frozenset[str]
+    kept: frozenset[Key]
+    named: frozenset[Key]
+    written: frozenset[Key]
     ends: frozenset[str]
     first: bool
     followed: frozenset[str]
@@ -45,12 +45,14 @@ class Looking:
     def __init__(self, trees: Sequence[Tree], read: Read) -> None:
         self.read = read
         self._nodes = [node for tree in trees for node in tree.nodes]
-        self.ticking = [node.known_ticking() for node in self._nodes]
+        self.ticking = [node.wiring.ticking for node in self._nodes]
         self.all = frozenset(range(len(self._nodes)))
         self._number = {id(node): number for number, node in enumerate(self._nodes)}
         self._roots = [tree.root for tree in trees]
         self._below = {number: frozenset(self._all(node)) for number, node in enumerate(self._nodes)}
-        self._asks = [read.asks(node.wiring.element, node.wiring.type) for node in self._nodes]
+        self._asks = [read.asks(node.wiring) for node in self._nodes]
+        self._outcome = frozenset((root.blackboard, name) for root in self._roots for name in OUTCOME)
+        self._reach = Reach()
         self._opaque = {number for number, node in enumerate(self._nodes) if not self._plain(node)}
         self._skips = {number for number, node in enumerate(self._nodes) if any(map(self._may_skip, self._below[number]))}
 
@@ -60,11 +62,7 @@ class Looking:
         return of.type.name not in self.read.free and not takes_script_from_entry(of.element, of.type)
 
     def _may_skip(self, number: int) -> bool:
-        node = self._nodes[number]
-        before = node.before
-        conditions = before is not None and (before.skip_if is not None or before.while_true is not None)
-        ends = node.may_end(node.wiring.ports.get, [ENDS] * len(node.children))
-        return conditions or SKIPPED in ends or not node.is_described() or number in self._opaque
+        return SKIPPED in self._reach.ends(self._nodes[number].wiring) or number in self._opaque
 
     def may_be_skipped(self, number: int) -> bool:
         """Tell whether a node, or one below it, may be skipped, or asks for what is not known."""
@@ -106,7 +104,7 @@ class Looking:
 
     def _asked(self, nodes: frozenset[int], *, everything: bool) -> Ahead:
         asks = [self._asks[number] for number in sorted(nodes)]
-        kept = OUTCOME.union(*(one.names for one in asks))
+        kept = self._outcome.union(*(one.names for one in asks))
         return Ahead(
             nodes,
             everything or bool(nodes & self._opaque),

@@ -7,7 +7,7 @@ from collections.abc import Iterator, Mapping
 from alula.missions.skill_types import OUTCOME_PORT
 from alula.prove.mission.regions import Regions
 from alula.prove.mission.system import System
-from alula.trees.access import named_entries, scripts_of, written_entries
+from alula.trees.access import Key, named_entries, scripts_of, written_entries
 from alula.trees.node import Node
 from alula.trees.script import statements_of
 from alula.trees.script.syntax import Call, Comparison, Literal, Name, walk
@@ -76,7 +76,7 @@ def _asked(system: System, node: Node, ends: Mapping[int, frozenset[str]]) -> It
                     if not any(end in known for known in ends.values()):
                         yield f"failed('{end}')", ""
                 case Comparison(operands=(Name(name=entry), Literal(value=str(end))), operators=("==" | "!=",)):
-                    leaves = _writers(system, entry.removeprefix("@"))
+                    leaves = _writers(system, node.blackboard.where(entry))
                     if end and leaves and not any(end in ends[leaf] for leaf in leaves):
                         yield (
                             f"{entry} {part.operators[0]} '{end}'",
@@ -84,16 +84,16 @@ def _asked(system: System, node: Node, ends: Mapping[int, frozenset[str]]) -> It
                         )
 
 
-def _writers(system: System, entry: str) -> list[int]:
+def _writers(system: System, entry: Key) -> list[int]:
     """Return the leaves whose outcomes an entry has, none where it may have anything else."""
     names = system.reads.sources({entry})
     for node in system.nodes:
-        written = set(written_entries(node).values())
-        others = {one.removeprefix("@") for one in written} | system.reads.asks(node.wiring.element, node.wiring.type).written
+        others = {node.blackboard.where(one) for one in written_entries(node).values()} | system.reads.asks(node.wiring).written
         if node not in system.leaves and names & others:
             return []
     return [leaf for leaf, node in enumerate(system.leaves) if _outcome(node) in names]
 
 
-def _outcome(node: Node) -> str:
-    return named_entries(node).get(OUTCOME_PORT, "").removeprefix("@")
+def _outcome(node: Node) -> Key | None:
+    name = named_entries(node).get(OUTCOME_PORT)
+    return None if name is None else node.blackboard.where(name)

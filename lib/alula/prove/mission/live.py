@@ -8,13 +8,13 @@ from __future__ import annotations
 
 from collections.abc import Callable, Hashable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
-from typing import NamedTuple
+from typing import NamedTuple, TypeAlias
 
 from alula.missions.skill_types import OUTCOME_PORT
 from alula.missions.skills import SkillNode
 from alula.prove.mission.ahead import RUNS, Looking
 from alula.prove.mission.reading import ANOTHER, OUTCOME
-from alula.trees.access import named_entries, scripts_of, written_entries
+from alula.trees.access import Key, named_entries, scripts_of, written_entries
 from alula.trees.node import Node
 from alula.trees.nodes.subtree import SubTree
 from alula.trees.script import statements_of
@@ -24,8 +24,8 @@ from alula.trees.status import FAILURE, SKIPPED, SUCCESS, Answer
 from alula.trees.ticking import AGAIN, Begin, Order, Ticking
 from alula.trees.tree import Tree
 
-Place = tuple[int, str]
-"""Where an entry is: the id of its blackboard, and its name there. What scripts ask of a leaf's execution is one, too."""
+Place: TypeAlias = "Key | tuple[int, str]"
+"""An entry, or what scripts may ask of the execution of a leaf, by its number."""
 Read = tuple[Place, frozenset[str] | None]
 """An entry with texts of which it is only asked whether it is one of them; None: by its value."""
 Reads = frozenset[Read]
@@ -310,7 +310,7 @@ class Liveness:
     @staticmethod
     def _outcome(node: Node) -> Place:
         name = named_entries(node).get(OUTCOME_PORT)
-        return (0, "") if name is None else _place(node, name)
+        return (-1, "") if name is None else _place(node, name)
 
     def _script(self, node: Node, text: str, after: Reads) -> Reads:
         """Return what is live before a script; what is no script reads nothing here (``Looking`` says that it may ask for anything)."""
@@ -358,12 +358,11 @@ def _at_least_once(count: str) -> bool:
 
 def leaf_place(leaf: int) -> Place:
     """Return the place of what scripts may ask of a leaf's execution."""
-    return -1 - leaf, ""
+    return leaf, ""
 
 
 def _place(node: Node, name: str) -> Place:
-    board, key = node.blackboard.where(name)
-    return id(board), key
+    return node.blackboard.where(name)
 
 
 def _without(reads: Reads, places: frozenset[Place]) -> Reads:

@@ -12,13 +12,14 @@ from alula.missions.director import Director, DirectorMemory, End, Outcome
 from alula.missions.skills import SkillNode
 from alula.model.model import Skillset
 from alula.prove.mission.ahead import RUNS, Ahead, Looking
-from alula.prove.mission.live import Live, Liveness, Place, leaf_place
+from alula.prove.mission.live import Live, Liveness, leaf_place
 from alula.prove.mission.moments import Later, Moment, Thawing, numbered
 from alula.prove.mission.oracle import UndecidedError
 from alula.prove.mission.own import MOST, Run
 from alula.prove.mission.reading import ANOTHER, Read
 from alula.prove.mission.robot import Handle, Memory, Robot
 from alula.prove.mission.unknown import Unknown, UnknownItems, UnknownNumber, UnknownText, is_unknown
+from alula.trees.access import Key
 from alula.trees.blackboard import Entry
 from alula.trees.node import Count, Node
 from alula.trees.status import IDLE, RUNNING, Skipped, Status
@@ -212,7 +213,7 @@ class Keeper:
         board = self._boards[number]
         entries = board.entries()
         return tuple(
-            (name, entries[name].type, _frozen(self._needed((id(board), name), entries[name], ahead, live))) for name in sorted(entries)
+            (name, entries[name].type, _frozen(self._needed((board, name), entries[name], ahead, live))) for name in sorted(entries)
         )
 
     def _follows(self, number: int, node: SkillNode, ahead: Ahead, live: Live | None) -> bool:
@@ -223,15 +224,15 @@ class Keeper:
         asked = ahead.everything or (node.leaf.skill_name in ahead.followed and (live is None or leaf_place(number) in live.texts))
         return asked and not handle.done
 
-    def _needed(self, place: Place, entry: Entry, ahead: Ahead, live: Live | None) -> object:
+    def _needed(self, name: Key, entry: Entry, ahead: Ahead, live: Live | None) -> object:
         """Return what is kept of an entry's value: its kind where it is computed with or text is written over it, else nothing."""
-        name, value = place[1], entry.value
-        if live is not None and place not in live.texts:
+        value = entry.value
+        if live is not None and name not in live.texts:
             over = name in ahead.written and isinstance(value, str) and entry.type not in TAKE_TEXT
             return self._body.read.kind(name, value) if over else None
         if ahead.everything or name in ahead.kept:
             kept = self._body.read.value(name, value)
-            return kept if live is None or type(kept) is not str else live.text(place, kept)
+            return kept if live is None or type(kept) is not str else live.text(name, kept)
         if value is None or not (name in ahead.named or (name in ahead.written and isinstance(value, str))):
             return None
         return self._body.read.kind(name, value)
@@ -252,8 +253,8 @@ class Keeper:
                 setattr(node, name, self._thawed(self._kept(node, name, count)))
         for board in self._boards:
             for name, entry in board.entries().items():
-                if name in self._body.read.counted:
-                    entry.value = self._body.read.value(name, entry.value)
+                if (board, name) in self._body.read.counted:
+                    entry.value = self._body.read.value((board, name), entry.value)
         robot, told = self._body.robot, self._body.board
         first = told.failures[0].skill if told.failures else ""
         return (

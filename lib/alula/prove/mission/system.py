@@ -24,7 +24,7 @@ from typing import TypeVar
 
 from alula.common.graphs import reachable_from
 from alula.missions.director import Director, Outcome
-from alula.missions.mission_file import STOP_HERE, FiledMission, plan_of_file
+from alula.missions.mission_file import READY, STOP_HERE, FiledMission, plan_of_file
 from alula.missions.palette import palette_of, without_class
 from alula.missions.part import MissionPart
 from alula.missions.plan import InputError, Inputs
@@ -48,10 +48,11 @@ from alula.prove.mission.ticking import ABORT, TICK, OneStop, Ticker
 from alula.prove.mission.ticking import Outcome as Ticked
 from alula.prove.mission.unknown import any_value
 from alula.prove.mission.uses import Uses
-from alula.trees.node import Node, pointer
+from alula.trees.node import Node, Shared, pointer
 from alula.trees.palette import Direction, NodeType, Port, name_in_files
 from alula.trees.reading import TreeFiles, type_name
 from alula.trees.source import TreeSource, source_of
+from alula.trees.wiring import wire
 
 T = TypeVar("T")
 TERMINATED, FAILED = ExecutionState.TERMINATED.value, ExecutionState.FAILED.value
@@ -116,7 +117,10 @@ class System:
         trees = (filed.tree, *([stop] if stop else []))
         director = Director(OneStop(filed, stop), board)
         unread = [*own.unread, *(f"{one.name}.{skill.name}" for one in skillsets for skill in one.skills)]
-        read = what_is_read(files, palette, unread, plan.parameters, oracle, own.free)
+        roots = [tree.root.wiring for tree in trees]
+        if READY in files.trees:
+            roots.append(wire(files, palette, READY, Shared(robot.clock_ns), blackboard=filed.tree.blackboard))
+        read = what_is_read(roots, unread, plan.parameters, oracle, own.free)
         body = Body(robot, director, board, trees, {one.name: one for one in skillsets}, read, few)
         ticker = Ticker(body, oracle)
         board.pending = Waits(robot, [one.name for one in skillsets], ticker.leaves)
@@ -299,7 +303,7 @@ class System:
         state, result = end
         success = state == TERMINATED and result in node.leaf.success
         outcome = pointer(node.wiring.ports.get(OUTCOME_PORT, ""), OUTCOME_PORT)
-        told = (result or state) if outcome is None else self.reads.value(outcome.removeprefix("@"), result or state)
+        told = (result or state) if outcome is None else self.reads.value(node.blackboard.where(outcome), result or state)
         if success:
             return (state, result) if outcome is not None and told == result else (TERMINATED, min(node.leaf.success))
         return (state, result) if result in self.reads.ends or (outcome is not None and told == (result or state)) else (FAILED, "")
