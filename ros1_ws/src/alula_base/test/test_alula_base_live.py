@@ -17,9 +17,10 @@ rospy = pytest.importorskip("rospy")
 import actionlib  # noqa: E402
 import actionlib.msg  # noqa: E402
 from geometry_msgs.msg import Twist  # noqa: E402
+from rosgraph_msgs.msg import Clock  # noqa: E402
 from skillset_interfaces.msg import ResourceState, ResourceStates  # noqa: E402
 from skillset_interfaces.srv import Transition, TransitionRequest, TransitionResponse  # noqa: E402
-from std_msgs.msg import String  # noqa: E402
+from std_msgs.msg import Header, String  # noqa: E402
 from std_srvs.srv import SetBool, SetBoolResponse  # noqa: E402
 
 from alula_testing.ros1 import refusal_of_node  # noqa: E402
@@ -204,6 +205,31 @@ def test_a_second_step_is_called_only_where_the_silence_lasts(robot, start_dead_
     assert robot.states[-1]["calls"]["hover"]["done"]
     assert robot.states[-1]["stops"] == 2
     assert rospy.get_time() - silent_s >= 2 * SILENT_AFTER_S - 1.0, "s: of silence, then of hovering; the heart beats every 0.1 s"
+
+
+@pytest.fixture
+def simulated(ros_master: str) -> Iterator[Callable[[float], None]]:
+    """Give nodes that are started now simulated time; yield what sets it, seconds."""
+    rospy.set_param("/use_sim_time", True)
+    clock = rospy.Publisher("/clock", Clock, queue_size=10, latch=True)
+    yield lambda now_s: clock.publish(rospy.Time.from_sec(now_s))
+    rospy.delete_param("/use_sim_time")
+    clock.unregister()
+
+
+def test_in_simulation_a_clock_that_stands_is_no_silence(robot, start_dead_man, simulated):
+    simulated(100.0)
+    robot.configure(silent_after_s=1.0)
+    start_dead_man()
+    heart = rospy.Publisher("/decision/alive", Header, queue_size=1, latch=True)
+    heart.publish(Header())
+    robot.until_state(state="heard")
+    simulated(100.9)
+    rospy.sleep(1.5)  # that nothing comes of it can only be waited for
+    assert robot.states[-1]["state"] == "heard"
+    simulated(101.1)
+    robot.until_state(state="silent", stops=1)
+    heart.unregister()
 
 
 class Skillset:

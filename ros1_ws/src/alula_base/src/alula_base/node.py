@@ -6,7 +6,6 @@ import functools
 import json
 import sys
 import threading
-import time
 from collections.abc import Sequence
 from dataclasses import asdict
 
@@ -14,6 +13,7 @@ import rospy
 from std_msgs.msg import String
 
 from alula_base.calls import make_call
+from alula_base.clock import SIMULATED_LOOK_S, is_simulated, now_s
 from alula_base.errors import ConfigError
 from alula_base.heartbeats import HEARD, SILENT, Change, Heartbeats
 from alula_base.settings import ReportSettings, Settings, read_settings
@@ -55,7 +55,7 @@ class Supervision:
 
 
 class DeadMan:
-    """Stops the robot when the decision side is silent, on a monotonic clock; starts nothing again when it is back."""
+    """Stops the robot when the decision side is silent, by the clock of `alula_base.clock`; starts nothing again when it is back."""
 
     def __init__(self, settings: Settings) -> None:
         self._settings = settings
@@ -78,17 +78,17 @@ class DeadMan:
         """Watch until ROS shuts down."""
         while not rospy.is_shutdown():
             with self._changed:
-                self._take(self._heartbeats.look(time.monotonic()))
+                self._take(self._heartbeats.look(now_s()))
                 if self._owes_heard and self._supervision is not None and self._supervision.heard():
                     self._owes_heard = False
-                wait_s = self._heartbeats.wait_s(time.monotonic())
-                longest_s = SETTLE_S if self._owes_heard else LONGEST_WAIT_S
+                wait_s = self._heartbeats.wait_s(now_s())
+                longest_s = SETTLE_S if self._owes_heard else SIMULATED_LOOK_S if is_simulated() else LONGEST_WAIT_S
                 self._changed.wait(longest_s if wait_s is None else min(max(wait_s, SHORTEST_WAIT_S), longest_s))
 
     @ends_the_node
     def _hear(self, topic: str, _message: object) -> None:
         with self._changed:
-            self._take(self._heartbeats.hear(topic, time.monotonic()))
+            self._take(self._heartbeats.hear(topic, now_s()))
 
     def _take(self, changes: Sequence[Change]) -> None:
         """Do what changes ask for, under the lock."""

@@ -10,6 +10,7 @@ from dataclasses import dataclass
 import rospy
 
 from alula_base.calls import Silent, StopCall
+from alula_base.clock import now_s
 from resource_reporter import CallFailedError
 
 
@@ -29,7 +30,7 @@ class Outcome:
 
 
 LOOK_S = 0.05
-"""How often a call that waits looks whether there is a heartbeat again."""
+"""Wall clock; how often a call that waits looks whether its time has come, or there is a heartbeat again."""
 
 
 class Worker:
@@ -77,12 +78,11 @@ class Worker:
         if not self._after_s:
             return True
         self.outcome = Outcome(None, f"is called if nothing is heard for {self._after_s:g} s more")
-        end_s = time.monotonic() + self._after_s
+        end_s = now_s() + self._after_s
         while self._silent():
-            left_s = end_s - time.monotonic()
-            if left_s <= 0.0:
+            if now_s() >= end_s:
                 return True
-            time.sleep(min(left_s, LOOK_S))
+            time.sleep(LOOK_S)
         return False
 
     def _made(self) -> Outcome:
