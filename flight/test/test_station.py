@@ -504,6 +504,8 @@ def test_the_status_of_what_is_down(robot, capsys):
     assert commands(["status", "--json"]) == 1
     said = json.loads(capsys.readouterr().out)
     assert (said["deployment"], said["up"], said["domain"], said["parts"], said["mission"]) == ("robot", False, 42, {}, "")
+    assert commands(["up", "robot", "--restart", "rover"]) == CANNOT_START
+    assert "--restart rover: the part managers serves it" in capsys.readouterr().err
     assert commands(["up", "robot", "--restart", "brige"]) == CANNOT_START
     assert "did you mean `bridge`" in capsys.readouterr().err
     assert commands(["down"]) == 0

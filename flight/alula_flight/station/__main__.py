@@ -11,7 +11,7 @@ from typing import Any
 import psutil
 
 from alula.cli.table import parse
-from alula.common.deployments import DeploymentError, deployment_names
+from alula.common.deployments import MANAGERS, DeploymentError, deployment_names
 from alula.common.errors import AlulaError
 from alula.common.suggestions import nearest
 from alula_flight.station import state as states
@@ -34,7 +34,9 @@ def up(given: Any) -> int:
     station = Station(given.deployment)
     for name in given.restart:
         if name not in station.deployment.parts:
-            raise StationError(f"--restart {name}: {nearest(name, station.deployment.parts) or 'it has no such part'}")
+            by = next((part for part, skillsets in station.deployment.served.items() if name in skillsets), "")
+            hint = f"the part {by} serves it, with all others there" if by else nearest(name, station.deployment.parts)
+            raise StationError(f"--restart {name}: {hint or 'it has no such part'}")
     mission = station.mission
     if mission:
         raise StationError(f"{mission} runs on {given.deployment}: its parts are left alone until it is over")
@@ -117,7 +119,8 @@ def lines_of(station: Station, state: StationState) -> list[str]:
     for name, part in state.parts.items():
         lasting = f" for {states.lasting_s(part.start):.0f} s, process {part.pid}" if part.pid else ""
         deaths = f"; ended {part.deaths} times by itself, last with {part.why}" if part.deaths else ""
-        lines.append(f"  {name}: {part.state}{lasting}{deaths}")
+        of = f" of {', '.join(station.deployment.served[name])}" if name == MANAGERS and name in station.deployment.served else ""
+        lines.append(f"  {name}{of}: {part.state}{lasting}{deaths}")
     lines += [f"  mission: {said['mission'] or 'none'}"] if said["up"] else []
     lines += [f"  page: {said['page']}"] if said["page"] else []
     lines += [f"  disk: {said['disk']}"] if said["disk"] else []

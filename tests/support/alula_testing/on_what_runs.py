@@ -91,12 +91,13 @@ def _two_missions(robot: Path, run: Run) -> None:
 
 def _deaths(robot: Path, run: Run) -> None:
     """A part that is killed runs again; another keeper takes over what runs; what a mission that is killed has started is stopped."""
-    begun = processes(run)
-    os.kill(begun["bridge"], signal.SIGKILL)
-    again = lambda part: part["state"] == "running" and part["pid"] != begun["bridge"]  # noqa: E731
-    until(lambda: again(status(run)["parts"]["bridge"]), "the bridge runs again", every_s=0.5)
-    before = processes(run)
-    assert {name: pid for name, pid in before.items() if name != "bridge"} == {name: pid for name, pid in begun.items() if name != "bridge"}
+    for victim in ("bridge", "managers"):
+        begun = processes(run)
+        os.kill(begun[victim], signal.SIGKILL)
+        again = lambda part: part["state"] == "running" and part["pid"] != begun[victim]  # noqa: B023, E731 - called in here
+        until(lambda: again(status(run)["parts"][victim]), f"the {victim} run again", every_s=0.5)  # noqa: B023
+        before = processes(run)
+        assert [name for name in PARTS if before[name] != begun[name]] == [victim]
     os.kill(json.loads((robot / ".alula/up/robot/state.json").read_text(encoding="utf-8"))["keeper"], signal.SIGKILL)
     run("alula up robot --restart recorder")
     after = processes(run)
