@@ -28,6 +28,7 @@ from alula.runtime.live.part import DEAD_S, Consequence, RunPart, part_of_robot
 from alula.runtime.live.spec import RunSpec
 from alula_flight.launch import launch_arguments, launch_file
 from alula_flight.mission_clock import MissionClock
+from alula_flight.mission_watch import SILENT_S, MissionWatch
 from alula_flight.outcome import GIVEN_UP, finish
 from alula_flight.process_faults import ProcessFaults, Started, process_faults_of
 from alula_flight.rest import Rest
@@ -130,6 +131,7 @@ class Supervisor:
             lost=lambda: self._watch.worst is Consequence.END,
         )
         self._departure = Departure(self._out)
+        self._mission = MissionWatch(self._clock)
         self._front = os.getppid()
         self._front_died = False
         self._faults: ProcessFaults | None = None
@@ -172,6 +174,7 @@ class Supervisor:
         self._faults = ProcessFaults(faults, functools.partial(process_of, launch.pm), self._out)
         self._clock.listen(self._faults.look)
         self._part.listen(self._spec, self._faults.departed)
+        self._mission.listen()
         if self._part.cameras:
             from alula_flight.thumbnails import Thumbnails  # late: it needs OpenCV
 
@@ -226,6 +229,10 @@ class Supervisor:
             if self._watch.worst is Consequence.REST:
                 if process_of(launch.pm, "mission") is not None:
                     self._ends(self._watch.worst_death)
+                self._rest.bring()
+                return GIVEN_UP
+            if self._mission.silent:
+                self._ends(f"the mission's process runs, and has not been heard for {SILENT_S:g} s")
                 self._rest.bring()
                 return GIVEN_UP
             if (self._told_to_end or self._watch.worst is Consequence.ABORT) and abort_since is None:

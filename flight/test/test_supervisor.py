@@ -18,6 +18,7 @@ from alula.runtime.live.part import DEAD_S, Clock, Consequence, RunPart
 from alula.runtime.live.spec import RunSpec
 from alula_flight import mission_clock, supervisor
 from alula_flight.mission_clock import MissionClock
+from alula_flight.mission_watch import SILENT_S
 from alula_flight.outcome import GIVEN_UP
 from alula_flight.supervisor import Supervisor, Watch
 
@@ -126,6 +127,22 @@ def test_a_process_that_stays_dead_has_another_consequence_than_one_that_runs_ag
     assert death.again_s == (None if again_s is None else 30.0 + again_s)
     if worst is Consequence.REST:
         assert (flight.ends(), flight.part.rested) == (GIVEN_UP, 1)
+
+
+def test_a_mission_that_lives_and_is_not_heard_any_more_has_the_robot_brought_to_rest(flight: Flight, tmp_path: Path) -> None:
+    flight.clock(20.0)
+    flight.supervisor._mission.hear()
+    flight.clock(20.0 + SILENT_S)
+    assert not flight.supervisor._mission.silent
+    flight.clock(20.1 + SILENT_S)
+    assert (flight.ends(), flight.part.rested) == (GIVEN_UP, 1)
+    assert read_end(tmp_path) == ReportedEnd(SUPERVISOR, "the mission's process runs, and has not been heard for 30 s", 20.1 + SILENT_S)
+
+
+def test_a_mission_that_was_never_heard_is_not_missed(flight: Flight) -> None:
+    flight.clock(20.0)
+    flight.clock(200.0)
+    assert not flight.supervisor._mission.silent
 
 
 def test_a_signal_from_outside_is_named(flight: Flight, tmp_path: Path) -> None:

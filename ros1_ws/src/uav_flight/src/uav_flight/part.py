@@ -69,6 +69,7 @@ class DronePart(RunPart):
 
     faults = FAULTS
     consequences: Mapping[str, Consequence] = {"uav_simulator": Consequence.END}
+    stays_dead: Mapping[str, Consequence] = {"ros_bridge": Consequence.REST}
     cameras: Mapping[str, str] = {"depth": "/zed_depth/depth", "screen": "/ground_station/screen"}
 
     def __init__(self) -> None:
