@@ -11,7 +11,7 @@ from pathlib import Path
 import pytest
 from flight_judge.__main__ import WORDS, main
 from flight_judge.truth import Broken, Truth, at_rest, truth_of
-from flight_judge.verdicts import Claim, claim_of, judge, read_words, with_radio
+from flight_judge.verdicts import Claim, Verdict, claim_of, judge, read_words, with_radio
 from rosbags.rosbag1 import Writer
 from rosbags.typesys import Stores, get_typestore
 
@@ -20,7 +20,7 @@ from alula.common.scenarios import load_scenario
 
 CAMPAIGNS = Path(__file__).resolve().parent / "campaigns"
 LIFT_OFF_S = 5.0
-GOOD = Truth(LIFT_OFF_S, 0, "", 1.2, at_rest=True, broken=(Broken("zed", "dead", 6.0, 20.0),), ended_by="")
+GOOD = Truth(LIFT_OFF_S, 0, "", 1.2, at_rest=True, broken=(Broken("zed", "dead", 6.0, 20.0),))
 CLAIM = Claim("degraded", "perception.zed_depthmap: RESOURCE_INVARIANT_VIOLATED zed_ok (zed_status is BROKEN)", 6.4)
 
 
@@ -85,7 +85,8 @@ def test_a_good_flight_has_a_true_cause_and_nothing_wrong() -> None:
         ({"collisions": None}, "the simulator tells nothing"),
         ({"crash": "it met the ground at 4.0 m/s"}, "crashed: it met the ground at 4.0 m/s"),
         ({"at_rest": False}, "not at rest in the end"),
-        ({"ended_by": "its limit of 180 s is over"}, "hung: its limit of 180 s is over"),
+        ({"ended_by": "supervisor", "ended_why": "its limit of 180 s is over"}, "hung: its limit of 180 s is over"),
+        ({"ended_by": "signal", "ended_why": "SIGTERM to alula run"}, "hung: SIGTERM to alula run"),
     ],
 )
 def test_each_thing_that_is_wrong_is_found(change: dict[str, object], said: str) -> None:
@@ -104,6 +105,15 @@ def test_each_thing_that_is_wrong_is_found(change: dict[str, object], said: str)
 def test_a_cause_that_was_not_in_effect_is_untrue(broken: tuple[Broken, ...]) -> None:
     (said,) = judge(CLAIM, replace(GOOD, broken=broken), read_words(WORDS)).wrong
     assert said == f"untrue cause: {CLAIM.reason}"
+
+
+def test_a_run_that_its_supervisor_ends_is_over_and_its_cause_is_judged() -> None:
+    words, ended = read_words(WORDS), {"ended_by": "supervisor", "ended_why": "mission died (signal SIGKILL)"}
+    claim = Claim("running", "", None)
+    killed = replace(GOOD, broken=(Broken("mission", "killed", 6.0),), **ended)  # type: ignore[arg-type]
+    assert judge(claim, killed, words) == Verdict((), "mission:killed")
+    assert judge(claim, replace(killed, broken=()), words).wrong == ("untrue cause: mission died (signal SIGKILL)",)
+    assert judge(claim, GOOD, words).wrong == ("never over: running",)
 
 
 def test_a_failure_may_be_told_some_ticks_of_the_clock_early() -> None:
@@ -177,6 +187,7 @@ def test_a_campaign_is_judged_flight_by_flight_beside_the_mocks(tmp_path: Path, 
     capsys.readouterr()
     assert main([str(campaign)]) == 1
     said = capsys.readouterr().out
+    assert "| encoder | 2 killed | 1 degraded; 1 degraded, wrong |\n" in said
     assert said.startswith("2 flights: 2 degraded. A cause was told in 2, true in 2. Wrong: 1 collisions, 1 not at rest in the end.")
     first, second = map(json.loads, (campaign / "verdicts.jsonl").read_text(encoding="utf-8").splitlines())
     assert (first["wrong"], first["cause"], first["mocks"]) == ([], "zed:dead", {"outcome": "degraded", "unknown": ["camera@9"]})

@@ -86,6 +86,23 @@ def table(flights: Sequence[Judged]) -> str:
     return "".join(f"| {' | '.join(cell.replace('|', '/') for cell in row)} |\n" for row in rows)
 
 
+def coverage(flights: Sequence[Judged]) -> str:
+    """Return what was really broken, in which ways, how often, and how those flights ended, as a Markdown table."""
+    kinds: dict[str, Counter[str]] = {}
+    ends: dict[str, Counter[str]] = {}
+    for one in flights:
+        for what in {broken.what for broken in one.truth.broken}:
+            kinds.setdefault(what, Counter()).update({broken.how for broken in one.truth.broken if broken.what == what})
+            ends.setdefault(what, Counter()).update([f"{one.row['outcome']}{', wrong' if one.verdict.wrong else ''}"])
+    rows = [("broken", "flights, by way", "outcomes"), ("---",) * 3]
+    rows += [(what, _listed(kinds[what]), _listed(ends[what])) for what in sorted(kinds)]
+    return "".join(f"| {' | '.join(row)} |\n" for row in rows)
+
+
+def _listed(counted: Counter[str]) -> str:
+    return "; ".join(f"{times} {name}" for name, times in counted.most_common())
+
+
 def counts(flights: Sequence[Judged]) -> str:
     """Return the figures of all flights, in a sentence each."""
     outcomes = ", ".join(f"{times} {name}" for name, times in Counter(str(one.row["outcome"]) for one in flights).most_common())
@@ -112,8 +129,11 @@ def main(arguments: Sequence[str] | None = None) -> int:
     except (OSError, ValueError) as error:
         sys.stderr.write(f"flight_judge: {error}\n")
         return 2
+    except KeyError as missing:
+        sys.stderr.write(f"flight_judge: {given.campaign}: is no campaign in the simulator: a run has no {missing}\n")
+        return 2
     write_text(given.campaign / "verdicts.jsonl", "".join(json_line(one.as_dict()) for one in flights))
-    told = f"{counts(flights)}\n{table(flights)}"
+    told = f"{counts(flights)}\n{table(flights)}\n{coverage(flights)}"
     sys.stdout.write(told)
     if given.into is not None:
         before, begin, rest = given.into.read_text(encoding="utf-8").partition(BEGIN)

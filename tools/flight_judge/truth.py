@@ -26,7 +26,7 @@ REST_M = 0.05
 """... in which the vehicle moves no farther where it is at rest, ..."""
 STANDS_M = 0.3
 """... standing: its centre is no higher than so much above where it started; all worlds that are flown have level ground."""
-INJECTED, SUPERVISOR, ACTS = "fault", "end", "act"
+INJECTED, END, ACTS = "fault", "end", "act"
 MENDED = "ok"
 
 
@@ -42,7 +42,10 @@ class Broken:
 
 @dataclass(frozen=True)
 class Truth:
-    """A flight as the simulator saw it; None where it tells nothing. ``ended_by``: who ended it from outside, and why; empty: nobody."""
+    """A flight as the simulator saw it; None where it tells nothing.
+
+    ``ended_by``: who ended it before its mission did; empty: nobody. ``ended_why``: in words.
+    """
 
     lift_off_s: float | None
     collisions: int | None
@@ -50,7 +53,8 @@ class Truth:
     min_clearance_m: float | None
     at_rest: bool | None
     broken: tuple[Broken, ...]
-    ended_by: str
+    ended_by: str = ""
+    ended_why: str = ""
 
 
 def truth_of(folder: Path) -> Truth:
@@ -75,7 +79,7 @@ def truth_of(folder: Path) -> Truth:
     told = [one for one in state.get("faults") or () if "t_s" in one]
     told += [one for one in lines if one.get("kind") == INJECTED]
     broken = [*_spans(told, lift_off_s), *_acts(lines, lift_off_s)]
-    ended = next((str(one.get("why")) for one in lines if one.get("kind") == SUPERVISOR), "")
+    ended: Mapping[str, Any] = next((one for one in lines if one.get("kind") == END), {})
     return Truth(
         lift_off_s,
         state.get("collisions"),
@@ -83,7 +87,8 @@ def truth_of(folder: Path) -> Truth:
         state.get("min_clearance_m"),
         at_rest(poses),
         tuple(sorted(broken, key=lambda one: one.at_s)),
-        ended,
+        str(ended.get("by", "")),
+        str(ended.get("why", "")),
     )
 
 

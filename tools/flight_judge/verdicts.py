@@ -19,6 +19,9 @@ EARLY_S = 0.06
 """The managers' clock ticks at 50 Hz: what they tell may be stamped some ticks before what caused it."""
 CLOCK_BY, CLOCK_S = "ros_bridge", 0.5
 """The process that brings the clock to the mission, and how long after its end the clock has stopped."""
+SUPERVISOR, HUNG = "supervisor", re.compile("limit|stands still")
+"""A run that its supervisor ends because something died is over; one that only a limit ends, or a person, hangs."""
+UNFINISHED = {"running", "not_started", "None"}
 RADIO = ("radio", "control")
 """What the radio's emulation breaks is told by nothing but its request: it does what it is asked for."""
 
@@ -84,15 +87,16 @@ def judge(claim: Claim, truth: Truth, words: Words) -> Verdict:
         wrong.append(f"crashed: {truth.crash}")
     if truth.at_rest is False:
         wrong.append("not at rest in the end")
-    if truth.ended_by:
-        wrong.append(f"hung: {truth.ended_by}")
-    if claim.outcome in {"running", "not_started", "None"}:
+    if truth.ended_by and (truth.ended_by != SUPERVISOR or HUNG.search(truth.ended_why)):
+        wrong.append(f"hung: {truth.ended_why}")
+    elif claim.outcome in UNFINISHED and not truth.ended_by:
         wrong.append(f"never over: {claim.outcome}")
-    if not claim.reason:
+    told = replace(claim, reason=claim.reason or (truth.ended_why if truth.ended_by == SUPERVISOR else ""))
+    if not told.reason:
         return Verdict(tuple(wrong))
-    cause = cause_of(claim, truth, words)
+    cause = cause_of(told, truth, words)
     if not cause:
-        wrong.append(f"untrue cause: {claim.reason}")
+        wrong.append(f"untrue cause: {told.reason}")
     return Verdict(tuple(wrong), cause)
 
 
