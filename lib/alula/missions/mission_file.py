@@ -9,6 +9,8 @@ the mission's account tells of it (output ports, with the value at the beginning
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass, replace
+from functools import cached_property
 from pathlib import Path
 
 from py_trees.behaviour import Behaviour
@@ -17,7 +19,7 @@ from py_trees.behaviours import Success
 from alula.missions.blackboard import Blackboard
 from alula.missions.conditions import Condition, answers
 from alula.missions.nodes import Needs
-from alula.missions.palette import no_class, palette_of
+from alula.missions.palette import no_class, palette_of, without_class
 from alula.missions.part import MissionPart
 from alula.missions.pending import PendingInterrupts
 from alula.missions.plan import InputError, Inputs, MissionPlan
@@ -29,7 +31,7 @@ from alula.trees.blackboard import Blackboard as TreeBoard
 from alula.trees.errors import FileError, TreeError
 from alula.trees.factory import build_tree
 from alula.trees.node import Node
-from alula.trees.palette import Category, Direction, NodeType, Port, node_type
+from alula.trees.palette import Category, Direction, NodeType, Palette, Port, node_type
 from alula.trees.reading import TreeFiles
 from alula.trees.source import TreeSource, source_of
 from alula.trees.structure import verify
@@ -43,8 +45,101 @@ def ignore(_tree: Tree) -> None:
     """Take no notice."""
 
 
-class FiledMission:
-    """The tree of a file, and what its end means."""
+@dataclass(frozen=True)
+class MissionFile:
+    """A mission's file, read once, with the models and the nodes of the robot that it is for: run, search and odds begin with it.
+
+    Attributes:
+        source: where it was read from.
+        files: its trees.
+        skillsets: the models whose skills and resources its trees may name.
+        part: what the robot adds to missions.
+    """
+
+    source: TreeSource
+    files: TreeFiles
+    skillsets: tuple[Skillset, ...]
+    part: MissionPart
+
+    @classmethod
+    def read(cls, mission: Path | TreeSource, skillsets: Sequence[Skillset], part: MissionPart) -> MissionFile:
+        """Read it; raises FileError."""
+        source = source_of(mission)
+        return cls(source, source.read(), tuple(skillsets), part)
+
+    def with_models(self, skillsets: Sequence[Skillset], part: MissionPart | None = None) -> MissionFile:
+        """Return it for other models, and for another part of the robot."""
+        return replace(self, skillsets=tuple(skillsets), part=part or self.part)
+
+    @cached_property
+    def palette(self) -> Palette:
+        """The types of node that its trees may have."""
+        return palette_of(self.files, self.skillsets, self.part)
+
+    @property
+    def nowhere_made(self) -> list[NodeType]:
+        """The types of node that its trees use and that are only declared, by its files or by Nav2."""
+        return [known for name in without_class(self.files, self.palette) if (known := self.palette.get(name)) is not None]
+
+    @property
+    def model(self) -> NodeType:
+        """What it tells of its main tree: its inputs, its parameters, and what its account tells of it, as ports."""
+        return self.files.models.get(self.files.main) or node_type(self.files.main, Category.SUBTREE)
+
+    @property
+    def given(self) -> list[Port]:
+        """Its parameters, which have a default, and its inputs, which have none."""
+        return [port for port in self.model.ports.values() if port.direction is Direction.INPUT]
+
+    def plan(self, name: str, inputs: Inputs) -> MissionPlan:
+        """Return its plan; raises InputError where the file, or an input, can't be used."""
+        try:
+            verify(self.files, self.palette)
+            if (problem := no_class(self.files, self.palette)) is not None:
+                raise FileError(problem)
+        except TreeError as error:
+            raise InputError(str(error)) from error
+        parameters = {port.name: _number(port) for port in self.given if port.default is not None}
+        own = self._inputs(inputs)
+        self.part.check_inputs(own)
+        told = [port for port in self.model.ports.values() if port.direction is not Direction.INPUT]
+        board: list[TreeBoard] = []
+
+        def make(clients: Mapping[str, Client], clock_ns: Clock, values: Mapping[str, float]) -> tuple[MissionTrees, Blackboard]:
+            memory = self.part.memory(clock_ns=clock_ns, pending=PendingInterrupts(clock_ns))
+            maker = Maker(self, Crew(clients, memory), clock_ns)
+            for port in told:
+                maker.board.set(port.name, _number(port))
+            for key, value in {**parameters, **values, **own}.items():
+                maker.board.set(key, value)
+            board[:] = [maker.board]
+            memory.entries = lambda: _shown(maker.board, {*parameters, *own})
+            return MissionTrees(maker), memory
+
+        def facts() -> Mapping[str, object]:
+            return {port.name: board[0].get(port.name) if board else _number(port) for port in told}
+
+        return MissionPlan(name, tuple(one.name for one in self.skillsets), make, parameters, own, facts)
+
+    def _inputs(self, inputs: Inputs) -> dict[str, object]:
+        needed = [port.name for port in self.given if port.default is None]
+        missing = [name for name in needed if name not in inputs]
+        if missing:
+            raise InputError(f"{self.source.path}: the mission needs `{missing[0]}` of its world")
+        return {name: inputs[name] for name in needed}
+
+
+def plan_of_file(mission: Path | TreeSource, name: str, skillsets: Sequence[Skillset], inputs: Inputs, part: MissionPart) -> MissionPlan:
+    """Return the plan of a mission's file; raises InputError."""
+    try:
+        file = MissionFile.read(mission, skillsets, part)
+    except TreeError as error:
+        raise InputError(str(error)) from error
+    return file.plan(name, inputs)
+
+
+class MissionTrees:
+    """The trees of a mission that runs, and what their ends mean."""
 
     def __init__(self, make: Maker) -> None:
         self._make = make
@@ -85,24 +180,17 @@ class FiledMission:
 class Maker:
     """Makes the trees of a mission, over one blackboard."""
 
-    def __init__(
-        self,
-        files: TreeFiles,
-        skillsets: Sequence[Skillset],
-        part: MissionPart,
-        crew: Crew,
-        clock_ns: Clock,
-        enums: Mapping[str, float],
-    ) -> None:
-        self.files = files
+    def __init__(self, file: MissionFile, crew: Crew, clock_ns: Clock) -> None:
+        skillsets = file.skillsets
+        self.files = file.files
         self.crew = crew
         self.board = TreeBoard(clock_ns)
         self._clock_ns = clock_ns
-        self._enums = {**enums, **states_of(skillsets)}
+        self._enums = {**file.source.enums, **states_of(skillsets)}
         self._resources = frozenset(f"{one.name}.{resource}" for one in skillsets for resource in one.resource_index)
         self._data = frozenset(f"{one.name}.{data}" for one in skillsets for data in one.data_index)
-        self._palette = palette_of(files, skillsets, part, crew)
-        for skillset, data in asked_data(files, skillsets).items():
+        self._palette = palette_of(file.files, skillsets, file.part, crew)
+        for skillset, data in asked_data(file.files, skillsets).items():
             if data:
                 crew.clients[skillset].follow(data)
 
@@ -117,45 +205,6 @@ class Maker:
         return tree
 
 
-def plan_of_file(mission: Path | TreeSource, name: str, skillsets: Sequence[Skillset], inputs: Inputs, part: MissionPart) -> MissionPlan:
-    """Return the plan of a mission's file; raises InputError."""
-    source = source_of(mission)
-    try:
-        files = source.read()
-        palette = palette_of(files, skillsets, part)
-        verify(files, palette)
-        if (problem := no_class(files, palette)) is not None:
-            raise FileError(problem)
-    except TreeError as error:
-        raise InputError(str(error)) from error
-    model = files.models.get(files.main) or node_type(files.main, Category.SUBTREE)
-    parameters, own = _parameters(model), _inputs(model, inputs, source.path)
-    part.check_inputs(own)
-    board: list[TreeBoard] = []
-
-    def make(clients: Mapping[str, Client], clock_ns: Clock, values: Mapping[str, float]) -> tuple[FiledMission, Blackboard]:
-        memory = part.memory(clock_ns=clock_ns, pending=PendingInterrupts(clock_ns))
-        maker = Maker(files, skillsets, part, Crew(clients, memory), clock_ns, source.enums)
-        for port in model.ports.values():
-            if port.direction is not Direction.INPUT:
-                maker.board.set(port.name, _number(port))
-        for key, value in {**parameters, **values, **own}.items():
-            maker.board.set(key, value)
-        board[:] = [maker.board]
-        memory.entries = lambda: _shown(maker.board, {*parameters, *own})
-        return FiledMission(maker), memory
-
-    def facts() -> Mapping[str, object]:
-        told = [port.name for port in model.ports.values() if port.direction is not Direction.INPUT]
-        return {name: board[0].get(name) if board else _number(model.ports[name]) for name in told}
-
-    return MissionPlan(name, tuple(one.name for one in skillsets), make, parameters, own, facts)
-
-
-def _parameters(model: NodeType) -> dict[str, float]:
-    return {port.name: _number(port) for port in model.ports.values() if port.direction is Direction.INPUT and port.default is not None}
-
-
 def _number(port: Port) -> float:
     try:
         return float(port.default or 0)
@@ -163,14 +212,6 @@ def _number(port: Port) -> float:
         place = f"{port.place}: " if port.place else ""
         message = f"{place}the default of the mission's port '{port.name}' is '{port.default}', no number; write the number alone"
         raise InputError(message) from None
-
-
-def _inputs(model: NodeType, inputs: Inputs, path: Path) -> dict[str, object]:
-    needed = [port.name for port in model.ports.values() if port.direction is Direction.INPUT and port.default is None]
-    missing = [name for name in needed if name not in inputs]
-    if missing:
-        raise InputError(f"{path}: the mission needs `{missing[0]}` of its world")
-    return {name: inputs[name] for name in needed}
 
 
 def _shown(board: TreeBoard, given: set[str]) -> Mapping[str, object]:

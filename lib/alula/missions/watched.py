@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from alula.missions.director import Mission
-from alula.missions.mission_file import FiledMission
+from alula.missions.mission_file import MissionTrees
 from alula.missions.record import STOP_LOG, MissionRecord
 from alula.missions.skillset import Clock
 from alula.trees.groot.address import Address, ServerError
@@ -17,7 +17,7 @@ class WatchedTree:
     ``groot``: ``HOST:PORT``; empty: no viewers. Raises ServerError.
     """
 
-    def __init__(self, mission: FiledMission, clock_ns: Clock, record: MissionRecord | None, groot: str) -> None:
+    def __init__(self, mission: MissionTrees, clock_ns: Clock, record: MissionRecord | None, groot: str) -> None:
         self._clock_us = lambda: clock_ns() // 1000
         self._record = record
         self.problems: list[str] = []
@@ -67,6 +67,6 @@ class WatchedTree:
 
 def watched(mission: Mission, clock_ns: Clock, record: MissionRecord | None, groot: str) -> WatchedTree | None:
     """Return what shows the tree; None where nobody sees it. Raises ServerError."""
-    if not isinstance(mission, FiledMission) or not (groot or record is not None):
+    if not isinstance(mission, MissionTrees) or not (groot or record is not None):
         return None
     return WatchedTree(mission, clock_ns, record, groot)

@@ -6,11 +6,10 @@ Any other may change at any time and nothing is different then; with twenty of t
 from __future__ import annotations
 
 import re
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterator
 from dataclasses import replace
 
-from alula.missions.palette import palette_of
-from alula.missions.part import MissionPart
+from alula.missions.mission_file import MissionFile
 from alula.model.expressions import TRUE
 from alula.model.json_form import to_json
 from alula.model.model import Skillset
@@ -24,15 +23,15 @@ ANYTHING = "*"
 """In a state that shows a fault."""
 
 
-def with_asked_resources(files: TreeFiles, models: Sequence[Skillset], part: MissionPart, faults: Faults) -> tuple[Skillset, ...]:
-    """Return the models without the resources that nothing names; a state that the trees name keeps a resource that has it."""
-    palette = palette_of(files, models, part)
+def with_asked_resources(file: MissionFile, faults: Faults) -> tuple[Skillset, ...]:
+    """Return the models of a mission without the resources that nothing names; a state that the trees name keeps a resource that has it."""
+    files, models, palette = file.files, file.skillsets, file.palette
     if any(takes_script_from_entry(one, palette.get(type_name(one))) for tree in files.trees.values() for one in tree.iterate()):
-        return tuple(models)  # the script may come from outside, and name any of them
+        return models  # the script may come from outside, and name any of them
     words = {word for text in _texts(files, palette) for word in WORD.findall(text)}
     shown = [state for name, states in faults.items() if name in words for state in states]
     if any(ANYTHING in state for state in shown):
-        return tuple(models)
+        return models
     words |= {word for state in shown for word in WORD.findall(state)}
     asked = {one.name: words | set(WORD.findall(to_json(_steps_of(one)))) for one in models}
     kept = {(one.name, resource.name) for one in models for resource in one.resources if resource.name in asked[one.name]}

@@ -15,7 +15,7 @@ from pathlib import Path
 
 from alula.missions.director import START_TIMEOUT_S, End, Outcome
 from alula.missions.driver import MissionDriver
-from alula.missions.mission_file import plan_of_file
+from alula.missions.mission_file import MissionFile
 from alula.missions.part import MissionPart
 from alula.missions.pausing import PauseRefusedError
 from alula.missions.record import MissionRecord
@@ -32,12 +32,12 @@ from alula.prove.mission.playable import AS_WANTED, breaks, playable, refuses
 from alula.prove.mission.robot import Robot, progress_of
 from alula.prove.mission.run import MissionRun
 from alula.prove.mission.state import Event, Kind
-from alula.prove.mission.system import any_inputs, nowhere_made, uses_of
+from alula.prove.mission.system import any_inputs, uses_of
 from alula.runtime.client import Client
 from alula.runtime.core.execution import Execution
 from alula.runtime.handle import SkillHandle
 from alula.runtime.local import LocalManagers, LocalWorld
-from alula.trees.source import TreeSource, source_of
+from alula.trees.source import TreeSource
 
 FLIPPED = {"<": ">", "<=": ">=", ">": "<", ">=": "<=", "==": "=="}
 STEP_S = 0.01
@@ -136,13 +136,11 @@ class _Player:
         self._data = {one.skillset.name: one.data for one in playables}
         self._served = {one.skillset.name: one.skillset for one in playables}
         self.world = LocalWorld(self._served.values(), self._functions)
-        source = source_of(mission)
-        declared = nowhere_made(source.read(), run.skillsets, part)
-        uses = uses_of(source, run.skillsets, part)
-        own = own_nodes(Robot(self._oracle, uses=uses), part, declared, run.why_any_order)
+        file = MissionFile.read(mission, run.skillsets, part)
+        uses = uses_of(file)
+        own = own_nodes(Robot(self._oracle, uses=uses), part, file.nowhere_made, run.why_any_order)
         nodes = MissionPart(own.part.nodes, memory=part.memory)
-        inputs = any_inputs(source.read(), self._oracle, uses)
-        plan = plan_of_file(source, source.path.stem, run.skillsets, inputs, nodes)
+        plan = file.with_models(run.skillsets, nodes).plan(file.source.path.stem, any_inputs(file, self._oracle, uses))
         plan = replace(plan, inputs={})
         self._facts = plan.facts
         clock_ns = lambda: self.world.clock.now_ns  # noqa: E731

@@ -8,6 +8,7 @@ from dataclasses import dataclass, field, replace
 from pathlib import Path
 
 from alula.language.errors import Diagnostic, Severity
+from alula.missions.mission_file import MissionFile
 from alula.missions.part import MissionPart
 from alula.missions.plan import InputError
 from alula.model.model import Skillset
@@ -25,7 +26,7 @@ from alula.prove.mission.regions import Regions
 from alula.prove.mission.system import System, look_at
 from alula.prove.mission.waits import Waits
 from alula.prove.mission.wanted import wanted
-from alula.trees.source import TreeSource, source_of
+from alula.trees.source import TreeSource
 
 LOOKED_AT = Failures(hooks=False, aborts=False)
 """What the models say can fail, and functions that refuse inputs."""
@@ -117,15 +118,13 @@ class _Search:
     """Looks at the runs of one mission."""
 
     def __init__(self, mission: Path | TreeSource, models: Sequence[Skillset], part: MissionPart, faults: Faults) -> None:
-        self._source = source_of(mission)
-        self._path = self._source.path
-        self._models = models
-        self._part = part
+        file = MissionFile.read(mission, models, part)
+        self._file = file.with_models(with_asked_resources(file, faults))
+        self._path = file.source.path
         self._faults = faults
 
     def _read(self, why: str) -> System:
-        models = with_asked_resources(self._source.read(), self._models, self._part, self._faults)
-        return System.read(self._source, models, self._part, LOOKED_AT, why_any_order=why)
+        return System.of(self._file, LOOKED_AT, why_any_order=why)
 
     def within(self, deadline: Deadline, given: str) -> _Seen:
         """Look at what the models say, and at the properties of the file."""

@@ -24,8 +24,7 @@ from typing import TypeVar
 
 from alula.common.graphs import reachable_from
 from alula.missions.director import Director, Outcome
-from alula.missions.mission_file import READY, STOP_HERE, FiledMission, plan_of_file
-from alula.missions.palette import palette_of, without_class
+from alula.missions.mission_file import READY, STOP_HERE, MissionFile, MissionTrees
 from alula.missions.part import MissionPart
 from alula.missions.plan import InputError, Inputs
 from alula.missions.skill_types import OUTCOME_PORT
@@ -49,9 +48,9 @@ from alula.prove.mission.ticking import Outcome as Ticked
 from alula.prove.mission.unknown import any_value
 from alula.prove.mission.uses import Uses
 from alula.trees.node import Node, Shared, pointer
-from alula.trees.palette import Direction, NodeType, Port, name_in_files
+from alula.trees.palette import name_in_files
 from alula.trees.reading import TreeFiles, type_name
-from alula.trees.source import TreeSource, source_of
+from alula.trees.source import TreeSource
 from alula.trees.wiring import wire
 
 T = TypeVar("T")
@@ -90,28 +89,38 @@ class System:
         known: Inputs | None = None,
         why_any_order: str = "",
     ) -> System:
-        """Read a mission's file; attempts and rounds are counted exactly up to ``few``.
+        """Read a mission's file; arguments and errors as of `of`, and FileError."""
+        return cls.of(MissionFile.read(mission, models, part), failures, few, known, why_any_order)
+
+    @classmethod
+    def of(
+        cls,
+        file: MissionFile,
+        failures: Failures = Failures(),  # noqa: B008 - a value
+        few: int = FEW,
+        known: Inputs | None = None,
+        why_any_order: str = "",
+    ) -> System:
+        """Return the system of a mission; attempts and rounds are counted exactly up to ``few``.
 
         With ``known`` inputs the robot's own leaves do what they do; without, they may answer all that they declare. Its nodes with
         children are run where their code can be, unless a reason is given (``why_any_order``).
 
         Raises InputError where the file can't be used, UndecidedError where the search can't look at it.
         """
-        source = source_of(mission)
-        files, path = source.read(), source.path
-        skillsets = [one for one in models if one.name in _named(files)]
+        files, path, palette = file.files, file.source.path, file.palette
+        named = _named(files)
+        skillsets = [one for one in file.skillsets if one.name in named]
         oracle = Oracle()
-        palette = palette_of(files, models, part)
-        declared = nowhere_made(files, models, part)
-        uses = uses_of(source, models, part)
+        uses = uses_of(file)
         robot = Robot(oracle, Conditions.of(files, palette, skillsets), Compared.of(files, palette, skillsets), uses)
-        inputs = any_inputs(files, oracle, uses) if known is None else known
-        own = own_nodes(robot, part, declared, why_any_order, known=known is not None)
-        plan = plan_of_file(source, path.stem, skillsets, inputs, own.part)
+        inputs = any_inputs(file, oracle, uses) if known is None else known
+        own = own_nodes(robot, file.part, file.nowhere_made, why_any_order, known=known is not None)
+        plan = file.with_models(skillsets, own.part).plan(path.stem, inputs)
         clients = {one.name: Client(robot, one) for one in skillsets}
         oracle.begin(lambda _: None)
         filed, board = plan.make(clients, robot.clock_ns, plan.parameters)  # type: ignore[arg-type]  # a client as far as missions use it
-        if not isinstance(filed, FiledMission) or not isinstance(board, Memory):
+        if not isinstance(filed, MissionTrees) or not isinstance(board, Memory):
             raise InputError(f"{path}: is no mission in a file")
         stop = filed.stop_tree() if STOP_HERE in files.trees else None
         trees = (filed.tree, *([stop] if stop else []))
@@ -346,25 +355,17 @@ def look_at(read: Callable[[str], System], look: Callable[[System], T]) -> T:
         return look(read(str(error)))
 
 
-def nowhere_made(files: TreeFiles, skillsets: Sequence[Skillset], part: MissionPart) -> list[NodeType]:
-    """Return the types of node that a mission's trees use and that are only declared, by its files or by Nav2."""
-    palette = palette_of(files, skillsets, part)
-    return [known for name in without_class(files, palette) if (known := palette.get(name)) is not None]
-
-
-def uses_of(source: TreeSource, models: Sequence[Skillset], part: MissionPart) -> Uses:
+def uses_of(file: MissionFile) -> Uses:
     """Return how a mission uses what nodes without a class write, and its inputs."""
-    files = source.read()
-    palette = palette_of(files, models, part)
-    declared = [one.name for one in nowhere_made(files, models, part)]
-    skills = (f"{one.name}.{skill.name}" for one in models for skill in one.skills)
-    numbers = [*source.enums, *states_of(models), *(port.name for port in _inputs(files) if port.default is not None)]
-    return Uses.of(files, palette, declared, [*declared, *skills, *map(name_in_files, part.nodes)], numbers)
+    declared = [one.name for one in file.nowhere_made]
+    skills = (f"{one.name}.{skill.name}" for one in file.skillsets for skill in one.skills)
+    numbers = [*file.source.enums, *states_of(file.skillsets), *(port.name for port in file.given if port.default is not None)]
+    return Uses.of(file.files, file.palette, declared, [*declared, *skills, *map(name_in_files, file.part.nodes)], numbers)
 
 
-def any_inputs(files: TreeFiles, oracle: Oracle, uses: Uses) -> Inputs:
+def any_inputs(file: MissionFile, oracle: Oracle, uses: Uses) -> Inputs:
     """Return any values for the inputs of a mission."""
-    ports = (port for port in _inputs(files) if port.default is None)
+    ports = (port for port in file.given if port.default is None)
     return {port.name: any_value(oracle, f"`{port.name}`", uses.type_of_input(port)) for port in ports}
 
 
@@ -381,10 +382,3 @@ def _named(files: TreeFiles) -> frozenset[str]:
 def _words(text: str) -> list[str]:
     plain = "".join(letter if letter.isalnum() or letter in "_." else " " for letter in text)
     return [part.partition(".")[0] for part in plain.split() if "." in part]
-
-
-def _inputs(files: TreeFiles) -> list[Port]:
-    """Return the inputs and the parameters of a mission, which have a default."""
-    model = files.models.get(files.main)
-    ports = [] if model is None else list(model.ports.values())
-    return [one for one in ports if one.direction is Direction.INPUT]

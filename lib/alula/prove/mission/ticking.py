@@ -14,7 +14,7 @@ from typing import NamedTuple
 from py_trees.behaviour import Behaviour
 
 from alula.missions.director import Director
-from alula.missions.mission_file import FiledMission
+from alula.missions.mission_file import MissionTrees
 from alula.prove.limits import Deadline
 from alula.prove.mission.measured import of_data
 from alula.prove.mission.memory import Body, Keeper, TreeMemory
@@ -56,7 +56,7 @@ class Decision:
 class OneStop:
     """The mission, with one tree that brings the robot to rest: a mission is aborted once."""
 
-    def __init__(self, mission: FiledMission, stop: Tree | None) -> None:
+    def __init__(self, mission: MissionTrees, stop: Tree | None) -> None:
         self._mission = mission
         self._stop = stop
         self.root = mission.root

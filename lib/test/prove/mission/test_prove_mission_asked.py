@@ -7,10 +7,12 @@ from pathlib import Path
 import pytest
 
 from alula.language.load import parse_skillset
+from alula.missions.mission_file import MissionFile
 from alula.missions.part import NO_PART
 from alula.prove.mission.asked import with_asked_resources
 from alula.prove.mission.prover import prove_mission
 from alula.trees.reading import read_text
+from alula.trees.source import TreeSource
 
 FREE = "".join(f" resource r{number} {{ initial A extern A -> B extern B -> A }}" for number in range(40))
 RESOURCES = """
@@ -27,7 +29,8 @@ MODEL = f"""skillset s {{{RESOURCES}
 
 def kept(tree: str, faults: dict[str, frozenset[str]] | None = None) -> list[str]:
     text = f'<root BTCPP_format="4"><BehaviorTree ID="m"><Sequence>{tree}<s.go/></Sequence></BehaviorTree></root>'
-    (model,) = with_asked_resources(read_text(text), [parse_skillset(MODEL)], NO_PART, faults or {})
+    file = MissionFile(TreeSource(Path("mission.xml")), read_text(text), (parse_skillset(MODEL),), NO_PART)
+    (model,) = with_asked_resources(file, faults or {})
     return [one.name for one in model.resources]
 
 
