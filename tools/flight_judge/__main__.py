@@ -1,4 +1,4 @@
-"""Judges a campaign in the simulator: ``setup/in_ros2 python -m flight_judge CAMPAIGN [--into PAGE] [--words FILE]``.
+"""Judges a campaign in the simulator: ``setup/in_ros2 python -m flight_judge CAMPAIGN [--into PAGE [--mark NAME]] [--words FILE]``.
 
 CAMPAIGN is the folder of ``alula campaign``. Each flight is judged by the simulator's truth: no collision, at rest in the end, not hung,
 and the cause that was told is one of the faults that were in effect. Beside it stands what the mocks say of the same faults. Verdicts
@@ -22,7 +22,6 @@ from flight_judge.truth import Truth, truth_of
 from flight_judge.verdicts import Verdict, Words, claim_of, judge, read_words, with_radio
 
 WORDS = Path(__file__).resolve().parents[2] / "tests/campaigns/uav-causes.yaml"
-BEGIN, END = "<!-- flights -->", "<!-- /flights -->"
 REASON_LETTERS = 110
 HEAD = ("run", "scenario, seed", "faults, s after lift-off", "outcome", "true cause", "clearance", "over mocks", "wrong")
 
@@ -121,7 +120,8 @@ def main(arguments: Sequence[str] | None = None) -> int:
     """Judge; return the exit code."""
     parser = argparse.ArgumentParser(prog="flight_judge", description="Judge the flights of a campaign by the simulator's truth.")
     parser.add_argument("campaign", type=Path, help="the folder of a campaign in the simulator")
-    parser.add_argument("--into", type=Path, metavar="PAGE", help=f"put figures and table into this page, between {BEGIN} and {END}")
+    parser.add_argument("--into", type=Path, metavar="PAGE", help="put figures and tables into this page, between its marks")
+    parser.add_argument("--mark", default="flights", help="name of the marks, <!-- NAME --> and <!-- /NAME --> (default flights)")
     parser.add_argument("--words", type=Path, default=WORDS, help="what a true reason may name, by fault (default: the drone's)")
     given = parser.parse_args(arguments)
     try:
@@ -136,12 +136,13 @@ def main(arguments: Sequence[str] | None = None) -> int:
     told = f"{counts(flights)}\n{table(flights)}\n{coverage(flights)}"
     sys.stdout.write(told)
     if given.into is not None:
-        before, begin, rest = given.into.read_text(encoding="utf-8").partition(BEGIN)
-        _, end, after = rest.partition(END)
+        first, last = f"<!-- {given.mark} -->", f"<!-- /{given.mark} -->"
+        before, begin, rest = given.into.read_text(encoding="utf-8").partition(first)
+        _, end, after = rest.partition(last)
         if not begin or not end:
-            sys.stderr.write(f"flight_judge: {given.into} has no place for the table: add {BEGIN} and {END}\n")
+            sys.stderr.write(f"flight_judge: {given.into} has no place for the table: add {first} and {last}\n")
             return 2
-        write_text(given.into, f"{before}{BEGIN}\n\n{told}\n{END}{after}")
+        write_text(given.into, f"{before}{first}\n\n{told}\n{last}{after}")
     return 1 if any(one.verdict.wrong for one in flights) else 0
 
 
