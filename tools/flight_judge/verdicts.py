@@ -61,7 +61,7 @@ def claim_of(summary: Mapping[str, Any]) -> Claim:
     named = re.match(r"(\w+)\.(\w+):", reason)
     ends = [one for one in summary.get("skills") or () if named and (one["skillset"], one["skill"]) == named.groups()]
     failed = [one["end_s"] for one in ends if one.get("end_s") is not None and one.get("result_kind") != "success"]
-    return Claim(str(summary.get("outcome")), reason, max(failed, default=None))
+    return Claim(str(summary.get("outcome")), reason, min(failed, default=None))
 
 
 def with_radio(truth: Truth, asked: Sequence[str]) -> Truth:
