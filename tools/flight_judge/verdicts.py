@@ -60,7 +60,11 @@ def claim_of(summary: Mapping[str, Any]) -> Claim:
     reason = str(summary.get("reason") or "")
     named = re.match(r"(\w+)\.(\w+):", reason)
     ends = [one for one in summary.get("skills") or () if named and (one["skillset"], one["skill"]) == named.groups()]
-    failed = [one["end_s"] for one in ends if one.get("end_s") is not None and one.get("result_kind") != "success"]
+    failed = [
+        one["end_s"]
+        for one in ends
+        if one.get("end_s") is not None and one.get("result_kind") != "success" and one.get("outcome") != "INTERRUPTED"
+    ]
     return Claim(str(summary.get("outcome")), reason, min(failed, default=None))
 
 
