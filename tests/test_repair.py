@@ -20,9 +20,11 @@ from alula import Mission
 from alula.check.robot import part_of
 from alula.cli.check import main as check
 from alula.cli.repair import main as repair
+from alula.cli.run import main as run
 from alula.common.robots import find_robot
 from alula.common.scenarios import load_scenario
 from alula.missions.director import Outcome
+from alula.missions.drawing import ROW_PX
 from alula.missions.mission_file import plan_of_file
 from alula.missions.mocked import MockedMission
 from alula.missions.scenario import inputs_of
@@ -52,27 +54,40 @@ def no_lidar(missions: Path) -> Path:
     return without_lidar(ALULA_ROOT, missions).mission
 
 
+PAGE = re.findall(
+    r"^ {4}(alula|mv) (.*?)(?: +#.*)?$", (ALULA_ROOT / "docs/how-to/repairs.md").read_text().split("## In five")[1], re.MULTILINE
+)[:5]
+"""The page's commands."""
+
+
 class Repaired(NamedTuple):
-    """What the command has said and written of a mission without its LiDAR branch."""
+    """What the command of the page has said and written of a mission without its LiDAR branch, in the folder of a robot."""
 
     before: str
     found: dict[str, Any]
     progress: str
     out: Path
+    robot: Path
 
 
 @pytest.fixture(scope="module")
 def repaired(tmp_path_factory: pytest.TempPathFactory) -> Repaired:
-    folder = tmp_path_factory.mktemp("missions")
-    mission, out = without_lidar(ALULA_ROOT, folder).mission, folder / "repaired.xml"
+    robot = tmp_path_factory.mktemp("robot")
+    for entry in ALULA_ROOT.iterdir():
+        if entry.name not in {".git", "missions", "runs"}:
+            (robot / entry.name).symlink_to(entry)
+    (robot / "missions").mkdir()
+    mission = without_lidar(ALULA_ROOT, robot / "missions").mission
     before = mission.read_text()
+    (words,) = [words.split()[1:] for _, words in PAGE if words.startswith("repair ")]
     said, progress = io.StringIO(), io.StringIO()
     with pytest.MonkeyPatch.context() as patch, redirect_stdout(said), redirect_stderr(progress):
-        patch.setenv("ALULA_ROBOT", str(ALULA_ROOT))
-        code = repair([str(mission), "--fault", "zed", "--most-faults", "1", "--time", TIME_S, "--out", str(out), "--json"])
+        patch.setenv("ALULA_ROBOT", str(robot))
+        patch.chdir(robot)
+        code = repair([*words, "--time", TIME_S, "--json"])
     assert code == 0, progress.getvalue()
     assert mission.read_text() == before  # only --out is written
-    return Repaired(before, json.loads(said.getvalue()), progress.getvalue(), out)
+    return Repaired(before, json.loads(said.getvalue()), progress.getvalue(), robot / words[words.index("--out") + 1], robot)
 
 
 def test_the_flight_goes_on_with_the_lidar_as_in_figure_10(repaired: Repaired) -> None:
@@ -94,7 +109,7 @@ def test_the_flight_goes_on_with_the_lidar_as_in_figure_10(repaired: Repaired) -
 def test_what_is_written_is_proved_by_check(
     repaired: Repaired, capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    monkeypatch.setenv("ALULA_ROBOT", str(ALULA_ROOT))
+    monkeypatch.setenv("ALULA_ROBOT", str(repaired.robot))
     assert check([str(repaired.out), "--json", "--time", TIME_S]) == 0
     (file,) = json.loads(capsys.readouterr().out)["files"]
     assert [finding["severity"] for finding in file["findings"]] == ["note"]  # what the file accepts, as before
@@ -103,6 +118,30 @@ def test_what_is_written_is_proved_by_check(
 def test_the_file_keeps_all_that_stood_in_it(repaired: Repaired) -> None:
     left = iter(repaired.out.read_text().split("\n"))
     assert all(line in left for line in repaired.before.split("\n"))  # in its order
+
+
+def test_the_drawing_has_a_band_for_each_node_of_the_branch(repaired: Repaired) -> None:
+    nodes, bands = repaired.found["repair"]["nodes"], (repaired.robot / "repaired.svg").read_text().count(f"width='100%' height='{ROW_PX}'")
+    assert bands == nodes + 1  # and the use of its tree
+
+
+def test_the_pages_commands_repair_the_mission(repaired: Repaired, monkeypatch: pytest.MonkeyPatch, tmp_path: Path) -> None:
+    """The search was run before; `check` is in a test of its own."""
+    kinds = [words.split()[0] for _, words in PAGE]
+    assert kinds == ["run", "repair", "check", "missions/repaired.xml", "run"]
+    kept = repaired.out.read_text()
+    outcomes = []
+    for number, (command, words) in enumerate(PAGE):
+        if command == "mv":
+            source, target = words.split()
+            (repaired.robot / source).rename(repaired.robot / target)
+        elif kinds[number] == "run":
+            out = tmp_path / str(number)
+            monkeypatch.setenv("ALULA_ROBOT", str(repaired.robot))
+            run([*words.split()[1:], "--out", str(out)])
+            outcomes.append(json.loads((out / "summary.json").read_text())["outcome"])
+    repaired.out.write_text(kept)
+    assert outcomes == ["given_up", "degraded"]
 
 
 def test_progress_shows_what_counterexamples_rule_out(repaired: Repaired) -> None:

@@ -127,7 +127,7 @@ def lamps(count: int) -> tuple[str, str]:
 
 FAMILIES: Mapping[str, tuple[Callable[[int], tuple[str, str]], Sequence[int]]] = {
     "legs": (legs, (1, 2, 4, 8)),
-    "sensors": (sensors, (2, 4, 8, 16)),
+    "sensors": (sensors, (2, 4, 8)),
     "at once": (at_once, (1, 2, 3, 4)),
     "lamps": (lamps, (1, 4, 16, 64)),
 }

@@ -16,13 +16,18 @@ from alula.cli.table import parse
 from alula.common.errors import AlulaError
 from alula.common.files import json_line, write_text
 from alula.common.garbage import collect_seldom
+from alula.missions.drawing import draw
+from alula.missions.palette import palette_of
 from alula.odds.errors import OddsError
 from alula.odds.odds import Odds, odds_of
 from alula.odds.robot import graph_of
 from alula.prove.limits import Deadline, OutOfTimeError
+from alula.repair.branches import Branch
 from alula.repair.repairing import Question, Search
 from alula.repair.subject import Subject
-from alula.repair.telling import as_dict, as_text
+from alula.repair.telling import added, as_dict, as_text
+from alula.trees.answers import Answers, StepClock, scripted_tree
+from alula.trees.view import view_of
 
 COMMAND = "alula repair"
 NONE, WRONG = 1, 2
@@ -56,11 +61,22 @@ def run(given: argparse.Namespace) -> int:
     if repair is not None:
         with subject.copy(repair.text) as changed:
             odds = _odds(subject.flown_as, given.file, changed)
+            if given.svg is not None:
+                write_text(given.svg, _drawn(subject, repair.branch, changed))
+                tell(f"{given.svg} shows it")
     if repair is not None and given.out is not None:
         write_text(given.out, repair.text)
         tell(f"{given.out} has it")
     sys.stdout.write(json_line(as_dict(answer, odds)) if given.json else as_text(answer, odds))
     return 0 if repair is not None or answer.survives_already else NONE
+
+
+def _drawn(subject: Subject, branch: Branch, changed: Path) -> str:
+    """Return a drawing of the mission with the branch."""
+    files = subject.tree(changed).read()
+    tree = scripted_tree(files, palette_of(files, subject.skillsets, subject.part), Answers({}), StepClock())
+    view = view_of(tree.root)
+    return draw(view, f"{subject.path.name}: {files.main}, with '{branch.name}'", added(view, branch))
 
 
 def _odds(path: Path, before: Path, changed: Path) -> tuple[Odds, Odds] | None:

@@ -8,7 +8,7 @@ ports and conditions follow as the file has them.
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Collection, Iterator
 from html import escape
 
 from alula.trees.view import NodeView
@@ -47,12 +47,14 @@ FILLS = {
 STROKES = {"SUCCESS": "#2e8b40", "FAILURE": "#c62828", "RUNNING": "#1565c0", "INTERRUPTED": "#7a7a7a", "INVALID": "#bdbdbd"}
 MARKS = {"SUCCESS": "\N{CHECK MARK}", "FAILURE": "\N{BALLOT X}", "RUNNING": "\N{HORIZONTAL ELLIPSIS}", "INTERRUPTED": "interrupted"}
 PORTS_INK, CONDITIONS_INK = "#5d6b78", "#9a5b00"
+NEW_FILL, NEW_WORDS = "#fdf1c7", "new"
 
 
 class _Canvas:
     """Collects shapes, a line a node."""
 
-    def __init__(self) -> None:
+    def __init__(self, new: Collection[int]) -> None:
+        self._new = new
         self.parts: list[str] = []
         self.width = 0.0
         self.rows = 0
@@ -60,6 +62,8 @@ class _Canvas:
     def node(self, view: NodeView, x: float) -> float:
         """Draw a node and what is below it; return the middle of its line."""
         y = TITLE_PX + MARGIN_PX + (self.rows + 0.5) * ROW_PX
+        if self.rows in self._new:
+            self.parts.append(f"<rect x='0' y='{y - ROW_PX / 2:.1f}' width='100%' height='{ROW_PX}' fill='{NEW_FILL}'/>")
         self.rows += 1
         self._box(view, x, y)
         stem = x + INDENT_PX / 2
@@ -132,7 +136,7 @@ def _shape(kind: str) -> Callable[[float, float, float, str], str]:
     return {"parallel": _trapezium, "condition": _pill}.get(kind, _rectangle)
 
 
-def _legend(tree: NodeView, y: float) -> str:
+def _legend(tree: NodeView, y: float, new: Collection[int]) -> str:
     """Return the signs that the tree has."""
     there = {view.kind for view in tree.walk()}
     parts, x = [], float(MARGIN_PX)
@@ -142,12 +146,15 @@ def _legend(tree: NodeView, y: float) -> str:
         parts.append(_shape(kind)(x, y, width, f"fill='{FILLS[kind]}' stroke='#888'"))
         parts.append(f"<text x='{x + width / 2:.1f}' y='{y + 17:.1f}' text-anchor='middle' fill='#111'>{label}</text>")
         x += width + 10
+    if new:
+        parts.append(f"<rect x='{x:.1f}' y='{y:.1f}' width='46' height='{BOX_PX}' fill='{NEW_FILL}'/>")
+        parts.append(f"<text x='{x + 23:.1f}' y='{y + 17:.1f}' text-anchor='middle' fill='#111'>{NEW_WORDS}</text>")
     return "".join(parts)
 
 
-def draw(tree: NodeView, title: str) -> str:
-    """Return the tree as an SVG document."""
-    canvas = _Canvas()
+def draw(tree: NodeView, title: str, new: Collection[int] = ()) -> str:
+    """Return the tree as an SVG document; ``new`` are nodes that get a band, numbered from the top as ``walk`` yields them."""
+    canvas = _Canvas(new)
     canvas.node(tree, MARGIN_PX)
     bottom = TITLE_PX + MARGIN_PX + canvas.rows * ROW_PX + 10
     width, height = max(canvas.width, 760, len(title) * TITLE_LETTER_PX) + MARGIN_PX, bottom + BOX_PX + MARGIN_PX
@@ -155,7 +162,7 @@ def draw(tree: NodeView, title: str) -> str:
     return (
         f"<svg xmlns='http://www.w3.org/2000/svg' viewBox='0 0 {width:.0f} {height:.0f}' width='{width:.0f}' height='{height:.0f}' "
         f"{FONT} font-size='11.5'><rect width='100%' height='100%' fill='white'/>{head}{''.join(canvas.parts)}"
-        f"{_legend(tree, bottom)}</svg>\n"
+        f"{_legend(tree, bottom, new)}</svg>\n"
     )
 
 

@@ -7,8 +7,10 @@ from collections.abc import Sequence
 from alula.odds.odds import Odds
 from alula.odds.telling import WORDS
 from alula.repair import planning
+from alula.repair.branches import Branch
 from alula.repair.fates import Fate
 from alula.repair.repairing import Answer, Repair
+from alula.trees.view import NodeView
 
 Both = tuple[Odds, Odds]
 """The odds without the branch, and with it."""
@@ -76,6 +78,24 @@ def as_dict(answer: Answer, odds: Both | None) -> dict[str, object]:
     if odds is not None:
         found["odds"] = {name: _pairs(odds, name) for name in odds[0].outcomes}
     return found
+
+
+def added(view: NodeView, branch: Branch) -> frozenset[int]:
+    """Return the numbers of the nodes of a drawn mission that came with a branch."""
+    found: set[int] = set()
+
+    def visit(one: NodeView, number: int, *, new: bool) -> int:
+        new = new or (one.name == branch.name and not branch.around)
+        outer = one.name == branch.name or (branch.wraps and any(child.name == branch.name for child in one.children))
+        if new or outer:
+            found.add(number)
+        number += 1
+        for child in one.children:
+            number = visit(child, number, new=new)
+        return number
+
+    visit(view, 0, new=False)
+    return frozenset(found)
 
 
 def _pairs(odds: Sequence[Odds], name: str) -> dict[str, list[float]]:

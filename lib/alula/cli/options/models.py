@@ -97,6 +97,7 @@ def repair(parser: ArgumentParser) -> None:
     parser.add_argument("--goal", default="", metavar="CONDITION", help="what is as good as an accomplished mission, as in properties")
     parser.add_argument("--within", default="", metavar="NODE", help="where the branch has to stand (default: anywhere)")
     _search(parser, "the mission with the branch")
+    parser.add_argument("--svg", type=Path, metavar="FILE", help="draw the mission with the branch there, which gets a band")
     json_option(parser, "the branch")
 
 
