@@ -6,7 +6,7 @@ The check of files and the search of all runs both read it here. What is in a sc
 from __future__ import annotations
 
 from collections.abc import Callable, Collection, Iterator, Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import TypeAlias
 
 from alula.trees.blackboard import Blackboard
@@ -113,6 +113,11 @@ class Accesses:
                     yield Access(key, target.name, False, attribute, place, in_passing=True)
                 yield from self._part(board, attribute, part.value)
                 yield Access(key, target.name, True, attribute, place, _written(part.value), value=part.value)
+            case Assignment(target=Conditional() as target):  # it is written where the condition says
+                yield from self._part(board, attribute, target.condition)
+                for branch in (target.then, target.otherwise):
+                    yield from (one if one.write else replace(one, in_passing=True) for one in self._part(board, attribute, branch))
+                yield from self._part(board, attribute, part.value)
             case _:
                 for child in children(part):
                     if not (isinstance(part, Call) and isinstance(child, Name)):

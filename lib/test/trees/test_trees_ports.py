@@ -132,3 +132,9 @@ def test_what_a_subtree_is_given_as_plain_text_is_written(use, default):
     assert make_tree(read_text(text), standard_palette(), int).tick() is SUCCESS
     oracle = pytest.importorskip("oracle")
     assert oracle.Theirs().play(text, {}, 1, []).ticks == oracle.ours(text, {}, 1, []).ticks
+
+
+def test_a_condition_that_says_what_is_written_is_read_and_what_is_written_is_not():
+    either = "<Sequence><Script code=\"a := 1; b := ''\"/><Script code=\"a == 1 ? b := 'x' : b := ''\"/></Sequence>"
+    (told,) = check(read_text(ROOT.format(either).replace("<root", '<root main_tree_to_execute="m"')), standard_palette())
+    assert (told.code, told.message) == ("ALU624", "`b` is written, and nothing reads it")
