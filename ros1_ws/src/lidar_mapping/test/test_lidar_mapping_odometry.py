@@ -13,6 +13,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from hypothesis.extra.numpy import arrays
 from lidar_mapping_yard import yard
+from scipy.spatial import cKDTree
 from scipy.spatial.transform import Rotation
 
 from lidar_mapping import (
@@ -189,6 +190,35 @@ def test_what_can_not_be_believed_says_why_and_leaves_the_filter_alone() -> None
     assert "fitness" in register(elsewhere, YARD, found, RegistrationSettings(min_points=10)).refusal
     assert found.state is kept[0]
     assert found.covariance == pytest.approx(kept[1])
+
+
+def test_a_fast_vehicle_makes_a_keyframe_of_three_sweeps() -> None:
+    found = odometry(replace(FREE, reach_m=30.0))
+    made = []
+    for k in range(10):  # 1 m a sweep
+        scan = yard(20_000, k) - [0.1 * k, 0.0, 2.0] - [0.9 * k, 0.0, 0.0]
+        step = found.add(still(k, scan), [], np.eye(4), AutopilotMotion(np.eye(3), np.array([10.0 * (k > 0), 0.0, 0.0])))
+        made.append(step.keyframe is not None)
+    assert made == [True, False, False, True, False, False, True, False, False, True]
+
+
+def test_keyframes_that_lie_behind_are_thinned_and_no_place_is_lost(monkeypatch) -> None:
+    monkeypatch.setattr("lidar_mapping.keyframes.MOST_KEPT", 12_000)
+    rng = np.random.default_rng(4)
+    bounded, places = Keyframes(voxel_m=0.08, limit=100), []
+    for k in range(30):  # along a wall, of which each keyframe sees 8 m
+        wall = np.stack([rng.uniform(0.3 * k, 0.3 * k + 8.0, 12_000), np.full(12_000, 3.0), rng.uniform(0.0, 2.0, 12_000)], axis=1)
+        pose = np.eye(4)
+        pose[0, 3] = 0.3 * k
+        places.append(wall)
+        bounded.add(k, pose, wall)
+    counts = [len(frame.points) for frame in bounded.all]
+    assert sum(counts) < 0.4 * len(counts) * counts[-1]
+    assert counts[-3:] == pytest.approx([counts[-1]] * 3, rel=0.1)
+    kept = np.vstack([frame.points_in_map() for frame in bounded.all])
+    seen = downsample(np.vstack(places), 0.25)
+    away, _ = cKDTree(kept).query(seen)
+    assert away.max() < 0.25
 
 
 # --- real scans ------------------------------------------------------------------------------------------------------

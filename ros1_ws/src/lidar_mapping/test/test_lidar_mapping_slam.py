@@ -11,7 +11,7 @@ import pytest
 from lidar_mapping_yard import Path
 from scipy.spatial.transform import Rotation
 
-from lidar_mapping import ImuReading, Slam, SlamSettings
+from lidar_mapping import ImuReading, OdometrySettings, Slam, SlamSettings
 from lidar_mapping.readings import ReadingQueue
 from perception_core import NS, PoseBuffer, PoseUnavailableError
 
@@ -235,18 +235,19 @@ def test_a_loop_is_closed_and_the_correction_carried_on_to_the_map() -> None:
     assert pose[:3, 3] == pytest.approx(path.position(28.0), abs=0.15)
 
 
-def test_of_a_sensor_of_many_beams_some_points_are_used_other_ones_each_time() -> None:
-    path, slam, used = Path(lap), Slam(SlamSettings(most_points=2000)), []
+def test_of_a_sensor_of_many_beams_all_points_are_used_as_means() -> None:
+    path, slam, inserted = Path(lap), Slam(SlamSettings(odometry=OdometrySettings(most_points=2000, dense_voxel_m=0.5))), []
+    insert = slam.map.insert
+    slam.map.insert = lambda points: inserted.append(points) or insert(points)
     for k in range(10):
-        sweep = path.sweep(k / 10, seed=1)
+        sweep = path.sweep(k / 10, seed=k)
         assert len(sweep.points) > 4000
         slam.add(sweep, path.readings(k / 10, k / 10 + 0.1, np.random.default_rng(k)), path.autopilot(k / 10 + 0.1), np.eye(4))
-        used.append(slam._thinned(sweep).points)
-    assert [len(points) for points in used] == pytest.approx([2000] * 10, rel=0.1)
-    assert not np.array_equal(used[0][:50], used[1][:50])
+        assert len(inserted[-1]) < 0.8 * len(sweep.within(1.2, 25.0).points)
     assert np.linalg.norm(slam.pose()[0][:3, 3] - path.position(1.0)) < 0.05
     few = path.sweep(1.0, seed=1, count=1500)
-    assert slam._thinned(few) is few
+    slam.add(few, path.readings(1.0, 1.1, np.random.default_rng(10)), path.autopilot(1.1), np.eye(4))
+    assert len(inserted[-1]) == len(few.within(1.2, 25.0).points)
 
 
 def test_a_corridor_makes_the_position_uncertain_along_it_and_is_survived() -> None:

@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from lidar_mapping.surface import PATCH_M, Patches, Surface, flat_patches, join
-from lidar_mapping.voxel_map import downsample
+from lidar_mapping.voxel_map import downsample, in_voxels_of
 
 if TYPE_CHECKING:
     from numpy.typing import NDArray
@@ -16,7 +16,10 @@ if TYPE_CHECKING:
     Floats = NDArray[np.float64]
 
 NEIGHBOUR_KEYFRAMES = 3
-MOST_CENTRES = 15_000  # of patches: a LiDAR of 16 beams has fewer in a keyframe; to tell more planes takes longer than a sweep
+DENSE_POINTS = 40_000  # a keyframe of so many tells planes by itself: of 64 beams it has more, of 16 beams fewer
+DENSE_CENTRES = 5_000  # of patches in such a keyframe but the first, which is all there is: more take longer, and lay scans no better
+MOST_CENTRES = 15_000  # in others, which have fewer anyway
+MOST_KEPT = 1_500_000  # points in all keyframes (18 MB), until those behind keep only what the next one does not hold
 
 
 @dataclass
@@ -39,11 +42,16 @@ class Keyframe:
 
 
 class Keyframes:
-    """All keyframes in the order of time; a keyframe costs about 300 kB, so a limit bounds the memory."""
+    """All keyframes in the order of time.
+
+    A keyframe of a sensor of 16 beams costs about 300 kB. Beyond `MOST_KEPT` points, those that lie behind are thinned, oldest first: each
+    place is kept with the last keyframe that saw it. So what memory there is grows with the surface seen, and a limit bounds it.
+    """
 
     def __init__(self, *, voxel_m: float, limit: int) -> None:
         self._voxel_m, self._limit = voxel_m, limit
         self.all: list[Keyframe] = []
+        self._thinned = 0  # how many of the oldest
 
     @property
     def full(self) -> bool:
@@ -51,16 +59,33 @@ class Keyframes:
         return len(self.all) >= self._limit
 
     def add(self, stamp_ns: int, pose: Floats, points: Floats) -> Keyframe:
-        """Take the points (N, 3), map frame, of the sweeps since the last keyframe; the planes are found with the help of the last ones."""
+        """Take the points (N, 3), map frame, of the sweeps since the last keyframe.
+
+        Where they are few, the planes are found with the help of the last keyframes.
+        """
         fresh = downsample(points, self._voxel_m)
-        around = np.vstack([fresh, *(frame.points_in_map() for frame in self.all[-NEIGHBOUR_KEYFRAMES:])])
+        dense = len(fresh) > DENSE_POINTS
+        around = np.vstack([fresh, *(frame.points_in_map() for frame in ([] if dense else self.all[-NEIGHBOUR_KEYFRAMES:]))])
         back: Floats = np.asarray(np.linalg.inv(pose), dtype=np.float64)
-        centres = downsample(fresh, PATCH_M)
-        patches = flat_patches(centres[:: len(centres) // MOST_CENTRES + 1], downsample(around, PATCH_M)).moved(back)
+        thinned = downsample(around, PATCH_M)
+        centres, most = thinned if dense else downsample(fresh, PATCH_M), DENSE_CENTRES if dense and self.all else MOST_CENTRES
+        patches = flat_patches(centres[:: len(centres) // most + 1], thinned).moved(back)
         inside = (fresh @ back[:3, :3].T + back[:3, 3]).astype(np.float32)
         frame = Keyframe(stamp_ns, pose, inside, patches)
         self.all.append(frame)
+        self._bound()
         return frame
+
+    def _bound(self) -> None:
+        """Thin the oldest keyframes that are not, until there are few enough points or only the last ones are left."""
+        kept = sum(len(frame.points) for frame in self.all)
+        while kept > MOST_KEPT and self._thinned < len(self.all) - NEIGHBOUR_KEYFRAMES:
+            frame, following = self.all[self._thinned : self._thinned + 2]
+            self._thinned += 1
+            if not frame.everywhere:
+                kept -= len(frame.points)
+                frame.points = frame.points[~in_voxels_of(frame.points_in_map(), following.points_in_map(), PATCH_M)]
+                kept += len(frame.points)
 
     def adopt(self, points: Floats, patches: Patches) -> None:
         """Take what an earlier run saw, map frame, as the first keyframe; its pose stays what it is."""

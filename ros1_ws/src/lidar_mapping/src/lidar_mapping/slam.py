@@ -32,7 +32,7 @@ if TYPE_CHECKING:
 
 @dataclass(frozen=True)
 class SlamSettings:
-    """Metres, seconds. Of a sweep ``most_points`` are used, by chance: a sensor of 16 beams has fewer, one of 64 four times as many.
+    """Metres, seconds.
 
     The map is lost after ``lost_s`` without a believed scan, or when the position is not known to ``lost_m``.
     """
@@ -41,7 +41,6 @@ class SlamSettings:
     max_voxels: int = 1_000_000
     self_m: float = 1.2
     max_range_m: float = 25.0
-    most_points: int = 30_000
     lost_s: float = 2.0
     lost_m: float = 0.75
     odometry: OdometrySettings = field(default_factory=OdometrySettings)
@@ -71,7 +70,6 @@ class Slam:
         self._odometry: LidarInertialOdometry | None = None
         self._lost_since_ns: int | None = None
         self._readings: deque[ImuReading] = deque(maxlen=KEPT)
-        self._chance = np.random.default_rng(0)
 
     @property
     def loops(self) -> int:
@@ -160,18 +158,11 @@ class Slam:
         if self._odometry is None:
             self._start(sweep, poses, velocity)
         assert self._odometry is not None  # noqa: S101 -- just started
-        near = self._thinned(sweep.within(self._settings.self_m, self._settings.max_range_m))
+        near = sweep.within(self._settings.self_m, self._settings.max_range_m)
         step = self._odometry.add(near, self._readings, T_base_lidar, AutopilotMotion(ends.rotation[1], velocity))
         self._readings.clear()
         self._take(step, ends.matrix(1))
         return step.registration
-
-    def _thinned(self, sweep: Sweep) -> Sweep:
-        """Return the sweep with about as many points as are used; every fourth one would be of the same beams each time."""
-        count = len(sweep.points)
-        return (
-            sweep if count <= self._settings.most_points else sweep.select(self._chance.random(count) < self._settings.most_points / count)
-        )
 
     def _start(self, sweep: Sweep, poses: PoseBuffer, velocity: Floats) -> None:
         place = self.T_map_odom @ poses.at([sweep.stamp_ns]).matrix()
