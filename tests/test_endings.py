@@ -76,7 +76,7 @@ def test_killed_front_leaves_nothing_and_the_vehicle_lands(fly: StartFlight) -> 
 
 
 # Each flight loses some nodes, one after the other. The recorder is the last of its flight: it stays away, nothing is on record after it.
-LOST_NODES = {"functional": ("zed_depth", "record"), "skills": ("managers", "uav_guidance", "ros_bridge")}
+LOST_NODES = {"functional": ("zed_depth", "record"), "skills": ("navigation", "uav_guidance", "ros_bridge")}
 
 
 def lose(flight: Flight, victims: Sequence[str]) -> None:

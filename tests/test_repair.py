@@ -128,7 +128,7 @@ def test_the_drawing_has_a_band_for_each_node_of_the_branch(repaired: Repaired) 
 def test_the_pages_commands_repair_the_mission(repaired: Repaired, monkeypatch: pytest.MonkeyPatch, tmp_path: Path) -> None:
     """The search was run before; `check` is in a test of its own."""
     kinds = [words.split()[0] for _, words in PAGE]
-    assert kinds == ["run", "repair", "check", "missions/repaired.xml", "run"]
+    assert kinds == ["run", "repair", "check", "missions/my_repair.xml", "run"]
     kept = repaired.out.read_text()
     outcomes = []
     for number, (command, words) in enumerate(PAGE):

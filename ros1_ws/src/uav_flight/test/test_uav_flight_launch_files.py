@@ -32,6 +32,12 @@ def test_simulated_time_waits_only_for_nodes_that_the_scenario_starts(scenario: 
 
 
 @pytest.mark.parametrize("scenario", scenario_names())
+def test_processes_that_can_be_made_to_fail_are_nodes(scenario: str, tmp_path: Path) -> None:
+    nodes = {node.name for node in launched(scenario, tmp_path).nodes}
+    assert set(dict(load_scenario(scenario).processes).values()) <= nodes
+
+
+@pytest.mark.parametrize("scenario", scenario_names())
 def test_what_the_command_line_asks_for_reaches_the_nodes(scenario: str, tmp_path: Path) -> None:
     words = ["--autopilot", "tcp:127.0.0.1:15760", "--sensors", "simulated", "--imperfections", "realistic", "--record", "sensors"]
     words += ["--seed", "7", "--rate", "3", "--fail", "zed@30", "--world", "forest", "--out", str(tmp_path / "run")]
