@@ -373,7 +373,7 @@ def _judged_now(mutant: Mutant) -> Verdict:
 
 def test_flights_of_a_campaign_see_what_is_wrong_and_what_is_otherwise() -> None:
     campaign = load_campaign(ROOT / "tests" / "campaigns" / "uav.yaml")
-    flights = Flights(study.robot_of(ROOT), "mapping", replace(campaign, runs=campaign.runs[:12]))
+    flights = Flights(study.robot_of(ROOT), "mapping", replace(campaign, runs=campaign.runs[:24]))
     every = {one.what: one for one in study.mutants(ROOT, ["mapping"])}
     seen = {
         "mapping.xml, mapping: 'mapping mission': its first child stands in its place": WRONG,  # nothing lands it when it gives up
@@ -382,7 +382,7 @@ def test_flights_of_a_campaign_see_what_is_wrong_and_what_is_otherwise() -> None
     }
     for what, by in seen.items():
         one = flights.judge(every[what])
-        assert (one.by, one.flights) == (by, one.first if by == WRONG else 6), one
+        assert (one.by, one.flights) == (by, one.first if by == WRONG else 12), one
     broken = flights.judge(replace(every["mapping.xml, ready: 'Sequence': Sequence is Fallback"], text="<root>"))
     assert broken.by == REFUSED
 
