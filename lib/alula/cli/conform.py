@@ -23,6 +23,8 @@ def lines(log: Log, verdict: ConformanceVerdict) -> Iterator[str]:
         yield f"{log.path}: conforms: {verdict.events} events of {', '.join(log.skillsets)}"
     else:
         yield f"{log.path}: does not conform"
+    if verdict.assumed:
+        yield f"  if {', '.join(verdict.assumed)} from the beginning on: no event is about it, as in a log that is older than the model"
     for finding in verdict.findings:
         yield f"  {finding}"
         yield "    the models allow instead: " + "; ".join(finding.allowed)

@@ -132,6 +132,14 @@ def test_flights_of_the_whole_stack_conform(name, capsys):
     assert ": conforms: " in capsys.readouterr().out
 
 
+def test_a_log_that_is_older_than_its_model_conforms_with_what_no_event_is_about_and_that_is_told(capsys):
+    recording = ROOT / "tests" / "recordings" / "mapping"
+    assert main([str(recording), "--json"]) == 0
+    assert json.loads(capsys.readouterr().out)["assumed"] == ["navigation.link == UP"]
+    assert main([str(recording)]) == 0
+    assert "navigation.link == UP from the beginning on" in capsys.readouterr().out
+
+
 def test_a_run_that_never_started_has_no_events_and_that_is_what_is_told(tmp_path, capsys):
     writer = RecordWriter(tmp_path / FILE)
     writer.write(MISSION, 0, {"scenario": "inspection"})

@@ -6,8 +6,9 @@ so far, most of the time one; an event that no belief allows is a finding.
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
+from types import MappingProxyType
 
 from alula.model import semantics
 from alula.model.model import Skillset
@@ -39,12 +40,17 @@ class Finding:
 class SkillsetMonitor:
     """Follows one skillset. ``finding`` is the first event that does not conform; later ones are not looked at.
 
+    Args:
+        skillset: the model.
+        assumed: states of resources at the beginning, instead of their initial ones.
+
     Raises:
         UnsupportedModelError: the model can't be executed.
     """
 
-    def __init__(self, skillset: Skillset) -> None:
+    def __init__(self, skillset: Skillset, assumed: Mapping[str, str] = MappingProxyType({})) -> None:
         self.skillset = skillset
+        self.assumed = assumed
         self.finding: Finding | None = None
         self.restarts: list[float] = []
         """When the managers were restarted, seconds of mission clock."""
@@ -53,7 +59,8 @@ class SkillsetMonitor:
         self._begin()
 
     def _begin(self) -> None:
-        self._beliefs: list[Belief] = [Belief(semantics.initial(self.skillset))]
+        first = semantics.initial(self.skillset)
+        self._beliefs: list[Belief] = [Belief(replace(first, states={**first.states, **self.assumed}))]
         self._last: EngineEvent | None = None
         self._ended: dict[str, str] = {}
 

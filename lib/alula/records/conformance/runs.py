@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Iterable, Mapping
 from dataclasses import dataclass
+from types import MappingProxyType
 
 from alula.model.model import Skillset
 from alula.records.conformance.monitor import Finding, SkillsetMonitor
@@ -20,6 +21,8 @@ class ConformanceVerdict:
         restarts: when managers were restarted, by skillset, seconds of mission clock.
         open: executions that had not ended when the log did, of skillsets without a finding.
         owed: what had to follow in the step with which the log ends, of the same.
+        assumed: states, as ``skillset.resource == STATE``, without which it does not conform: of resources that no event is about, in which
+            they would have been from the beginning on.
     """
 
     events: int
@@ -27,6 +30,7 @@ class ConformanceVerdict:
     restarts: Mapping[str, tuple[float, ...]]
     open: tuple[str, ...]
     owed: tuple[str, ...]
+    assumed: tuple[str, ...] = ()
 
     @property
     def conforms(self) -> bool:
@@ -41,19 +45,20 @@ class ConformanceVerdict:
             "restarts": {name: list(at) for name, at in self.restarts.items()},
             "open": list(self.open),
             "owed": list(self.owed),
+            "assumed": list(self.assumed),
         }
 
 
 class Monitor:
-    """Follows all skillsets of a run.
+    """Follows all skillsets of a run; ``assumed``: by skillset, states of resources at the beginning, instead of their initial ones.
 
     Raises:
         UnsupportedModelError: a model can't be executed.
     """
 
-    def __init__(self, skillsets: Iterable[Skillset]) -> None:
+    def __init__(self, skillsets: Iterable[Skillset], assumed: Mapping[str, Mapping[str, str]] = MappingProxyType({})) -> None:
         self.skillsets = tuple(skillsets)
-        self._monitors = {skillset.name: SkillsetMonitor(skillset) for skillset in self.skillsets}
+        self._monitors = {one.name: SkillsetMonitor(one, assumed.get(one.name, {})) for one in self.skillsets}
 
     def take(self, event: EngineEvent) -> Finding | None:
         """Take the next event; return what does not conform, once a skillset.
@@ -74,4 +79,5 @@ class Monitor:
             restarts={name: tuple(monitor.restarts) for name, monitor in monitors.items() if monitor.restarts},
             open=tuple(f"{name}.{one}" for name, monitor in monitors.items() for one in monitor.open if not monitor.finding),
             owed=tuple(f"{name}: {one}" for name, monitor in monitors.items() for one in monitor.owed if not monitor.finding),
+            assumed=tuple(f"{name}.{one} == {state}" for name, monitor in monitors.items() for one, state in monitor.assumed.items()),
         )

@@ -105,8 +105,7 @@ def run_skillsets(served: Sequence[Served], arguments: Sequence[str] | None = No
     sweep_shared_memory()
     # Our own handlers: rclpy's would shut the context down before the callers were told.
     rclpy.init(args=words, signal_handler_options=SignalHandlerOptions.NO)
-    address = pipe_address(os.environ.get("ROS_DOMAIN_ID", ""), *(one.skillset.name for one in served), *words)
-    refused = _serve(options.part, served, address, stop)
+    refused = _serve(options.part, served, words, stop)
     rclpy.try_shutdown()
     faulthandler.cancel_dump_traceback_later()
     if refused:
@@ -114,7 +113,7 @@ def run_skillsets(served: Sequence[Served], arguments: Sequence[str] | None = No
         sys.exit(REFUSED)
 
 
-def _serve(part: str, served: Sequence[Served], address: str, stop: threading.Event) -> str:
+def _serve(part: str, served: Sequence[Served], words: Sequence[str], stop: threading.Event) -> str:
     """Serve until ``stop``; return why managers refuse to, or ""."""
     refusals: list[str] = []
 
@@ -127,6 +126,7 @@ def _serve(part: str, served: Sequence[Served], address: str, stop: threading.Ev
         first = Node(names[0], enable_rosout=False, start_parameter_services=False)
     nodes: list[Node] = [first]
     try:
+        address = "" if part == ALL else pipe_address(os.environ.get("ROS_DOMAIN_ID", ""), *names, *words)
         if part in {ALL, RESOURCES}:
             listen_for_rivals(first, names)
         parts = make_parts(part, served, address=address, stop=stop, on_rival=refuse)

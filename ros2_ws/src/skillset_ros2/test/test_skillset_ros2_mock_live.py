@@ -230,7 +230,7 @@ def test_two_robots_with_a_skillset_of_one_name_share_a_domain_and_nothing_else(
         (["nowhere"], "nowhere"),
         (
             [UAV, "--fail", "camera@3"],
-            "there is no fault 'camera' in the behaviour; it has link:silent, zed, lidar, pilot, radio, radio:degraded, encoder",
+            "there is no fault 'camera' in the behaviour; it has link:silent, zed, lidar, pilot, pilot:lands, pilot:stick, radio",
         ),
         ([UAV, "--fail", "zed@soon"], "--fail: fault 'zed@soon': write WHAT, WHAT@SECONDS"),
         ([UAV, "--skillset", "flying"], "--skillset flying: uav has no such skillset; it has"),

@@ -70,7 +70,7 @@ def test_a_users_script_runs(ros2_domain):
         execution = managers.running()
         # A script that is slower than the managers would hear of the end only.
         first = script.stdout.readline()
-        managers.bring({"flight_status": "IN_AIR"})
+        managers.bring({"flight_status": "IN_AIR", "link": "UP"})
         execution.terminate("AT_ALTITUDE")
         managers.hooks["goto"].dispatched.wait(READY_S)
         # What lands before the script watches is no change that it could see.
