@@ -64,7 +64,7 @@ def test_a_behaviour_that_can_not_be_read_leaves_nothing_behind(tmp_path: Path) 
         (
             ["--fail", "camera@3"],
             "there is no fault 'camera' in the behaviour; it has "
-            "link:silent, zed, lidar, pilot, control, link, barometer, gps, imu, barometer:wrong",
+            "link:silent, zed, lidar, pilot, pilot:lands, pilot:stick, wind, control, link, barometer, gps, imu, barometer:wrong",
         ),
     ):
         flight = start_flight(tmp_path / "run", "--mock", *more)
