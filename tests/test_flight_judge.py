@@ -109,11 +109,12 @@ def test_a_cause_that_was_not_in_effect_is_untrue(broken: tuple[Broken, ...]) ->
 
 def test_a_run_that_its_supervisor_ends_is_over_and_its_cause_is_judged() -> None:
     words, ended = read_words(WORDS), {"ended_by": "supervisor", "ended_why": "mission died (signal SIGKILL)"}
-    claim = Claim("running", "", None)
+    claim = claim_of({"outcome": "aborted", "reason": "ended by the supervisor: mission died (signal SIGKILL)"})
     killed = replace(GOOD, broken=(Broken("mission", "killed", 6.0),), **ended)  # type: ignore[arg-type]
     assert judge(claim, killed, words) == Verdict((), "mission:killed")
-    assert judge(claim, replace(killed, broken=()), words).wrong == ("untrue cause: mission died (signal SIGKILL)",)
-    assert judge(claim, GOOD, words).wrong == ("never over: running",)
+    assert judge(claim, replace(killed, broken=()), words).wrong == (f"untrue cause: {claim.reason}",)
+    assert judge(Claim("running", "", None), GOOD, words).wrong == ("never over: running",)
+    assert judge(Claim("None", "", None), killed, words) == Verdict((), "mission:killed"), "what is lost of its files says the log"
 
 
 def test_a_failure_may_be_told_some_ticks_of_the_clock_early() -> None:

@@ -136,7 +136,9 @@ class AttachedSupervisor:
                 log.error("the mission did not end within %.0f s after it was told to", ABORT_TIMEOUT_S)
                 return GIVEN_UP
         if mission.returncode < 0:
-            note_death(self._out, Death("mission", describe_exit(mission.returncode), self._clock.now_s))
+            death = Death("mission", describe_exit(mission.returncode), self._clock.now_s)
+            note_death(self._out, death)
+            note_end(self._out, ReportedEnd(SUPERVISOR, f"{death.name} died ({death.how})", death.when_s))
         if mission.returncode != 0 or self._serves or self._held.look():
             self._rest.bring()  # what the mission could not, or there was none
         return mission.returncode if mission.returncode >= 0 else GIVEN_UP

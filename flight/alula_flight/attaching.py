@@ -9,9 +9,8 @@ from contextlib import contextmanager
 from pathlib import Path
 
 from alula.common.processes import RUN_ID_VARIABLE
-from alula.common.record import FILE, RecordError, read_record
-from alula.common.run_log import account
 from alula.common.scenarios import load_scenario
+from alula.report.ends import RUNNING, last_account
 from alula.runtime.live.spec import RequestError, RunSpec
 from alula_flight.station import state as states
 from alula_flight.station.master import why_no_master
@@ -19,8 +18,6 @@ from alula_flight.station.parts import environment_of
 from alula_flight.station.station import Station
 
 AT_REST_S = 90.0  # wall clock
-STILL_RUNNING = "running"
-"""The outcome in the record of a mission that has not written how it ended."""
 
 
 @contextmanager
@@ -72,11 +69,7 @@ def _check(station: Station) -> None:
 def leave_at_rest(spec: RunSpec, say: Callable[[str], None]) -> None:
     """Interrupt what a mission has left running that ended before it could stop it: its managers live on."""
     out = Path(spec.out_dir)
-    try:
-        outcome = account(out, read_record(out / FILE)).get("outcome")
-    except (OSError, ValueError, RecordError):
-        outcome = None
-    if outcome not in {None, STILL_RUNNING}:
+    if last_account(out).get("outcome") not in {None, RUNNING}:
         return
     say("the mission did not end in order: what runs is interrupted")
     station = Station(spec.deployment)

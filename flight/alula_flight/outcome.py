@@ -7,6 +7,7 @@ from pathlib import Path
 
 from alula.records.conformance import Monitor
 from alula.report.deaths import read_deaths
+from alula.report.ends import close_account
 from alula.runtime.live.spec import RunSpec
 
 GIVEN_UP, CANNOT_START = 1, 2
@@ -14,7 +15,7 @@ GIVEN_UP, CANNOT_START = 1, 2
 
 
 def finish(spec: RunSpec, mission_exit: int | None, monitor: Monitor | None = None) -> int:
-    """Make the report from the run's folder, say how it went, and return the exit code."""
+    """Make the report from the run's folder, of which nothing runs any more, say how it went, and return the exit code."""
     # Late, because a wrong command line should not have to wait for matplotlib and Open3D.
     from alula.report.facts import RunFacts
     from alula.report.making import make_report
@@ -22,6 +23,7 @@ def finish(spec: RunSpec, mission_exit: int | None, monitor: Monitor | None = No
 
     out = Path(spec.out_dir)
     died = read_deaths(out)
+    close_account(out, mission_exit)
     summary = make_report(
         RunFacts(
             scenario=spec.scenario,

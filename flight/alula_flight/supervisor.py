@@ -227,8 +227,7 @@ class Supervisor:
                 self._ends(self._watch.worst_death)
                 return GIVEN_UP
             if self._watch.worst is Consequence.REST:
-                if process_of(launch.pm, "mission") is not None:
-                    self._ends(self._watch.worst_death)
+                self._ends(self._watch.worst_death)
                 self._rest.bring()
                 return GIVEN_UP
             if self._mission.silent:

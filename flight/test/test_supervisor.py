@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import json
 import signal
 from collections.abc import Callable, Iterator, Mapping
 from dataclasses import dataclass, field
@@ -10,16 +11,17 @@ from types import SimpleNamespace
 
 import pytest
 
+from alula.common.record import FILE, MISSION, RecordWriter
 from alula.common.run_log import read_held
 from alula.report.deaths import read_deaths
-from alula.report.ends import OPERATOR, SIGNAL, SUPERVISOR, ReportedEnd, note_end, read_end
+from alula.report.ends import OPERATOR, SIGNAL, SUPERVISOR, ReportedEnd, last_account, note_end, read_end
 from alula.report.live import LiveEvents
 from alula.runtime.live.part import DEAD_S, Clock, Consequence, RunPart
 from alula.runtime.live.spec import RunSpec
 from alula_flight import mission_clock, supervisor
 from alula_flight.mission_clock import MissionClock
 from alula_flight.mission_watch import SILENT_S
-from alula_flight.outcome import GIVEN_UP
+from alula_flight.outcome import GIVEN_UP, finish
 from alula_flight.supervisor import Supervisor, Watch
 
 
@@ -77,8 +79,8 @@ class Flight:
     def clock(self, now_s: float) -> None:
         self.supervisor._clock._tick(SimpleNamespace(clock=SimpleNamespace(to_sec=lambda: now_s)))
 
-    def died(self, name: str) -> None:
-        self.supervisor._watch.process_died(f"{name}-1", 1)
+    def died(self, name: str, code: int = 1) -> None:
+        self.supervisor._watch.process_died(f"{name}-1", code)
 
     def signalled(self, number: signal.Signals) -> None:
         self.supervisor._end_asked(number)
@@ -127,6 +129,27 @@ def test_a_process_that_stays_dead_has_another_consequence_than_one_that_runs_ag
     assert death.again_s == (None if again_s is None else 30.0 + again_s)
     if worst is Consequence.REST:
         assert (flight.ends(), flight.part.rested) == (GIVEN_UP, 1)
+        assert read_end(tmp_path) == ReportedEnd(SUPERVISOR, "ros_bridge died (exit code 1) and stayed dead", 30.0 + DEAD_S + 0.1)
+
+
+def test_a_mission_that_was_killed_is_the_reason_that_is_told(flight: Flight, tmp_path: Path) -> None:
+    flight.clock(30.0)
+    flight.died("mission", -signal.SIGKILL)
+    assert (flight.ends(), flight.part.rested) == (GIVEN_UP, 1)
+    assert read_end(tmp_path) == ReportedEnd(SUPERVISOR, "mission died (signal SIGKILL)", 30.0)
+
+
+def test_the_report_of_a_mission_that_was_killed_says_that_it_was_aborted_and_why(flight: Flight, tmp_path: Path) -> None:
+    (tmp_path / "logs").mkdir()
+    writer = RecordWriter(tmp_path / FILE)
+    writer.write(MISSION, 0, {"scenario": "mapping", "outcome": "running", "reason": "", "lift_off_s": None})
+    flight.clock(30.0)
+    flight.died("mission", -signal.SIGKILL)
+    code = finish(RunSpec("mapping", str(tmp_path), "id"), flight.ends())
+    summary = json.loads((tmp_path / "summary.json").read_text(encoding="utf-8"))
+    assert code == GIVEN_UP
+    assert (summary["outcome"], summary["reason"]) == ("aborted", "ended by the supervisor: mission died (signal SIGKILL)")
+    assert last_account(tmp_path)["outcome"] == "aborted", "all that reads the account in a run's folder is told the same"
 
 
 def test_a_mission_that_lives_and_is_not_heard_any_more_has_the_robot_brought_to_rest(flight: Flight, tmp_path: Path) -> None:

@@ -1,14 +1,16 @@
-"""Who ended a run before its mission did, and why; the first entry counts."""
+"""Who ended a run before its mission did, and why, the first entry counts; and the account of a mission that could not tell its end."""
 
 from __future__ import annotations
 
 import contextlib
 import signal
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import asdict, dataclass
 from pathlib import Path
+from typing import Any
 
-from alula.common.run_log import END, note, read
+from alula.common.record import FILE, RecordError, RecordFollower
+from alula.common.run_log import END, MISSION, account, note, read
 from alula.report.facts import Death
 
 OPERATOR, SUPERVISOR, FRONT, SIGNAL = "operator", "supervisor", "front", "signal"
@@ -17,6 +19,10 @@ TOLD_TO_END = "told to end by "
 """How the reason of a mission begins that was ended by a signal: who had it sent, and why, is for the run to say."""
 CLOCK_STANDS = "the mission clock stands still"
 """How the reason begins of a mission that heard no clock any more: it does not know who brought it."""
+
+RUNNING, ABORTED = "running", "aborted"
+"""The outcome in the account of a mission that has not told how it ended, and of one that was ended."""
+NO_OWN_END = "the mission did not tell how it ended"
 
 
 @dataclass(frozen=True)
@@ -62,3 +68,28 @@ def read_end(out: Path) -> ReportedEnd | None:
         with contextlib.suppress(TypeError):
             return ReportedEnd(**values)
     return None
+
+
+def last_account(out: Path) -> Mapping[str, Any]:
+    """Return the mission's last account, of a run with this folder; empty where there is none that can be read."""
+    try:
+        return account(out, RecordFollower(out / FILE).poll())
+    except (OSError, ValueError, RecordError):
+        return account(out, [])
+
+
+def close_account(out: Path, mission_exit: int | None) -> None:
+    """Note that a mission was aborted which could not tell it, as its process had died or was not heard, with who ended it or how it died.
+
+    To be called when nothing of the run runs any more. After exit code 0 nothing is noted: the mission had come to its end, and only its
+    account is lost.
+    """
+    told = last_account(out)
+    if told.get("outcome") != RUNNING or mission_exit == 0:
+        return
+    ended = read_end(out)
+    code = "" if mission_exit is None else f" with exit code {mission_exit}"
+    why = f"the mission's process ended{code} before the mission did" if ended is None else ended.sentence()
+    # An account before the departure does not tell that there was none.
+    known = {name: value for name, value in told.items() if value is not None}
+    note(out, MISSION, {**known, "outcome": ABORTED, "reason": why, "problems": [*(told.get("problems") or ()), NO_OWN_END]})

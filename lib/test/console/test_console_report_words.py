@@ -9,7 +9,7 @@ from typing import Any
 import pytest
 from console_page import DRAWN, Page
 from console_records import LIFT_OFF_S, failing_story, overtaken
-from console_reports import make_report, make_story_report
+from console_reports import SUMMARY, make_report, make_story_report
 
 from alula.common.record import DATA, MISSION
 from alula.report.page.embedded import REPORT
@@ -62,6 +62,17 @@ def test_what_failed_without_being_made_to_is_the_cause_of_what_followed(browser
     assert f"{mark} 40.00 s" in page.text("#timeline text").split(" | ")
     told = [line for line in page.text("#lines li").split(" | ") if line.startswith(("40.00 s", "50.00 s"))]
     assert told == [f"{when}{sentence}" for when, sentence in zip(("40.00 s", "50.00 s"), sentences, strict=False)]
+    assert page.complaints() == []
+
+
+def test_a_mission_that_was_killed_is_told_to_be_aborted_with_who_ended_it(browser: Any, tmp_path: Path) -> None:
+    story = failing_story()[:-1]  # its record never tells its end
+    reason = "ended by the supervisor: mission died (signal SIGKILL)"
+    page = Page(browser, make_story_report(tmp_path, story, {**SUMMARY, "outcome": "aborted", "reason": reason}))
+    page.wait(DRAWN)
+    assert page.text("#headline") == "Mission aborted"
+    assert reason in page.text("body")
+    assert "59.80 sMission aborted." in page.text("#lines li").split(" | "), "told where its record ends"
     assert page.complaints() == []
 
 

@@ -8,9 +8,25 @@ from types import SimpleNamespace
 
 import pytest
 
+from alula.common.record import FILE as RECORD
+from alula.common.record import MISSION, RecordWriter
 from alula.common.run_log import FILE, note_wait
 from alula.report.deaths import Death
-from alula.report.ends import FRONT, OPERATOR, SIGNAL, SUPERVISOR, ReportedEnd, ended_by_signal, note_end, read_end, true_reason, with_dead
+from alula.report.ends import (
+    FRONT,
+    NO_OWN_END,
+    OPERATOR,
+    SIGNAL,
+    SUPERVISOR,
+    ReportedEnd,
+    close_account,
+    ended_by_signal,
+    last_account,
+    note_end,
+    read_end,
+    true_reason,
+    with_dead,
+)
 from alula.report.facts import RunFacts
 from alula.report.files import Problems
 from alula.report.summary import read_outcome
@@ -189,3 +205,49 @@ def test_the_summary_of_a_run_that_came_to_its_limit_says_so(tmp_path: Path) -> 
     facts = RunFacts("mapping", 1, tmp_path, (), (), 1)
     history = SimpleNamespace(mission={"outcome": "aborted", "reason": SIGINT})
     assert read_outcome(facts, history, Problems()) == ("aborted", "ended by the supervisor: its limit of 30 s is over")
+
+
+KILLED = ReportedEnd(SUPERVISOR, "mission died (signal SIGKILL)", 30.0)
+UNHEARD = ReportedEnd(SUPERVISOR, "ros_bridge died (exit code 1) and stayed dead", 41.0)
+
+
+@pytest.mark.parametrize("damage", [b"", b"\x05cut"])
+@pytest.mark.parametrize(
+    ("ended", "code", "reason", "told"),
+    [
+        (KILLED, 1, KILLED.sentence(), "mission ended by the supervisor: mission died (signal SIGKILL)"),
+        (UNHEARD, 1, UNHEARD.sentence(), "mission ended by the supervisor: ros_bridge died (exit code 1) and stayed dead"),
+        (ReportedEnd(OPERATOR, "Ctrl-C"), 1, "aborted by the operator: Ctrl-C", "mission aborted by the operator: Ctrl-C"),
+        (
+            None,
+            1,
+            "the mission's process ended with exit code 1 before the mission did",
+            "mission aborted: the mission's process ended with exit code 1 before the mission did",
+        ),
+    ],
+)
+def test_a_mission_that_could_not_tell_its_end_was_aborted_by_whoever_ended_it(
+    ended: ReportedEnd | None, code: int, reason: str, told: str, damage: bytes, tmp_path: Path
+) -> None:
+    RecordWriter(tmp_path / RECORD).write(MISSION, 0, {"outcome": "running", "reason": "", "lift_off_s": None, "joined": {"base": 8}})
+    with (tmp_path / RECORD).open("ab") as file:
+        file.write(damage)
+    if ended is not None:
+        note_end(tmp_path, ended)
+    for _ in range(2):
+        close_account(tmp_path, code)
+        account = last_account(tmp_path)
+        assert account == {"outcome": "aborted", "reason": reason, "joined": {"base": 8}, "problems": [NO_OWN_END]}
+    problems = Problems()
+    outcome, said = read_outcome(RunFacts("mapping", 1, tmp_path, (), (), code), SimpleNamespace(mission=account), problems)
+    assert (outcome, said, problems.sentences) == ("aborted", reason, [NO_OWN_END])
+    assert verdict_lines({"outcome": outcome, "reason": said, "mission_exit": code, "landed": None}, [], tmp_path) == ["", told]
+
+
+@pytest.mark.parametrize(("account", "code"), [({"outcome": "given_up", "reason": "x"}, 1), ({"outcome": "running"}, 0), ({}, 1)])
+def test_the_account_of_a_mission_that_had_come_to_its_end_stays(account: dict[str, str], code: int, tmp_path: Path) -> None:
+    if account:
+        RecordWriter(tmp_path / RECORD).write(MISSION, 0, account)
+    note_end(tmp_path, KILLED)
+    close_account(tmp_path, code)
+    assert last_account(tmp_path) == account

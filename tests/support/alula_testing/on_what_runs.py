@@ -120,8 +120,9 @@ def _a_mission_dies(robot: Path, run: Run) -> None:
         told = flown.result()
     assert "what runs is interrupted" in told
     assert "not all of it stopped" not in told
-    died = json.loads((folder / "summary.json").read_text(encoding="utf-8"))["died"]
-    assert [(one["name"], one["how"]) for one in died] == [("mission", "signal SIGKILL")]
+    summary = json.loads((folder / "summary.json").read_text(encoding="utf-8"))
+    assert [(one["name"], one["how"]) for one in summary["died"]] == [("mission", "signal SIGKILL")]
+    assert (summary["outcome"], summary["reason"]) == ("aborted", "ended by the supervisor: mission died (signal SIGKILL)")
 
 
 def lives(pid: int) -> bool:

@@ -24,6 +24,9 @@ const failures = (run) => causesOf(run).failures;
 /** What stays up between missions, {parts, master, disk}, where this is no mission's run but that of a deployment; else null. */
 const deploymentOf = (run) => (run.facts["/run"]?.deployment && !run.facts["/run"].scenario ? { name: run.facts["/run"].deployment, parts: [], master: {}, disk: "", ...run.facts["/parts"] } : null);
 
+/** How the mission ended, by its report where there is one: a mission that was killed could not tell; "running": it has not ended. */
+const outcomeOf = (run) => run.facts["/summary"]?.outcome ?? last(run.mission.v)?.outcome ?? "running";
+
 function headline(run) {
   const deployment = deploymentOf(run);
   if (deployment && run.over) return { text: `${deployment.name} is down`, tone: "bad", reason: "" };
@@ -36,7 +39,7 @@ function headline(run) {
   if (run.ticked.length) return { text: `Ticked without a robot, ${run.ticked.length === 1 ? "once" : `${run.ticked.length} times`}`, tone: "now", reason: `the last tick: ${last(run.ticked).root}` };
   if (run.begin === null && run.mission.v.length) return { text: "The mission waits for its clock", tone: "now", reason: "" };
   if (run.begin === null) return { text: run.facts["/run"] ? "The run has recorded nothing yet" : "No run yet", tone: "now", reason: "" };
-  const outcome = summary?.outcome ?? mission.outcome ?? "running";
+  const outcome = outcomeOf(run);
   if (outcome === "running" && (summary || run.over)) return { text: "The mission's process ended before the mission did", tone: "bad", reason: "" };
   const failed = failures(run).length;
   if (outcome === "running" && (last(run.held.v) ?? null) !== null) return { text: `The mission is paused${failed ? `, after ${failed === 1 ? "a failure" : `${failed} failures`}` : ""}`, tone: "fair", reason: last(run.held.v) };
@@ -128,7 +131,9 @@ function account(run) {
   if (back !== null && crash) say(back, `Crashed${where && `, ${where}`}: ${crash}.`, "bad");
   else if (back !== null) say(back, `${sentence(robotWords(run).back)}${where && `, ${where}`}.`);
   const mission = last(run.mission.v);
-  if (mission && mission.outcome !== "running") say(mission.end_s ?? last(run.mission.t), `${OUTCOMES[mission.outcome]?.[0] ?? words(mission.outcome)}.`);
+  const outcome = outcomeOf(run);
+  const told = mission?.outcome !== "running" ? mission?.end_s ?? last(run.mission.t) : run.end; // else it was ended
+  if (mission && outcome !== "running") say(told, `${OUTCOMES[outcome]?.[0] ?? words(outcome)}.`);
   return lines.sort(byTime);
 }
 
@@ -166,13 +171,13 @@ function operatorTold(run, say) {
 }
 
 /** Whether the run had no mission, and only served its skills. */
-const served = (run) => (run.facts["/summary"]?.outcome ?? last(run.mission.v)?.outcome) === "served";
+const served = (run) => outcomeOf(run) === "served";
 
 /** A row for each failure, and one for the whole mission: [{what, why, t, until, done, cost, fault, repair}]; the last has no t. */
 function answers(run) {
   const rows = [];
   const failed = failures(run);
-  const running = (run.facts["/summary"]?.outcome ?? last(run.mission.v)?.outcome ?? "running") === "running";
+  const running = outcomeOf(run) === "running";
   const groups = new Map();
   for (const failure of failed) {
     const key = failure.fault ?? failure.key;
@@ -224,8 +229,8 @@ function started(run, from, to) {
 
 /** How the whole mission ended, in a few words. */
 function wholeDone(run) {
-  const outcome = run.facts["/summary"]?.outcome ?? last(run.mission.v)?.outcome;
-  if (!outcome || outcome === "running") return "";
+  const outcome = outcomeOf(run);
+  if (outcome === "running") return "";
   const { landed: back, crash, left } = run.facts["/summary"] ?? {};
   const down = crash ? "crashed" : back === true ? robotWords(run).back : back === false ? `not ${robotWords(run).back}` : "";
   return [(OUTCOMES[outcome]?.[0] ?? words(outcome)).toLowerCase(), [down, left].filter(Boolean).join(", ")].filter(Boolean).join("; ");

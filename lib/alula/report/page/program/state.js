@@ -113,7 +113,7 @@ function wrongAt(run, t) {
   const left = run.departure !== null && t >= run.departure;
   if (!left && !run.over) for (const [needed, otherwise] of valueAt(run.start, t) ?? []) if (otherwise) found.push({ text: `before the start: ${otherwise || needed}`, tone: "fair", since: null });
   const held = valueAt(run.held, t) ?? null;
-  if (held !== null && (run.facts["/summary"]?.outcome ?? last(run.mission.v)?.outcome) === "running") found.push({ text: "the mission is paused", tone: "fair", since: run.held.t[indexAt(run.held.t, t)] });
+  if (held !== null && outcomeOf(run) === "running") found.push({ text: "the mission is paused", tone: "fair", since: run.held.t[indexAt(run.held.t, t)] });
   found.push(...faultsAt(run, t), ...endedBadly(run, t));
   for (const [name, track] of run.resources) {
     const index = indexAt(track.t, t);
@@ -148,7 +148,7 @@ function endedBadly(run, t) {
 /** Why nothing is active: a mission that has not begun says what it waits for. */
 function nothingTold(run, t) {
   if (deploymentOf(run)) return "no mission";
-  if (run.mission.v.length && last(run.mission.v).outcome !== "running") return "nothing any more";
+  if (outcomeOf(run) !== "running") return "nothing any more";
   const unmet = (valueAt(run.start, t) ?? []).filter(([, otherwise]) => otherwise).map(([, otherwise]) => otherwise);
   return unmet.length ? `nothing yet: the mission waits, ${unmet.join(", ")}` : "nothing yet";
 }
