@@ -19,7 +19,7 @@ ANSWERS = (
     "[...document.querySelectorAll('#answers tbody tr')].map((row) => [...row.children].map((cell) =>"
     "(cell.tagName === 'TH' ? cell.firstChild : cell).textContent).join(' | '))"
 )
-"""The rows of what failed, when, what was done, what it cost."""
+"""The rows of what failed, when, what was done, what it cost, what could have been done."""
 
 
 def test_the_report_says_what_failed_when_what_was_done_and_what_it_cost(browser: Any, tmp_path: Path) -> None:
@@ -42,7 +42,8 @@ def test_the_report_says_what_failed_when_what_was_done_and_what_it_cost(browser
     assert [row[:2] for row in rows] == [["zed failed (dead, injected)", "29.90 s"], ["the whole mission", ""]]
     assert "the mission fell back from “ZED navigation” to “LiDAR navigation”; started lidar_depthmap" in rows[0][2]
     assert rows[0][3] == "noticed after 0.10 s; the fallback ran after 0.60 s; the robot moved on after 4.10 s"
-    assert rows[1][2:] == ["mission accomplished in degraded mode; landed", "no waypoint was missed; nothing was hit"]
+    assert rows[0][4].strip() == "alula repair missions/mapping.xml --fault zed"
+    assert rows[1][2:] == ["mission accomplished in degraded mode; landed", "no waypoint was missed; nothing was hit", ""]
     assert page.complaints() == []
 
 
@@ -237,7 +238,7 @@ def test_what_follows_from_one_failure_is_one_row_with_what_the_autopilot_did(br
         "the mission fell back from “the video was lost” to “given up”; the autopilot changed to RTL: it flies home and lands by itself"
     )
     assert rows[0][3] == "noticed after 3.00 s"
-    assert rows[2][2:] == ["mission given up; landed", "8 of 10 waypoints were not reached; nothing was hit"]
+    assert rows[2][2:] == ["mission given up; landed", "8 of 10 waypoints were not reached; nothing was hit", ""]
     assert "enough_frames was violated: frames per second: 6 below the limit for 1 s." in page.text("#lines")
     assert "navigation.land could not start, its precondition sdk_authority was not met: SDK_authority" in page.text("#lines")
     assert "57.00 sLanded." in page.text("#lines li")
@@ -287,8 +288,8 @@ def test_an_abort_is_no_failure_and_says_what_followed(browser: Any, tmp_path: P
     page.wait(DRAWN)
     assert (page.text("#headline"), page.text("#reason")) == ("Mission aborted", "aborted by the operator")
     assert page.run(ANSWERS) == [
-        "perception.lidar_depthmap failed: too dark | 19.00 s | nothing followed | ",
-        "the whole mission |  | mission aborted; landed | 4 of 5 waypoints were not reached",
+        "perception.lidar_depthmap failed: too dark | 19.00 s | nothing followed |  | ",
+        "the whole mission |  | mission aborted; landed | 4 of 5 waypoints were not reached | ",
     ]
     assert "20.00 sThe mission is told to stop: aborted by the operator; started hover, land." in page.text("#lines li")
     assert page.text(".chain b") == "skill"
