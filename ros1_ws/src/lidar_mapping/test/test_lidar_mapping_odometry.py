@@ -192,14 +192,18 @@ def test_what_can_not_be_believed_says_why_and_leaves_the_filter_alone() -> None
     assert found.covariance == pytest.approx(kept[1])
 
 
-def test_a_fast_vehicle_makes_a_keyframe_of_three_sweeps() -> None:
-    found = odometry(replace(FREE, reach_m=30.0))
-    made = []
-    for k in range(10):  # 1 m a sweep
-        scan = yard(20_000, k) - [0.1 * k, 0.0, 2.0] - [0.9 * k, 0.0, 0.0]
-        step = found.add(still(k, scan), [], np.eye(4), AutopilotMotion(np.eye(3), np.array([10.0 * (k > 0), 0.0, 0.0])))
-        made.append(step.keyframe is not None)
-    assert made == [True, False, False, True, False, False, True, False, False, True]
+@pytest.mark.parametrize(
+    ("step_m", "most_points", "made"),
+    [(1.0, 30_000, range(3, 10)), (1.0, 10_000, [3, 6, 9]), (0.17, 30_000, [3, 7])],
+    ids=["fast", "fast with dense sweeps", "slow"],
+)
+def test_a_keyframe_is_made_where_the_vehicle_has_moved_on(step_m, most_points, made) -> None:
+    found, kept = odometry(replace(FREE, reach_m=30.0, most_points=most_points)), []
+    for k in range(10):
+        scan = yard(20_000, k) - [step_m * k, 0.0, 2.0]
+        step = found.add(still(k, scan), [], np.eye(4), AutopilotMotion(np.eye(3), np.array([10.0 * step_m * (k > 0), 0.0, 0.0])))
+        kept += [k] if step.keyframe and k >= 3 else []  # before, the motion is being learnt
+    assert kept == list(made)
 
 
 def test_keyframes_that_lie_behind_are_thinned_and_no_place_is_lost(monkeypatch) -> None:

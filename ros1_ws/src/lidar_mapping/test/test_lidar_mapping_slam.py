@@ -13,6 +13,7 @@ from scipy.spatial.transform import Rotation
 
 from lidar_mapping import ImuReading, OdometrySettings, Slam, SlamSettings
 from lidar_mapping.readings import ReadingQueue
+from perception_bench.street import PERIOD_S, Drive, street
 from perception_core import NS, PoseBuffer, PoseUnavailableError
 
 pytestmark = pytest.mark.long
@@ -248,6 +249,16 @@ def test_of_a_sensor_of_many_beams_all_points_are_used_as_means() -> None:
     few = path.sweep(1.0, seed=1, count=1500)
     slam.add(few, path.readings(1.0, 1.1, np.random.default_rng(10)), path.autopilot(1.1), np.eye(4))
     assert len(inserted[-1]) == len(few.within(1.2, 25.0).points)
+
+
+def test_along_a_street_of_64_beams_the_pose_hardly_drifts() -> None:
+    drive, slam, off_m = Drive(street(240.0, 1), 1), Slam(SlamSettings(self_m=1.5, max_range_m=80.0)), []
+    for number in range(1, 101):  # 80 m; the autopilot's way is too long by 2 %
+        slam.add(drive.sweep(number), [], drive.poses(number, 0.02), np.eye(4))
+        off_m.append(np.linalg.norm(slam.pose()[0][:3, 3] - drive.pose(number * PERIOD_S)[:3, 3]))
+    assert slam.count.rejected == 0
+    assert np.sqrt(np.mean(np.square(off_m))) < 0.025
+    assert max(off_m) < 0.06
 
 
 def test_a_corridor_makes_the_position_uncertain_along_it_and_is_survived() -> None:

@@ -17,8 +17,7 @@ if TYPE_CHECKING:
 
 NEIGHBOUR_KEYFRAMES = 3
 DENSE_POINTS = 40_000  # a keyframe of so many tells planes by itself: of 64 beams it has more, of 16 beams fewer
-DENSE_CENTRES = 5_000  # of patches in such a keyframe but the first, which is all there is: more take longer, and lay scans no better
-MOST_CENTRES = 15_000  # in others, which have fewer anyway
+MOST_CENTRES = 15_000  # of patches in a keyframe: of 16 beams it has fewer; with 5,000 of 64 beams the heading drifts along a street
 MOST_KEPT = 1_500_000  # points in all keyframes (18 MB), until those behind keep only what the next one does not hold
 
 
@@ -68,8 +67,8 @@ class Keyframes:
         around = np.vstack([fresh, *(frame.points_in_map() for frame in ([] if dense else self.all[-NEIGHBOUR_KEYFRAMES:]))])
         back: Floats = np.asarray(np.linalg.inv(pose), dtype=np.float64)
         thinned = downsample(around, PATCH_M)
-        centres, most = thinned if dense else downsample(fresh, PATCH_M), DENSE_CENTRES if dense and self.all else MOST_CENTRES
-        patches = flat_patches(centres[:: len(centres) // most + 1], thinned).moved(back)
+        centres = thinned if dense else downsample(fresh, PATCH_M)
+        patches = flat_patches(centres[:: len(centres) // MOST_CENTRES + 1], thinned).moved(back)
         inside = (fresh @ back[:3, :3].T + back[:3, 3]).astype(np.float32)
         frame = Keyframe(stamp_ns, pose, inside, patches)
         self.all.append(frame)

@@ -43,7 +43,8 @@ if TYPE_CHECKING:
 IMU_GAP_NS = 100_000_000
 KNOT_NS = 10_000_000
 VELOCITY_BASE_NS = 100_000_000
-LEAST_SWEEPS = 3  # in a keyframe: a fast vehicle would make one of each sweep
+FIRST_SWEEPS = 3
+DENSE_SWEEPS = 3  # in a keyframe at least, where sweeps are dense: a fast vehicle would make one of each, which takes too long
 WHOLE_KEYFRAMES = 4  # after so many keyframes one tree of the whole surface is built; those between share a small one
 FIRST_HEADING_RAD = 0.001  # a new map's heading is what the start says, by definition
 ANY_M_S = 10.0
@@ -117,12 +118,14 @@ class LidarInertialOdometry:
     def add(self, sweep: Sweep, readings: Iterable[ImuReading], T_base_lidar: Floats, autopilot: AutopilotMotion | None = None) -> Step:  # noqa: N803
         """Follow the vehicle to the end of a sweep; ``readings`` are those since the sweep before, in order."""
         self._propagate(readings, sweep.end_ns)
-        points = self._thinned(self._straighten(sweep, T_base_lidar))
+        straight = self._straighten(sweep, T_base_lidar)
+        dense = len(straight) > self._settings.most_points
+        points = self._thinned(straight, dense=dense)
         registration = self._locate(points, autopilot)
         state = self.filter.state
         placed = points @ state.rotation.T + state.position
         self.filter.history = type(self.filter.history)([self.filter.history[-1]], maxlen=self.filter.history.maxlen)
-        return Step(registration, placed, self._keep(placed) if registration.believed else None)
+        return Step(registration, placed, self._keep(placed, dense=dense) if registration.believed else None)
 
     @property
     def state(self) -> InertialState:
@@ -176,11 +179,10 @@ class LidarInertialOdometry:
         at_knots = Poses(rotation, np.array([state.position - now.position for state in states]) @ now.rotation)
         return straighten(sweep.points @ mount[:3, :3].T + mount[:3, 3], times_s, knots_s, at_knots)
 
-    def _thinned(self, points: Floats32) -> Floats:
+    def _thinned(self, points: Floats32, *, dense: bool) -> Floats:
         """Return the mean of the points in each voxel where there are more than are needed: a sensor of 64 beams sees a wall many times."""
-        if len(points) <= self._settings.most_points:
-            return points.astype(np.float64)
-        return downsample(points.astype(np.float64), self._settings.dense_voxel_m)
+        exact = points.astype(np.float64)
+        return downsample(exact, self._settings.dense_voxel_m) if dense else exact
 
     def _locate(self, points: Floats, autopilot: AutopilotMotion | None) -> Registration:
         """Register from where the autopilot's motion leads; where that fits badly, from other starts too, and take the best.
@@ -274,7 +276,7 @@ class LidarInertialOdometry:
             thinned = thinned[:: -(-len(thinned) // self._settings.scan_points)]
         return register(thinned, self._surface, self.filter, self._settings.registration)
 
-    def _keep(self, placed: Floats) -> Keyframe | None:
+    def _keep(self, placed: Floats, *, dense: bool) -> Keyframe | None:
         """Gather the sweep, and make a keyframe of what was gathered when the vehicle has moved on.
 
         The first sweep makes one alone, and the next few another, wherever they are: a single sweep is too sparse to tell normals well.
@@ -282,9 +284,10 @@ class LidarInertialOdometry:
         settings, pose = self._settings, self.filter.state.matrix
         if len(self._since) < settings.keyframe_sweeps:
             self._since.append(placed)
-        if self._last_pose is not None and len(self._since) < LEAST_SWEEPS:
+        if self._last_pose is not None and dense and len(self._since) < DENSE_SWEEPS:
             return None
-        if self._last_pose is not None and len(self.keyframes.all) > 1:
+        early = len(self.keyframes.all) == 1 and len(self._since) >= FIRST_SWEEPS
+        if self._last_pose is not None and not early:
             moved = np.linalg.inv(self._last_pose) @ pose
             turned = np.linalg.norm(rotation_vector(moved[:3, :3]))
             if (np.linalg.norm(moved[:3, 3]) < settings.keyframe_m and turned < settings.keyframe_rad) or self.keyframes.full:
