@@ -121,7 +121,10 @@ def test_the_file_keeps_all_that_stood_in_it(repaired: Repaired) -> None:
 
 
 def test_the_drawing_has_a_band_for_each_node_of_the_branch(repaired: Repaired) -> None:
-    nodes, bands = repaired.found["repair"]["nodes"], (repaired.robot / "my_repair.svg").read_text().count(f"width='100%' height='{ROW_PX}'")
+    nodes, bands = (
+        repaired.found["repair"]["nodes"],
+        (repaired.robot / "my_repair.svg").read_text().count(f"width='100%' height='{ROW_PX}'"),
+    )
     assert bands == nodes + 1  # and the use of its tree
 
 

@@ -17,7 +17,6 @@ from alula.records.logs import Log
 from alula.records.models import models_of
 from alula.runtime.core.events import EngineEvent, TransitionEvent
 
-
 MOST_STARTS = 256
 """So many states at the beginning are tried at most."""
 

@@ -24,7 +24,13 @@ def launched(scenario: str, tmp_path: Path, *arguments: str) -> ROSLaunchConfig:
 
 def served(config: ROSLaunchConfig) -> set[str]:
     """Return the skillsets whose managers share a process."""
-    return {word.partition("=")[0] for node in config.nodes if node.name == "managers" for word in shlex.split(node.args) if ":make_hooks" in word}
+    return {
+        word.partition("=")[0]
+        for node in config.nodes
+        if node.name == "managers"
+        for word in shlex.split(node.args)
+        if ":make_hooks" in word
+    }
 
 
 @pytest.mark.parametrize("scenario", scenario_names())
