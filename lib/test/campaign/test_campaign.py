@@ -142,7 +142,7 @@ WRONG = {
     "seeds: []": "a.yaml:1: `seeds` is empty, so there would be no run",
     "scenarios: []": "a.yaml:1: `scenarios` is empty, so there would be no run",
     "runs: 2\ndraw: {faults: []}": "a.yaml:2: `faults` has no fault to draw for inspection",
-    "faults: [[rotor@3]]": "there is no fault 'rotor' in the behaviour; it has zed",
+    "faults: [[rotor@3]]": "there is no fault 'rotor' in the behaviour; it has link:silent, zed",
 }
 
 
