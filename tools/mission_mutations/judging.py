@@ -40,7 +40,7 @@ FOUND, EQUAL, MISSED = "found", "equal", "missed"
 ANSWERS, ANOTHER_RUN, ACCOUNT = "answers", "another run", "account"
 COMPARED = frozenset({ANSWERS, ANOTHER_RUN, ACCOUNT})
 """What is seen only beside the mission as it is."""
-CANDIDATES = 40
+CANDIDATES = 400
 """So many runs that may tell two missions apart are flown at most: of those that leave them soon, many can't be flown."""
 ACCOUNTS = 4
 """So many runs are flown to their end at most, to compare what is told there."""
