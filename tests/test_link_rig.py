@@ -1,0 +1,84 @@
+"""The rover on two computers: what its judge says of where it truly was, and a whole mission with a cut link where that is asked for."""
+
+from __future__ import annotations
+
+import os
+
+import pytest
+from link_rig.cases import CASES, run_case
+from link_rig.verdicts import HEAD, End, Fault, Pose, driving_since, judge
+
+STEP_S = 0.05
+CUT = Fault("link cut for 5 s", 10.0, 15.0, ("link",))
+SURVIVED = End("accomplished", "")
+RIG = "ALULA_LINK_RIG"
+"""The environment variable that has a whole mission run with a cut link."""
+
+
+def driven(*legs):
+    """Return the poses of a rover that drives (0.5 m/s) or stands, each for so many seconds: (speed, seconds)."""
+    poses, x, stamp_s = [], 0.0, 0.0
+    for speed_m_s, lasts_s in legs:
+        for _ in range(round(lasts_s / STEP_S)):
+            poses.append(Pose(100.0 + stamp_s, stamp_s, x, 0.0, 0.0))
+            x, stamp_s = x + speed_m_s * STEP_S, stamp_s + STEP_S
+    return poses
+
+
+def judged(poses, end=SURVIVED, **options):
+    return judge(CUT, end, poses, **{"collisions": 0, "silent_after_s": 2.0, **options})
+
+
+def test_a_rover_that_stops_in_time_and_goes_on_is_told_with_its_times():
+    verdict = judged(driven((0.5, 12.0), (0.0, 5.5), (0.5, 5.0)))
+    assert verdict.wrong == ()
+    assert verdict.moved_on_s == pytest.approx(2.0, abs=STEP_S)
+    assert verdict.stood_s == pytest.approx(5.5, abs=STEP_S)
+    assert verdict.went_on_s == pytest.approx(2.5, abs=STEP_S)
+    assert verdict.row == "| link cut for 5 s | 2.0 | 0 | 5.5 | 2.5 | accomplished | - |\n"
+    assert verdict.row.count("|") == HEAD.splitlines()[0].count("|")
+
+
+def test_a_pause_of_a_driving_rover_is_no_stop():
+    assert judged(driven((0.5, 10.5), (0.0, 0.5), (0.5, 1.2), (0.0, 8.0))).moved_on_s == pytest.approx(2.2, abs=2 * STEP_S)
+
+
+@pytest.mark.parametrize(
+    ("legs", "told"),
+    [
+        ([(0.5, 30.0)], "it moved on all the time: 3 s are allowed"),
+        ([(0.5, 14.0), (0.0, 10.0)], "it moved on for 4.0 s: 3 s are allowed"),
+        ([(0.5, 11.0), (0.0, 2.0), (0.5, 10.0)], "it moved again 2.0 s before the fault's end"),
+    ],
+)
+def test_a_rover_that_moves_unsupervised_is_wrong(legs, told):
+    (wrong,) = judged(driven(*legs)).wrong
+    assert wrong == told
+
+
+def test_turning_is_moving():
+    turning = [Pose(one.at_s, one.stamp_s, 0.0, 0.0, 0.5 * one.stamp_s) for one in driven((0.0, 30.0))]
+    assert judged(turning).wrong == ("it moved on all the time: 3 s are allowed",)
+
+
+def test_collisions_false_causes_and_a_next_mission_that_fails_are_wrong():
+    stopped = driven((0.5, 11.0), (0.0, 20.0))
+    assert judged(stopped, collisions=2).wrong == ("it ran into something 2 times",)
+    assert judged(stopped, End("given_up", "the link did not come back")).wrong == ()
+    assert len(judged(stopped, End("given_up", "the battery is empty")).wrong) == 1
+    assert judged(stopped, following=SURVIVED).wrong == ()
+    assert judged(stopped, following=End("given_up", "no map")).wrong == ("the next mission was given_up: no map",)
+
+
+def test_since_when_it_drives_is_told_while_it_drives_only():
+    assert driving_since([]) is None
+    assert driving_since(driven((0.0, 3.0), (0.5, 3.0))) == pytest.approx(3.0, abs=STEP_S)
+    assert driving_since(driven((0.5, 3.0), (0.0, 3.0))) is None
+
+
+@pytest.mark.skipif(RIG not in os.environ, reason=f"takes two minutes and root: {RIG}=cut-5 runs this case, or another of tools/link_rig")
+@pytest.mark.flight
+@pytest.mark.timeout(1800)
+def test_a_rover_whose_link_is_cut_stops_in_time_and_its_mission_goes_on(tmp_path):
+    verdict = run_case(CASES[os.environ[RIG]], tmp_path)
+    assert verdict.wrong == ()

@@ -1,0 +1,1 @@
+"""The rover on two computers that lose each other, or a process: what it then does, judged by the simulator's truth."""

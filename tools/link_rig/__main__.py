@@ -1,0 +1,47 @@
+"""`tools/link_rig`: a whole mission of the rover on two computers for each case of what goes; prints a row of a Markdown table for each.
+
+Run it as root, after `alula setup` in examples/rover: `setup/in_ros2 python -m link_rig [--case NAME]... [--keep FOLDER]`. Exit code 1:
+something is wrong by the simulator's truth; 2: it can't be run here.
+"""
+
+from __future__ import annotations
+
+import argparse
+import sys
+import tempfile
+from collections.abc import Sequence
+from pathlib import Path
+
+from alula_testing.networks import why_impossible
+from link_rig.cases import CASES, run_case
+from link_rig.computers import ROVER
+from link_rig.verdicts import HEAD
+
+
+def main(words: Sequence[str] | None = None) -> int:
+    """Run the cases; return the exit code."""
+    parser = argparse.ArgumentParser(prog="link_rig", description="What the rover on two computers does when something goes.")
+    parser.add_argument("--case", action="append", choices=CASES, metavar="NAME", help=f"of {', '.join(CASES)}; repeatable; default: all")
+    parser.add_argument("--keep", type=Path, metavar="FOLDER", help="keep there what each case writes (default: nothing is kept)")
+    given = parser.parse_args(words)
+    reason = why_impossible() or ("" if (ROVER / ".alula/venv2").is_dir() else f"the rover is not set up: alula setup in {ROVER}")
+    if reason:
+        sys.stderr.write(f"link_rig: {reason}\n")
+        return 2
+    wrong = False
+    sys.stdout.write(HEAD)
+    for name in given.case or CASES:
+        with tempfile.TemporaryDirectory(prefix="link_rig_") as temporary:
+            folder = given.keep.resolve() / name if given.keep else Path(temporary)
+            folder.mkdir(parents=True, exist_ok=True)
+            verdict = run_case(CASES[name], folder)
+        wrong |= bool(verdict.wrong)
+        sys.stdout.write(verdict.row)
+        sys.stdout.flush()
+        for one in verdict.wrong:
+            sys.stderr.write(f"link_rig: {name}: {one}\n")
+    return 1 if wrong else 0
+
+
+if __name__ == "__main__":
+    sys.exit(main())

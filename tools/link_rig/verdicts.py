@@ -1,0 +1,151 @@
+"""What the truth says of a mission with a fault: how long it moved on, whether it ran into something, how it ended, when it went on."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Iterator, Sequence
+from dataclasses import dataclass
+from itertools import pairwise
+
+ACCOMPLISHED = "accomplished"
+STILL_M_S, STILL_RAD_S = 0.02, 0.05
+"""A robot that moves and turns no faster stands."""
+MARGIN_S = 1.0
+"""So much longer than the dead man's limit may it move, simulated seconds: a beat that is under way, and the way to a stop."""
+COLUMNS = ("fault", "moved on for, s", "collisions", "stood for, s", "went on after its end, s", "mission", "cause it says")
+HEAD = f"| {' | '.join(COLUMNS)} |\n{'|---' * len(COLUMNS)}|\n"
+
+
+@dataclass(frozen=True)
+class Pose:
+    """Where the robot truly was: ``at_s`` monotonic clock, ``stamp_s`` simulated time; metres, radians."""
+
+    at_s: float
+    stamp_s: float
+    x: float
+    y: float
+    theta: float
+
+
+@dataclass(frozen=True)
+class Fault:
+    """What was done, between two moments of simulated time; ``cause``: words of which a mission that is not accomplished names one."""
+
+    name: str
+    begun_s: float
+    ended_s: float
+    cause: tuple[str, ...]
+
+
+@dataclass(frozen=True)
+class End:
+    """How a mission ended, in its own words."""
+
+    outcome: str
+    reason: str
+
+
+@dataclass(frozen=True)
+class Verdict:
+    """What is told of one mission; seconds of simulated time, None where it did not come to that.
+
+    Attributes:
+        moved_on_s: from the fault's begin until it stood.
+        stood_s: how long it then stood.
+        went_on_s: from the fault's end until it moved again; negative: it moved before that.
+        collisions: how often it ran into something.
+        wrong: what must not be, in words; empty: nothing.
+    """
+
+    fault: Fault
+    end: End
+    moved_on_s: float | None
+    stood_s: float | None
+    went_on_s: float | None
+    collisions: int
+    wrong: tuple[str, ...]
+
+    @property
+    def row(self) -> str:
+        """Return a row of the table whose head is ``HEAD``."""
+        cells = (
+            self.fault.name,
+            _seconds(self.moved_on_s),
+            str(self.collisions),
+            _seconds(self.stood_s),
+            _seconds(self.went_on_s),
+            self.end.outcome,
+            self.end.reason.replace("|", "/") or "-",
+        )
+        return f"| {' | '.join(cells)} |\n"
+
+
+def judge(
+    fault: Fault, end: End, poses: Sequence[Pose], *, collisions: int, silent_after_s: float, following: End | None = None
+) -> Verdict:
+    """Judge a mission by where the robot truly was.
+
+    Args:
+        fault: what was done meanwhile.
+        end: how the mission ended.
+        poses: where the robot was, in the order of time.
+        collisions: how often it ran into something.
+        silent_after_s: the limit of the base's dead man, simulated seconds.
+        following: how the mission after it ended, where there was one: it has to be accomplished.
+    """
+    stood = next((pause for pause in _pauses(poses) if pause[0] >= fault.begun_s and pause[1] - pause[0] > MARGIN_S), None)
+    moved_on_s = None if stood is None else max(0.0, stood[0] - fault.begun_s)
+    goes_on = stood is not None and math.isfinite(stood[1])
+    limit_s = silent_after_s + MARGIN_S
+    lasted_s = fault.ended_s - fault.begun_s
+    wrong = []
+    if lasted_s > limit_s and (moved_on_s is None or moved_on_s > limit_s):
+        told = "all the time" if moved_on_s is None else f"for {moved_on_s:.1f} s"
+        wrong.append(f"it moved on {told}: {limit_s:g} s are allowed")
+    if stood is not None and goes_on and lasted_s > limit_s and stood[1] < fault.ended_s:
+        wrong.append(f"it moved again {fault.ended_s - stood[1]:.1f} s before the fault's end")
+    if collisions:
+        wrong.append(f"it ran into something {collisions} times")
+    if end.outcome != ACCOMPLISHED and not any(word in end.reason for word in fault.cause):
+        wrong.append(f"the mission ended with '{end.reason}', which names none of: {', '.join(fault.cause)}")
+    if following is not None and following.outcome != ACCOMPLISHED:
+        wrong.append(f"the next mission was {following.outcome}: {following.reason}")
+    return Verdict(
+        fault,
+        end,
+        moved_on_s,
+        stood[1] - stood[0] if stood is not None and goes_on else None,
+        stood[1] - fault.ended_s if stood is not None and goes_on else None,
+        collisions,
+        tuple(wrong),
+    )
+
+
+def driving_since(poses: Sequence[Pose]) -> float | None:
+    """Return since when the robot moves without a pause, simulated time; None: it stands."""
+    pauses = list(_pauses(poses))
+    if not pauses or math.isfinite(pauses[-1][1]):
+        return pauses[-1][1] if pauses else (poses[0].stamp_s if len(poses) > 1 else None)
+    return None
+
+
+def _pauses(poses: Sequence[Pose]) -> Iterator[tuple[float, float]]:
+    """Return from when until when the robot stood, simulated time; the last one ends at infinity where it stands at the end."""
+    begun_s: float | None = None
+    for before, pose in pairwise(poses):
+        lasted_s = pose.stamp_s - before.stamp_s
+        if lasted_s <= 0.0:
+            continue
+        moves = math.hypot(pose.x - before.x, pose.y - before.y) > STILL_M_S * lasted_s
+        moves = moves or abs(math.remainder(pose.theta - before.theta, math.tau)) > STILL_RAD_S * lasted_s
+        if not moves and begun_s is None:
+            begun_s = before.stamp_s
+        elif moves and begun_s is not None:
+            yield begun_s, before.stamp_s
+            begun_s = None
+    if begun_s is not None:
+        yield begun_s, math.inf
+
+
+def _seconds(value: float | None) -> str:
+    return "-" if value is None else f"{value:.1f}"
