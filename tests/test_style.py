@@ -42,6 +42,7 @@ TYPED = [
     "tools/perception_bench",
     "tools/prove_bench",
     "tools/repair_bench",
+    "tools/link_rig",
     "tools/groot_bench",
     "tools/finding_pages",
     "tools/log_mutations",
