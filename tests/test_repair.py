@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import io
 import json
+import os
 import re
 import signal
 import subprocess
@@ -28,11 +29,12 @@ from alula.missions.drawing import ROW_PX
 from alula.missions.mission_file import plan_of_file
 from alula.missions.mocked import MockedMission
 from alula.missions.scenario import inputs_of
-from repair_bench.cases import copied, without_chances, without_end, without_lidar
+from repair_bench.cases import copied, without_chances, without_end, without_lidar, without_video_end
 
 ALULA_ROOT = Path(__file__).resolve().parents[1]
 TIME_S = "600"
 """What a search may take here: it ends by its result, also on a busy machine."""
+LONG = "ALULA_LONG_REPAIRS"
 
 
 @pytest.fixture
@@ -248,6 +250,19 @@ def test_over_mocks_all_faults_end_as_with_the_branch_by_hand(repaired: Repaired
 def decisions(run: MockedMission) -> list[str]:
     """Return the skills that have ended, in their order."""
     return [one.skill for one in run.ended]
+
+
+@pytest.mark.skipif(LONG not in os.environ, reason=f"takes more than a minute of processor time: {LONG}=1 runs it")
+@pytest.mark.timeout(0)  # as long as the machine needs
+def test_a_lost_radio_ends_an_inspection_degraded_unless_the_autopilot_flies_home(
+    missions: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    found = answer(capsys, without_video_end(ALULA_ROOT, missions).mission, "--fault", "radio")
+    assert (found["answer"], found["assuming"]) == ("repaired", ["navigation.SDK_authority UNAVAILABLE"])
+    one = found["repair"]
+    assert isinstance(one, dict)
+    assert one["nodes"] <= 15
+    assert 'ID="stop_here"' in one["xml"]
 
 
 # --- the rover ----------------------------------------------------------------------------------------------------------

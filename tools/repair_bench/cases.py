@@ -76,6 +76,13 @@ def without_end(root: Path, folder: Path) -> Case:
     return Case(root, folder / "mapping.xml", "lidar")
 
 
+def without_video_end(root: Path, folder: Path) -> Case:
+    """Return the drone's inspection without the branch by which it lands when the telepilot's video was lost."""
+    copied(root, folder)
+    put(folder / "inspection.xml", "", r' *<Sequence name="the video was lost">(?:(?!</Sequence>).)*</Sequence>\n')
+    return Case(root, folder / "inspection.xml", "radio")
+
+
 def without_chances(root: Path, folder: Path) -> Case:
     """Return the rover's patrol that drives once only, whatever stands in its way."""
     robot = root / "examples/rover"
@@ -95,6 +102,7 @@ ROBOTS: Mapping[str, Callable[[Path, Path], Case]] = {
     "drone, zed": without_lidar,
     "drone, no end": without_end,
     "drone, lidar": without_sensor,
+    "drone, radio": without_video_end,
     "rover, person": without_chances,
 }
 

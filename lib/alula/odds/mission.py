@@ -104,6 +104,11 @@ class MissionSteps:
         """Tell whether a fault is there that can bring about this end of an execution, ``skillset.skill END``."""
         return any(_any(self._faults[name].ends, end) for name in state.faults)
 
+    def comes_later(self, state: Place, shown: str) -> bool:
+        """Tell whether a state, ``skillset.resource STATE``, comes only of what is done about the faults that are there."""
+        several = [self._faults[name] for name in state.faults]
+        return any(_any(one.later, shown) for one in several) and not any(_any(one.states, shown) for one in several)
+
     def only_ends(self, fault: str) -> bool:
         """Tell whether a fault is no more than bad ends of skills."""
         return not self._faults[fault].states

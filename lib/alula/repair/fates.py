@@ -5,16 +5,19 @@ does in time, the chosen faults in their order, each at any moment, and whatever
 come stays, but it ends skills badly no more often than faults may come. Requests are not refused, and executions not ended, by data of
 which nothing is known, unless a fault that is there does that. Executions end well; fairness is the prover's: what can happen again and
 again happens some time. So a mission survives when, from every situation that it can come into, it can still be accomplished.
+
+A state that comes `later`, of what others do about a fault, such as an autopilot that flies home by itself, may be one after which no
+mission can do anything. So situations without such states are looked at first: a mission that survives in these does under an assumption.
 """
 
 from __future__ import annotations
 
 from collections import deque
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 from typing import NamedTuple
 
-from alula.common.graphs import reachable_from
+from alula.common.graphs import reachable_from, steps_to
 from alula.model.expressions import Expression
 from alula.model.model import ResultKind, Skillset
 from alula.odds.mission import MissionSteps, Place
@@ -65,6 +68,8 @@ class Fate:
         run: what happens in a run after which it can't be accomplished any more.
         states: those of the resources then.
         situations: how many were looked at.
+        assuming: where it does not survive, the states, ``skillset.resource STATE``, without which it would, of those that come later;
+            with them it ends safely all the same. Empty: there are no such states.
     """
 
     faults: tuple[str, ...]
@@ -74,12 +79,19 @@ class Fate:
     run: tuple[str, ...]
     states: Mapping[str, str]
     situations: int
+    assuming: tuple[str, ...] = ()
+
+    @property
+    def answered(self) -> bool:
+        """Tell whether it survives, at least under an assumption."""
+        return self.survives or bool(self.assuming)
 
     def as_dict(self) -> dict[str, object]:
         """Return it as JSON has it."""
         return {
             "faults": list(self.faults),
             "survives": self.survives,
+            "assuming": list(self.assuming),
             "safe": self.safe,
             "outcomes": sorted(self.outcomes),
             "run": list(self.run),
@@ -105,40 +117,91 @@ def fate_of(
     Raises OutOfTimeError.
     """
     ends = _Ends.of(skillsets)
-    first = [Here(place) for place in steps.initial()]
-    before: dict[Here, tuple[Here, Step[Place]] | None] = dict.fromkeys(first)
-    leading: dict[Here, list[Here]] = {}
-    good: list[Here] = []
-    ends_at_rest: list[Here] = []
-    safe = True
-    outcomes: set[str] = set()
-    todo = deque(first)
-    while todo:
-        here = todo.popleft()
-        deadline.check()
-        if most is not None and len(before) > most:
-            return None
-        outcome = steps.outcome(here.place)
-        if (outcome in GOOD and (reached is None or steps.holds(here.place, reached))) or (
-            goal is not None and here.come == len(faults) and steps.holds(here.place, goal)
-        ):
-            good.append(here)
-        if outcome is not None:
-            ends_at_rest.append(here)
-            safe = safe and (not rest or any(steps.resource(here.place, name) == state for name, state in rest))
-        following = [] if outcome is not None else list(_following(steps, here, faults, ends, strikes))
-        if here.come == len(faults) and not following:
-            outcomes.add("none" if outcome is None else outcome.value)
-        for step, there in following:
-            leading.setdefault(there, []).append(here)
-            if there not in before:
-                before[there] = (here, step)
-                todo.append(there)
-    hopeful, ending = (reachable_from(several, lambda one: leading.get(one, ())) for several in (good, ends_at_rest))
-    lost = next((one for one in before if one not in hopeful), None)
-    safe = safe and len(ending) == len(before)
-    run, states = ((), {}) if lost is None else (_run(before, lost), steps.resources(lost.place))
-    return Fate(tuple(faults), frozenset(outcomes), lost is None, safe, run, states, len(before))
+
+    def is_good(here: Here) -> bool:
+        accomplished = steps.outcome(here.place) in GOOD and (reached is None or steps.holds(here.place, reached))
+        return accomplished or (goal is not None and here.come == len(faults) and steps.holds(here.place, goal))
+
+    def following(here: Here) -> list[tuple[Step[Place], Here]]:
+        return [] if steps.outcome(here.place) is not None else _following(steps, here, faults, ends, strikes)
+
+    graph = _Graph([Here(place) for place in steps.initial()])
+    if not graph.explore(following, lambda here, step: steps.comes_later(here.place, step.name), deadline, most):
+        return None
+    lost_before = graph.first_without_way(is_good)
+    later = graph.put_off
+    if later and not graph.explore(following, lambda _here, _step: False, deadline, most):
+        return None
+    lost = graph.first_without_way(is_good) if later else lost_before
+    ended = [one for one in graph.before if steps.outcome(one.place) is not None]
+    at_rest = all(not rest or any(steps.resource(one.place, name) == state for name, state in rest) for one in ended)
+    safe = at_rest and graph.first_without_way(lambda here: steps.outcome(here.place) is not None) is None
+    last = [steps.outcome(one.place) for one in graph.before if one.come == len(faults) and one in graph.ends]
+    outcomes = frozenset("none" if one is None else one.value for one in last)
+    run, states = ((), {}) if lost is None else (graph.run_to(lost), steps.resources(lost.place))
+    assuming = tuple(later) if safe and lost is not None and lost_before is None else ()
+    return Fate(tuple(faults), outcomes, lost is None, safe, run, states, len(graph.before), assuming)
+
+
+class _Graph:
+    """The situations that a mission can come into, looked at breadth first; some steps may be put off.
+
+    Attributes:
+        before: all that were found, each with the step by which it was.
+        ends: those that nothing follows.
+        put_off: the names of the steps that `explore` has put off.
+    """
+
+    def __init__(self, first: Sequence[Here]) -> None:
+        self.before: dict[Here, tuple[Here, Step[Place]] | None] = dict.fromkeys(first)
+        self.ends: set[Here] = set()
+        self.put_off: list[str] = []
+        self._leading: dict[Here, list[Here]] = {}
+        self._todo = deque(first)
+        self._later: list[tuple[Here, Step[Place], Here]] = []
+
+    def explore(
+        self,
+        following: Callable[[Here], list[tuple[Step[Place], Here]]],
+        is_put_off: Callable[[Here, Step[Place]], bool],
+        deadline: Deadline,
+        most: int | None,
+    ) -> bool:
+        """Go on with what was put off, then with all but what is put off now; False: there are more situations than ``most``."""
+        several, self._later = self._later, []
+        for here, step, there in several:
+            self._add(here, step, there)
+        while self._todo:
+            here = self._todo.popleft()
+            deadline.check()
+            if most is not None and len(self.before) > most:
+                return False
+            found = following(here)
+            if not found:
+                self.ends.add(here)
+            for step, there in found:
+                if is_put_off(here, step):
+                    self._later.append((here, step, there))
+                else:
+                    self._add(here, step, there)
+        self.put_off = sorted({step.name for _, step, _ in self._later})
+        return True
+
+    def _add(self, here: Here, step: Step[Place], there: Here) -> None:
+        self._leading.setdefault(there, []).append(here)
+        if there not in self.before:
+            self.before[there] = (here, step)
+            self._todo.append(there)
+
+    def first_without_way(self, is_good: Callable[[Here], bool]) -> Here | None:
+        """Return the first situation, of those that were found, from which none of these is reached; None: there is none."""
+        hopeful = reachable_from(filter(is_good, self.before), lambda one: self._leading.get(one, ()))
+        return next((one for one in self.before if one not in hopeful), None)
+
+    def run_to(self, here: Here) -> tuple[str, ...]:
+        """Return what happens until a situation."""
+        lines = [_told(step) for step in steps_to(self.before, here)]
+        return tuple(line for line in lines if line)
 
 
 def needs(steps: MissionSteps, skillsets: Sequence[Skillset], skill: str, deadline: Deadline) -> bool:
@@ -187,14 +250,6 @@ def _following(steps: MissionSteps, here: Here, faults: Sequence[str], ends: _En
                     found.append((step, there))
     now = [one for one in found if one[0].kind in {Kind.NOW, Kind.FAULT}]
     return now if any(step.kind is Kind.NOW for step, _ in now) else found
-
-
-def _run(before: Mapping[Here, tuple[Here, Step[Place]] | None], there: Here) -> tuple[str, ...]:
-    lines: list[str] = []
-    while (step := before[there]) is not None:
-        there, taken = step
-        lines.append(_told(taken))
-    return tuple(line for line in lines[::-1] if line)
 
 
 def _told(step: Step[Place]) -> str:

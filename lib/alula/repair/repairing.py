@@ -92,6 +92,7 @@ class Repair:
         left: what `check` finds in the mission as it is, and in the repaired one, too.
         before, after: what becomes of the mission by faults, without and with it.
         not_looked_at: faults, alone or one after another, of which that was not found out: too many situations, or no time left.
+        assuming: the states that must not come later, as a `Fate` has them.
     """
 
     branch: Branch
@@ -102,6 +103,7 @@ class Repair:
     before: dict[tuple[str, ...], Fate] = field(default_factory=dict)
     after: dict[tuple[str, ...], Fate] = field(default_factory=dict)
     not_looked_at: tuple[tuple[str, ...], ...] = ()
+    assuming: tuple[str, ...] = ()
 
 
 @dataclass(frozen=True)
@@ -123,7 +125,13 @@ class Answer:
     @property
     def survives_already(self) -> bool:
         """Tell whether there is nothing to repair."""
-        return self.fate is not None and self.fate.survives
+        return self.fate is not None and self.fate.answered
+
+    @property
+    def assuming(self) -> tuple[str, ...]:
+        """The states that must not come later: else the fault is not survived, though the mission ends safely."""
+        found = self.repair or self.fate
+        return () if found is None else found.assuming
 
 
 class Search:
@@ -174,7 +182,7 @@ class Search:
         failing = self._failing(system, finding)
         fault = (self._question.fault,) if self._question.fault else ()
         fate = self._judge.fate(text, fault) if fault else None
-        if fate is not None and fate.survives:
+        if fate is not None and fate.answered:
             return Answer(tuple(failing), fate)
         self._tell(f"{'; '.join(dict.fromkeys(one.words for one in failing))}: {_told(fate)}")
         reasons = next((lines for one in failing if (lines := self._why_impossible(text, one))), [])
@@ -257,9 +265,11 @@ class Search:
         text, not_asked = branch.written(self._subject, leave_out, self._question.never_asked)
         if errors := [one for one in self._judge.check(text, prove=False).new(before) if one.severity is Severity.ERROR]:
             return errors[0].message
+        assuming: tuple[str, ...] = ()
         if fate is not None:
             now = self._judge.fate(text, fate.faults)
-            if not now.survives and (fate.safe or not now.safe):
+            assuming = now.assuming
+            if not now.answered and (fate.safe or not now.safe):
                 return f"with {' and '.join(fate.faults)} it {_told(now)}"
         judgement = self._judge.check(text)
         new = judgement.new(before)
@@ -277,7 +287,7 @@ class Search:
             return "not all its runs in which hooks raise, managers die, or somebody aborts or pauses it were looked at"
         written, _ = branch.written(self._subject)
         left = dict.fromkeys(one.message for one in whole.findings if one.severity is not Severity.NOTE)
-        return Repair(branch, written, 0, tuple(not_asked), tuple(left))
+        return Repair(branch, written, 0, tuple(not_asked), tuple(left), assuming=assuming)
 
     def _why_impossible(self, text: str, failing: Failing) -> list[str]:
         """Return why no tree can have done what a skill is for that the mission needs; empty where one might."""

@@ -20,7 +20,7 @@ def as_text(answer: Answer, odds: Both | None) -> str:
     """Return lines for a terminal."""
     what = "; ".join(dict.fromkeys(one.words for one in answer.failing))
     if answer.survives_already:
-        return f"nothing to repair: {what}, and the mission survives it\n"
+        return f"nothing to repair: {what}, and the mission survives it{_assuming(answer.assuming)}\n"
     if answer.repair is None:
         when = " before the search was ended" if answer.stopped else ""
         head = "impossible" if answer.impossible else f"unknown: no branch was proved{when}"
@@ -34,12 +34,13 @@ def _of_repair(repair: Repair, what: str, odds: Both | None, reasons: Sequence[s
     where = "around" if branch.around else "in a Fallback around" if branch.wraps else "behind"
     lines = [f"repaired, proved by check: {what}", f"  '{branch.name}', {branch.size} nodes, {where} the node at {branch.at}"]
     lines += [f"  it can't be accomplished then, and ends safely: {one}" for one in reasons]
+    lines += [f"  it survives{_assuming(repair.assuming)}; else it ends safely"] if repair.assuming else []
     lines += ["", text, ""] if (text := branch.as_xml()) else []
     lines += [f"  not proved: the property `{one}` asks for a node that the mission has not" for one in repair.not_asked]
     lines += [f"  left as it was: {one}" for one in repair.left]
     for faults, after in repair.after.items():
         before = repair.before[faults]
-        if len(faults) == 1 or after.survives or not after.safe:
+        if len(faults) == 1 or after.answered or not after.safe:
             lines.append(f"  {' and then '.join(faults):<34} {_fate(before)} -> {_fate(after)}")
     if repair.not_looked_at:
         lines.append(f"  not looked at: {', '.join(' and then '.join(one) for one in repair.not_looked_at)}")
@@ -59,6 +60,7 @@ def as_dict(answer: Answer, odds: Both | None) -> dict[str, object]:
         "tried": answer.tried,
         "stopped": answer.stopped,
         "reasons": list(answer.reasons),
+        "assuming": list(answer.assuming),
     }
     if repair is None:
         return found
@@ -109,7 +111,12 @@ def _range(odds: Odds, name: str) -> str:
 
 
 def _fate(fate: Fate) -> str:
-    return "survives" if fate.survives else "ends safely" if fate.safe else "unsafe"
+    return f"survives{_assuming(fate.assuming)}" if fate.answered else "ends safely" if fate.safe else "unsafe"
+
+
+def _assuming(assuming: Sequence[str]) -> str:
+    states = [one.rpartition(" ") for one in assuming]
+    return f" assuming that {' and '.join(f'{at} does not become {state} later' for at, _, state in states)}" if states else ""
 
 
 # --- plans --------------------------------------------------------------------------------------------------------------

@@ -66,6 +66,7 @@ data:
 FAULTS = """
 faults:
   laser: {states: {eyes.laser: BROKEN}}
+  dust: {states: {eyes.laser: BROKEN}, later: {eyes.bumper: STUCK}}
   lost: {states: {base.pose: LOST}}
   bumper: {states: {eyes.bumper: STUCK}}
   battery: {ends: {power.supply: EMPTY}}

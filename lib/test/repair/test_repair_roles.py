@@ -23,11 +23,13 @@ from alula.model.expressions import Comparison, DataIs, ResourceIs
 from alula.prove.limits import Deadline
 from alula.repair.courses import Courses, initial_states
 from alula.repair.errors import RepairError
+from alula.repair.judging import Judge
 from alula.repair.planning import Aim, Planner
 from alula.repair.planning import Answer as Planned
 from alula.repair.purposes import Purposes
 from alula.repair.repairing import Answer, Question, Search
 from alula.repair.subject import Subject
+from alula.repair.telling import as_dict, as_text
 
 TIME_S = 600.0
 """What a search may take: it ends by its result, also on a busy machine."""
@@ -120,6 +122,35 @@ def test_another_skill_of_its_role_goes_on_with_what_that_one_needs(tmp_path: Pa
     assert 'to="{goal}"' in xml
     assert answer.repair.branch.size <= 15
     assert any("base.creep" in run for run in fly(subject, answer.repair.text, "laser"))
+
+
+def test_a_fault_is_survived_under_the_assumption_that_nothing_comes_later(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    """Dust leaves the bumper alone at first: with it the rover goes on, until that is stuck, too; then the mission is given up at rest."""
+    subject, answer = repaired(ERRAND.replace("PORTS", ""), "dust", tmp_path, monkeypatch)
+    assert answer.repair is not None
+    assert skills_in(answer.repair.branch.as_xml()) == ["eyes.feel", "base.creep"]
+    assert answer.assuming == ("eyes.bumper STUCK",)
+    (fate,) = [one for faults, one in answer.repair.after.items() if faults == ("dust",)]
+    assert (fate.survives, fate.assuming, fate.safe) == (False, answer.assuming, True)
+    assert as_dict(answer, None)["assuming"] == ["eyes.bumper STUCK"]
+    assert "survives assuming that eyes.bumper does not become STUCK later" in as_text(answer, None)
+    subject.path.write_text(answer.repair.text)
+    again = Search(Subject.read(subject.path, quiet), Question("dust"), Deadline.after(TIME_S), quiet).run()
+    assert (again.survives_already, again.assuming) == (True, answer.assuming)
+
+
+def test_an_assumption_is_what_makes_a_mission_survive(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    """Where nothing is said to come later, the same mission survives; where the later state matters to nothing, nothing is assumed."""
+    subject, answer = repaired(ERRAND.replace("PORTS", ""), "laser", tmp_path, monkeypatch)
+    assert answer.repair is not None
+    file = tmp_path / "skillsets/faults.yaml"
+    whole = file.read_text()
+    found = []
+    for later in ("later: {eyes.bumper: STUCK}", "later: {base.pose: LOST}", "later: {}"):
+        file.write_text(whole.replace("later: {eyes.bumper: STUCK}", later))
+        fate = Judge(Subject.read(subject.path, quiet), Deadline.after(TIME_S)).fate(answer.repair.text, ["dust"])
+        found.append((fate.survives, fate.assuming))
+    assert found == [(False, ("eyes.bumper STUCK",)), (True, ()), (True, ())]
 
 
 def test_where_nothing_goes_on_it_ends_at_the_place_that_the_mission_calls_safe(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
