@@ -142,6 +142,8 @@ def fitted(value: Value, old: Value, enums: Mapping[str, float]) -> Value:
         return as_float(value) if isinstance(old, float) else _integer_like(as_integer(value), old)
     if isinstance(value, str) == isinstance(old, str) and (isinstance(value, str) or type(value) is type(old)):
         return value
+    if any(isinstance(one, StandIn) and not isinstance(one, (int, float, str, list)) for one in (old, value)):
+        return value  # of a type that nobody knows: it may be this one
     raise ValueMismatch(f"{kind(value)} for an entry that holds {kind(old)}", "an entry keeps its type; write another entry")
 
 

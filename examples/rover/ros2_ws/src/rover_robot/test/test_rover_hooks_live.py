@@ -67,6 +67,8 @@ class Rig:
         self.executor = MultiThreadedExecutor(num_threads=8)
         self.executor.add_node(self.node)
         self.until(lambda: all(client.ready for client in self.clients.values()) and self.transition.service_is_ready())
+        told = self.transition.call_async(Transition.Request(resource="link", to="UP"))  # as its dead man reports it
+        self.until(told.done)
 
     def until(self, condition):
         end = time.monotonic() + TIMEOUT_S
