@@ -41,6 +41,7 @@ TYPED = [
     "tools/console_bench",
     "tools/perception_bench",
     "tools/prove_bench",
+    "tools/growing_bench",
     "tools/repair_bench",
     "tools/link_rig",
     "tools/groot_bench",

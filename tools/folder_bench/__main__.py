@@ -7,9 +7,6 @@ process of its own: seconds of the processor, peak memory. A line is printed as 
 from __future__ import annotations
 
 import argparse
-import json
-import resource
-import subprocess
 import sys
 import tempfile
 import time
@@ -19,7 +16,9 @@ from pathlib import Path
 from alula.api.checking import checked_files
 from alula.common.garbage import collect_seldom
 from alula.common.robots import meaning
+from growing_bench import Row, measured_apart, peak_mb, tell_row, tell_rows, write_rows
 
+COLUMNS = "{shape:<10}{files:>8}{nodes:>10}{cpu_s:>10}{peak_mb:>10}{findings:>10}"
 NODES = 25
 """Of a file."""
 DEEPEST = 100
@@ -61,7 +60,7 @@ def _leaf(number: int, one: int) -> str:
     return f'<Condition ID="Is{one}" level="{{goal{one}}}"/>'
 
 
-def measure(shape: str, count: int) -> dict[str, object]:
+def measure(shape: str, count: int) -> Row:
     """Check a folder in this process; proofs aside, which a folder of others has none of."""
     collect_seldom()
     with tempfile.TemporaryDirectory() as folder, meaning(None):
@@ -74,7 +73,7 @@ def measure(shape: str, count: int) -> dict[str, object]:
         "files": count,
         "nodes": count * NODES,
         "cpu_s": round(taken, 2),
-        "peak_mb": round(resource.getrusage(resource.RUSAGE_SELF).ru_maxrss / 1024),
+        "peak_mb": peak_mb(),
         "findings": sum(len(file.findings) for file in files),
     }
 
@@ -84,15 +83,8 @@ def main(words: Sequence[str] | None = None) -> int:
     options = _parser().parse_args(words)
     if options.one:
         shape, count = options.one
-        sys.stdout.write(json.dumps(measure(shape, int(count))) + "\n")
-        return 0
-    rows: list[dict[str, object]] = []
-    _say(_HEAD)
-    for row in _all(options.files):
-        rows.append(row)
-        _say(_ROW.format(**row))
-    if options.json is not None:
-        options.json.write_text(json.dumps({"folders": rows}, indent=2) + "\n", encoding="utf-8")
+        return tell_row(measure(shape, int(count)))
+    write_rows(options.json, "folders", tell_rows(COLUMNS, _all(options.files)))
     return 0
 
 
@@ -108,23 +100,11 @@ def _numbers(text: str) -> list[int]:
     return [int(number) for number in text.split(",")]
 
 
-def _all(counts: Sequence[int]) -> Iterator[dict[str, object]]:
+def _all(counts: Sequence[int]) -> Iterator[Row]:
     """Yield a row for each folder, each measured in a process of its own."""
     for shape in SHAPES:
         for count in counts:
-            program = [sys.executable, "-m", "folder_bench", "--one", shape, str(count)]
-            done = subprocess.run(program, check=True, capture_output=True, text=True)
-            row: dict[str, object] = json.loads(done.stdout)
-            yield row
-
-
-_HEAD = f"{'shape':<10}{'files':>8}{'nodes':>10}{'CPU s':>10}{'peak MB':>10}{'findings':>10}"
-_ROW = "{shape:<10}{files:>8}{nodes:>10}{cpu_s:>10}{peak_mb:>10}{findings:>10}"
-
-
-def _say(line: str) -> None:
-    sys.stdout.write(line + "\n")
-    sys.stdout.flush()
+            yield measured_apart("folder_bench", "--one", shape, str(count))
 
 
 if __name__ == "__main__":

@@ -10,10 +10,7 @@ from __future__ import annotations
 
 import argparse
 import contextlib
-import json
 import random
-import resource
-import subprocess
 import sys
 import tempfile
 import time
@@ -43,9 +40,11 @@ from alula.prove.mission.findings import findings
 from alula.prove.mission.prover import LOOKED_AT
 from alula.prove.mission.regions import Regions
 from alula.prove.mission.system import System
+from growing_bench import Row, measured_apart, peak_mb, tell_row, tell_rows, write_rows
 from prove_bench.growth import picture
 
 COMMAND = "alula bench missions"
+COLUMNS = "{family:<12}{size:<12}{leaves:>7}{cpu_s:>9}{peak_mb:>9}{regions:>9}{ticks:>9}  {complete}"
 MAIN = "main_tree_to_execute="
 A_SKILLSET = 5
 """Skills of one skillset, in trees."""
@@ -142,7 +141,7 @@ def _working(name: str, tool: str, *done: Assignment, needs: ResourceIs | None =
 # --- measuring ---------------------------------------------------------------------------------------------------------
 
 
-def measure(family: str, size: str, timeout_s: float) -> dict[str, object]:
+def measure(family: str, size: str, timeout_s: float) -> Row:
     """Look at all runs of one mission in this process; of a robot's own mission ``size`` is the file."""
     with tempfile.TemporaryDirectory() as folder:
         if family not in FAMILIES:
@@ -160,7 +159,7 @@ def _warn(line: str) -> None:
     sys.stderr.write(f"{COMMAND}: {line}\n")
 
 
-def _looked_at(path: Path, models: Sequence[Skillset], part: MissionPart, timeout_s: float) -> dict[str, object]:
+def _looked_at(path: Path, models: Sequence[Skillset], part: MissionPart, timeout_s: float) -> Row:
     begin, worked = time.monotonic(), time.process_time()
     deadline = Deadline.after(timeout_s)
     regions = Regions(System.read(path, models, part, LOOKED_AT), deadline)
@@ -171,7 +170,7 @@ def _looked_at(path: Path, models: Sequence[Skillset], part: MissionPart, timeou
         "leaves": len(regions.system.leaves),
         "seconds": round(time.monotonic() - begin, 3),
         "cpu_s": round(time.process_time() - worked, 3),
-        "peak_mb": round(resource.getrusage(resource.RUSAGE_SELF).ru_maxrss / 1024, 1),
+        "peak_mb": peak_mb(),
         "regions": len(regions.regions),
         "ticks": regions.system.ticker.runs,
         "complete": regions.complete,
@@ -184,15 +183,9 @@ def main(arguments: Sequence[str] | None = None) -> int:
     options = _parser().parse_args(arguments)
     if options.one:
         family, size = options.one
-        sys.stdout.write(json.dumps(measure(family, size, options.timeout)) + "\n")
-        return 0
-    _say(_HEAD)
-    rows: list[dict[str, object]] = []
-    for row in _all(options.robot, options.timeout):
-        rows.append(row)
-        _say(_ROW.format(**{**row, "complete": "yes" if row["complete"] else "no"}))
-    if options.json is not None:
-        options.json.write_text(json.dumps({"timeout_s": options.timeout, "missions": rows}, indent=2) + "\n", encoding="utf-8")
+        return tell_row(measure(family, size, options.timeout))
+    rows = tell_rows(COLUMNS, _all(options.robot, options.timeout), complete={True: "yes", False: "no"})
+    write_rows(options.json, "missions", rows, timeout_s=options.timeout)
     if options.svg is not None:
         options.svg.write_text(picture([row for row in rows if row["family"] in FAMILIES]), encoding="utf-8")
     return 0
@@ -208,7 +201,7 @@ def _parser() -> argparse.ArgumentParser:
     return parser
 
 
-def _all(robots: Sequence[Path], timeout_s: float) -> Iterator[dict[str, object]]:
+def _all(robots: Sequence[Path], timeout_s: float) -> Iterator[Row]:
     """Yield a row for each mission, measured in a process of its own; a kind that stops is not tried with more."""
     for robot in robots:
         for path in sorted((robot / "missions").glob("*.xml")):
@@ -222,20 +215,8 @@ def _all(robots: Sequence[Path], timeout_s: float) -> Iterator[dict[str, object]
                 break
 
 
-def _apart(family: str, size: str, timeout_s: float) -> dict[str, object]:
-    program = [sys.executable, "-m", "prove_bench.missions", "--timeout", str(timeout_s), "--one", family, size]
-    done = subprocess.run(program, check=True, stdout=subprocess.PIPE, text=True)
-    row: dict[str, object] = json.loads(done.stdout)
-    return row
-
-
-_HEAD = f"{'mission':<12}{'size':<12}{'leaves':>7}{'CPU s':>9}{'peak MB':>9}{'regions':>9}{'ticks':>9}  all runs"
-_ROW = "{family:<12}{size:<12}{leaves:>7}{cpu_s:>9}{peak_mb:>9}{regions:>9}{ticks:>9}  {complete}"
-
-
-def _say(line: str) -> None:
-    sys.stdout.write(line + "\n")
-    sys.stdout.flush()
+def _apart(family: str, size: str, timeout_s: float) -> Row:
+    return measured_apart("prove_bench.missions", "--timeout", str(timeout_s), "--one", family, size)
 
 
 if __name__ == "__main__":

@@ -8,10 +8,7 @@ soon as it is measured.
 from __future__ import annotations
 
 import argparse
-import json
 import random
-import resource
-import subprocess
 import sys
 import time
 from collections.abc import Iterator, Sequence
@@ -34,7 +31,9 @@ from alula.model.model import (
     Transition,
 )
 from alula.prove.skillset.prover import prove
+from growing_bench import Row, measured_apart, peak_mb, tell_row, tell_rows, write_rows
 
+COLUMNS = "{family:<12}{method:<12}{size:>6}{seconds:>10}{cpu_s:>10}{peak_mb:>10}  {proved}"
 ALL_ONE_BY_ONE = 10**9
 SPARSE_RESOURCES = 60
 
@@ -102,7 +101,7 @@ def _using(name: str, resources: Sequence[str], needs: ResourceIs | None = None)
     )
 
 
-def measure(family: str, count: int, method: str, timeout_s: float) -> dict[str, object]:
+def measure(family: str, count: int, method: str, timeout_s: float) -> Row:
     """Prove one skillset in this process."""
     begin, worked = time.monotonic(), time.process_time()
     findings = prove(FAMILIES[family](count), timeout_s=timeout_s, most=METHODS[method])
@@ -113,7 +112,7 @@ def measure(family: str, count: int, method: str, timeout_s: float) -> dict[str,
         "method": method,
         "seconds": round(seconds, 3),
         "cpu_s": round(cpu_s, 3),
-        "peak_mb": round(resource.getrusage(resource.RUSAGE_SELF).ru_maxrss / 1024, 1),
+        "peak_mb": peak_mb(),
         "proved": not any(finding.code == "ALU540" for finding in findings),
         "findings": sorted({finding.code for finding in findings}),
     }
@@ -124,15 +123,9 @@ def main(arguments: Sequence[str] | None = None) -> int:
     options = _parser().parse_args(arguments)
     if options.one:
         family, size, method = options.one
-        sys.stdout.write(json.dumps(measure(family, int(size), method, options.timeout)) + "\n")
-        return 0
-    _say(_HEAD)
-    rows: list[dict[str, object]] = []
-    for row in _all(options.sizes, options.timeout):
-        rows.append(row)
-        _say(_ROW.format(**{**row, "proved": "yes" if row["proved"] else "no"}))
-    if options.json is not None:
-        options.json.write_text(json.dumps({"timeout_s": options.timeout, "proofs": rows}, indent=2) + "\n")
+        return tell_row(measure(family, int(size), method, options.timeout))
+    rows = tell_rows(COLUMNS, _all(options.sizes, options.timeout), proved={True: "yes", False: "no"})
+    write_rows(options.json, "proofs", rows, timeout_s=options.timeout)
     return 0
 
 
@@ -149,26 +142,15 @@ def _sizes(text: str) -> list[int]:
     return [int(size) for size in text.split(",")]
 
 
-def _all(sizes: Sequence[int], timeout_s: float) -> Iterator[dict[str, object]]:
+def _all(sizes: Sequence[int], timeout_s: float) -> Iterator[Row]:
     """Yield a row for each size, each measured in a process of its own; a method that stops is not tried with more."""
-    program = [sys.executable, "-m", "prove_bench.skillsets", "--timeout", str(timeout_s), "--one"]
     for family in FAMILIES:
         for method in METHODS:
             for size in sizes:
-                done = subprocess.run([*program, family, str(size), method], check=True, capture_output=True, text=True)
-                row: dict[str, object] = json.loads(done.stdout)
+                row = measured_apart("prove_bench.skillsets", "--timeout", str(timeout_s), "--one", family, str(size), method)
                 yield row
                 if not row["proved"]:
                     break
-
-
-_HEAD = f"{'family':<12}{'method':<12}{'size':>6}{'seconds':>10}{'CPU s':>10}{'peak MB':>10}  proved"
-_ROW = "{family:<12}{method:<12}{size:>6}{seconds:>10}{cpu_s:>10}{peak_mb:>10}  {proved}"
-
-
-def _say(line: str) -> None:
-    sys.stdout.write(line + "\n")
-    sys.stdout.flush()
 
 
 if __name__ == "__main__":

@@ -8,9 +8,6 @@ a kind that is not through in the time is not tried with more.
 from __future__ import annotations
 
 import argparse
-import json
-import resource
-import subprocess
 import sys
 import tempfile
 import time
@@ -22,13 +19,15 @@ from alula.common.robots import load_robot_folder, meaning
 from alula.prove.limits import Deadline, OutOfTimeError
 from alula.repair.repairing import Question, Search
 from alula.repair.subject import Subject
+from growing_bench import Row, measured_apart, peak_mb, tell_row, tell_rows, write_rows
 from repair_bench.cases import FAMILIES, ROBOTS, Case, growing
 
 COMMAND = "alula bench repair"
+COLUMNS = "{case:<15}{size:>5}{seconds:>9}{cpu_s:>9}{peak_mb:>9}{tried:>7}{nodes:>7}  {answer}"
 ROOT = Path(__file__).resolve().parents[2]
 
 
-def measure(name: str, size: int, timeout_s: float) -> dict[str, object]:
+def measure(name: str, size: int, timeout_s: float) -> Row:
     """Repair one mission in this process; ``size`` is nothing for a robot's own."""
     collect_seldom()
     with tempfile.TemporaryDirectory() as folder:
@@ -40,7 +39,7 @@ def measure(name: str, size: int, timeout_s: float) -> dict[str, object]:
             "size": size,
             "seconds": round(time.monotonic() - begun_s, 2),
             "cpu_s": round(time.process_time() - worked_s, 2),
-            "peak_mb": round(resource.getrusage(resource.RUSAGE_SELF).ru_maxrss / 1024),
+            "peak_mb": peak_mb(),
             "tried": tried,
             "nodes": nodes,
             "answer": answer,
@@ -68,15 +67,9 @@ def main(words: Sequence[str] | None = None) -> int:
     options = _parser().parse_args(words)
     if options.one:
         name, size = options.one
-        sys.stdout.write(json.dumps(measure(name, int(size), options.timeout)) + "\n")
-        return 0
-    rows: list[dict[str, object]] = []
-    _say(_HEAD)
-    for row in _all(options.case or [*ROBOTS, *FAMILIES], options.timeout):
-        rows.append(row)
-        _say(_ROW.format(**{**row, "size": row["size"] or ""}))
-    if options.json is not None:
-        options.json.write_text(json.dumps({"timeout_s": options.timeout, "repairs": rows}, indent=2) + "\n", encoding="utf-8")
+        return tell_row(measure(name, int(size), options.timeout))
+    rows = tell_rows(COLUMNS, _all(options.case or [*ROBOTS, *FAMILIES], options.timeout))
+    write_rows(options.json, "repairs", rows, timeout_s=options.timeout)
     return 0
 
 
@@ -90,24 +83,13 @@ def _parser() -> argparse.ArgumentParser:
     return parser
 
 
-def _all(names: Sequence[str], timeout_s: float) -> Iterator[dict[str, object]]:
+def _all(names: Sequence[str], timeout_s: float) -> Iterator[Row]:
     for name in names:
         for size in FAMILIES[name][1] if name in FAMILIES else (0,):
-            program = [sys.executable, "-m", "repair_bench", "--timeout", str(timeout_s), "--one", name, str(size)]
-            done = subprocess.run(program, check=True, stdout=subprocess.PIPE, text=True)
-            row: dict[str, object] = json.loads(done.stdout)
+            row = measured_apart("repair_bench", "--timeout", str(timeout_s), "--one", name, str(size))
             yield row
             if row["answer"] == "not in the time":
                 break
-
-
-_HEAD = f"{'case':<15}{'size':>5}{'wall s':>9}{'CPU s':>9}{'peak MB':>9}{'tried':>7}{'nodes':>7}  answer"
-_ROW = "{case:<15}{size:>5}{seconds:>9}{cpu_s:>9}{peak_mb:>9}{tried:>7}{nodes:>7}  {answer}"
-
-
-def _say(line: str) -> None:
-    sys.stdout.write(line + "\n")
-    sys.stdout.flush()
 
 
 if __name__ == "__main__":

@@ -217,24 +217,22 @@ def simulated(ros_master: str) -> Iterator[Callable[[float], None]]:
     clock.unregister()
 
 
-def test_in_simulation_a_clock_that_runs_or_stands_is_no_silence(robot, start_dead_man, simulated):
+def test_in_simulation_a_silence_lasts_on_both_clocks(robot, start_dead_man, simulated):
     simulated(100.0)
     robot.configure(silent_after_s=1.0)
     start_dead_man()
     heart = rospy.Publisher("/decision/alive", Header, queue_size=1, latch=True)
     heart.publish(Header())
     robot.until_state(state="heard")
-    simulated(500.0)  # a simulation that runs fast
-    rospy.sleep(1.5)  # one that stands; that nothing comes of both can only be waited for
-    assert robot.states[-1]["state"] == "heard"
     begin_s = rospy.get_time()
 
     def is_silent() -> bool:
-        simulated(500.0 + rospy.get_time() - begin_s)
+        simulated(100.0 + (rospy.get_time() - begin_s) / 3)
         return robot.states[-1]["state"] == "silent"
 
     until(is_silent, what="it is silent")
     assert robot.states[-1]["stops"] == 1
+    assert rospy.get_time() - begin_s >= 3.0, "s: of a simulation that takes three for one"
     heart.unregister()
 
 

@@ -14,7 +14,7 @@ SIMULATED_LOOK_S = 0.05
 """Wall clock; the clock of a simulation counts from look to look, so there is one so often."""
 
 
-class _Slower:
+class SlowerClock:
     """Passes as the slower one of two clocks does, from look to look."""
 
     def __init__(self) -> None:
@@ -31,7 +31,7 @@ class _Slower:
             return self._now_s
 
 
-_SLOWER = _Slower()
+_SLOWER = SlowerClock()
 
 
 def is_simulated() -> bool:
