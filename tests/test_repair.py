@@ -276,7 +276,6 @@ def rover(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
     return tmp_path
 
 
-@pytest.mark.skipif(LONG not in os.environ, reason=f"takes minutes: {LONG}=1 searches; with the resource link the first fails")
 @pytest.mark.long
 @pytest.mark.timeout(0)  # a minute of processor time: as long as the machine needs
 def test_a_way_that_is_blocked_gets_another_chance(rover: Path, capsys: pytest.CaptureFixture[str]) -> None:
@@ -286,14 +285,13 @@ def test_a_way_that_is_blocked_gets_another_chance(rover: Path, capsys: pytest.C
     one = found["repair"]
     assert isinstance(one, dict)
     assert one["around"]
-    needed = "base.authority == MISSION &amp;&amp; base.pose_status == GOOD"
+    needed = "base.authority == MISSION &amp;&amp; base.link == UP &amp;&amp; base.pose_status == GOOD"
     assert one["xml"] == f'<RetryAfter name="follow the walls again" attempts="3" wait="1" if="{needed}"/>'
     fates = found["fates"]
     assert isinstance(fates, list)
     assert [fate["after"]["survives"] for fate in fates if fate["after"]["faults"] == ["person"]] == [True]
 
 
-@pytest.mark.skipif(LONG not in os.environ, reason=f"takes minutes: {LONG}=1 searches; with the resource link the first fails")
 @pytest.mark.parametrize("fault", ["laser", "person", "door"])
 def test_the_rover_survives_as_it_is(rover: Path, capsys: pytest.CaptureFixture[str], fault: str) -> None:
     assert answer(capsys, rover / "patrol.xml", "--fault", fault)["answer"] == "nothing to repair"
