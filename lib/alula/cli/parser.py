@@ -3,6 +3,8 @@
 from __future__ import annotations
 
 import argparse
+import contextlib
+import math
 from typing import Any, NoReturn
 
 from alula.common.suggestions import nearest
@@ -61,6 +63,19 @@ def _range(choices: Any) -> str:
 def json_option(parser: argparse.ArgumentParser, what: str) -> None:
     """Add ``--json``: a command prints ``what`` then as `alula.common.files.json_line` does, a line each."""
     parser.add_argument("--json", action="store_true", help=f"print {what} as JSON, an object a line")
+
+
+def time_option(parser: argparse.ArgumentParser, default_s: float, what: str) -> None:
+    """Add ``--time SECONDS``; ``what`` it limits, as the help says it."""
+    words = f"time limit{what} (default {default_s:g})"
+    parser.add_argument("--time", type=_seconds, default=default_s, metavar="SECONDS", help=words)
+
+
+def _seconds(text: str) -> float:
+    with contextlib.suppress(ValueError):
+        if 0.0 <= (seconds := float(text)) < math.inf:  # also refuses nan
+            return seconds
+    raise argparse.ArgumentTypeError(f"{text} is no number of seconds; write one from 0 on")
 
 
 def completed_by(action: argparse.Action, words: str) -> None:

@@ -13,7 +13,7 @@ from alula.cli.ctrl_c import ctrl_c_stops
 from alula.cli.saying import warner
 from alula.cli.table import parse
 from alula.common.errors import AlulaError
-from alula.common.files import json_line, write_text
+from alula.common.files import check_place, json_line, write_text
 from alula.common.garbage import collect_seldom
 from alula.common.robots import find_robot, meaning
 from alula.prove.limits import Deadline
@@ -41,6 +41,7 @@ def run(given: argparse.Namespace) -> int:
     """Do what is asked for; raises what ``main`` tells."""
     if not given.goal:
         raise RepairError("name what is to be reached: --goal CONDITION, such as skillset.resource == STATE, or a role of a skill")
+    check_place("--out", given.out)
     tell = warner(COMMAND)
     using = tuple(one.strip() for part in given.using for one in part.split(",") if one.strip())
     aim = Aim(given.goal, given.start, given.never, using, given.most_faults)

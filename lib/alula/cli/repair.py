@@ -14,7 +14,7 @@ from alula.cli.ctrl_c import ctrl_c_stops
 from alula.cli.saying import warner
 from alula.cli.table import parse
 from alula.common.errors import AlulaError
-from alula.common.files import json_line, write_text
+from alula.common.files import check_place, json_line, write_text
 from alula.common.garbage import collect_seldom
 from alula.missions.drawing import draw
 from alula.missions.palette import palette_of
@@ -49,6 +49,8 @@ def main(words: Sequence[str] | None = None) -> int:
 
 def run(given: argparse.Namespace) -> int:
     """Do what is asked for; raises what ``main`` tells."""
+    check_place("--out", given.out)
+    check_place("--svg", given.svg)
     tell = warner(COMMAND)
     subject = Subject.read(given.file, tell)
     using = tuple(one.strip() for part in given.using for one in part.split(",") if one.strip())

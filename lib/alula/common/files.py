@@ -8,6 +8,8 @@ import os
 from collections.abc import Callable
 from pathlib import Path
 
+from alula.common.errors import AlulaError
+
 
 def write_aside(path: Path, write: Callable[[Path], None]) -> None:
     """Let ``write`` make the file under a hidden name with the same suffix, then rename it; raises what ``write`` raises."""
@@ -17,6 +19,19 @@ def write_aside(path: Path, write: Callable[[Path], None]) -> None:
         aside.replace(path)
     finally:
         aside.unlink(missing_ok=True)
+
+
+def check_place(option: str, path: Path | None) -> None:
+    """Raise AlulaError where no file can be written to what an option names; before the work whose result it is for."""
+    if path is None:
+        return
+    folder = path.absolute().parent
+    if path.is_dir():
+        raise AlulaError(f"{option} {path}: is a folder; name a file in it")
+    if not folder.is_dir():
+        raise AlulaError(f"{option} {path}: there is no folder {folder}; make it, or name another file")
+    if not os.access(folder, os.W_OK):
+        raise AlulaError(f"{option} {path}: {folder} can't be written to; name a file elsewhere")
 
 
 def write_text(path: Path, text: str) -> None:

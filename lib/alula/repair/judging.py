@@ -16,11 +16,12 @@ from alula.prove.limits import Deadline
 from alula.prove.mission.prover import Proved, prove_within
 from alula.prove.mission.run import MissionRun
 from alula.prove.mission.system import System
+from alula.repair.errors import RepairError
 from alula.repair.fates import MOST_FAULTS, Fate, fate_of, needs
 from alula.repair.subject import Subject
 
-BOUND = "ALU710"
-"""The finding that says that not all runs were looked at."""
+BOUND, UNREAD = "ALU710", "ALU713"
+"""The findings that say that not all runs were looked at, and that a property can't be read."""
 
 
 @dataclass(frozen=True)
@@ -78,6 +79,12 @@ class Judge:
         with self._subject.copy(text) as path:
             proved = self._prove(path, also=also)
         return Judgement((*found, *proved.findings), proved.complete)
+
+    def refuse_unread(self, text: str, option: str, condition: str) -> None:
+        """Raise RepairError where the property that asks for an option's condition can't be read in a text of the mission's file."""
+        wrong = next((one for one in self.check(text).findings if one.code == UNREAD), None)
+        if wrong is not None:
+            raise RepairError(f"{option} '{condition}': {wrong.message}{f'; {wrong.hint}' if wrong.hint else ''}")
 
     def _prove(self, path: Path, *, also: bool) -> Proved:
         self._deadline.check()

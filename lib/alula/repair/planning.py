@@ -29,7 +29,7 @@ from alula.repair.judging import Judge
 from alula.repair.naming import plain
 from alula.repair.purposes import Purpose, Purposes, asked_of_others
 from alula.repair.repairing import Question, Search, Tell, condition_of
-from alula.repair.subject import Subject
+from alula.repair.subject import Subject, with_property
 from alula.trees.document import Element
 from alula.trees.node import pointer
 from alula.trees.reading import type_name
@@ -107,6 +107,10 @@ class Planner:
             raise RepairError(f"--using {wrong[0]}: there is no such skill; there are {', '.join(sorted(self._purposes.known))}")
         roles = {role for one in self._purposes.known.values() if one.achieves for role in one.roles}
         self._role = aim.goal if aim.goal in roles else ""
+        if aim.goal.isidentifier() and not self._role:
+            raise RepairError(
+                f"--goal '{aim.goal}': no skill fills this role by its success; there are {', '.join(sorted(roles)) or 'none'}"
+            )
         self._wanted: Wanted | None = None if self._role else ("", condition_of("--goal", aim.goal))
         if self._wanted is not None:
             _check_names("--goal", aim.goal, self._wanted[1], self._subject.skillsets)
@@ -127,6 +131,8 @@ class Planner:
         if self._wanted is not None and Here(states).fulfils(self._wanted):
             raise RepairError(f"--goal '{self._aim.goal}': it is so at first; say what is so by --from")
         tried = 0
+        with suppress(OutOfTimeError):  # the search ends at once then
+            self._can_be_asked()
         for course in islice(self._courses.to(states, self._reaches), MOST_COURSES):
             tried += 1
             names = ", ".join(one.name for one in course.steps)
@@ -139,6 +145,15 @@ class Planner:
                 return Answer(self._repaired(plan), tried, stopped=self._stopped)
             self._tell(f"{names}: no: {plan}")
         return Answer(None, tried, impossible=not tried, reasons=() if tried else tuple(self._why(states)))
+
+    def _can_be_asked(self) -> None:
+        """Raise RepairError where what must never be names what the robot has not."""
+        if self._aim.never:
+            with _file(EMPTY) as path:
+                subject = self._of(path)
+                document = subject.document()
+                with_property(document.root, subject.files.main, f"asked: never {self._aim.never}")
+                self._judge(subject).refuse_unread(document.text(), "--never", self._aim.never)
 
     def _reaches(self, course: Course) -> bool:
         if self._role:
@@ -293,9 +308,12 @@ def _states_of(condition: str, skillsets: Sequence[Skillset]) -> dict[str, str]:
     read = condition_of("--from", condition)
     _check_names("--from", condition, read, skillsets)
     several = read.operands if isinstance(read, And) else (read,)
-    states = {one.resource: one.state for one in several if isinstance(one, ResourceIs) and not one.negated}
-    if len(states) < len(several):
-        raise RepairError(f"--from '{condition}': write states, as skillset.resource == STATE, with `and` between them")
+    states: dict[str, str] = {}
+    for one in several:
+        if not isinstance(one, ResourceIs) or one.negated:
+            raise RepairError(f"--from '{condition}': write states, as skillset.resource == STATE, with `and` between them")
+        if states.setdefault(one.resource, one.state) != one.state:
+            raise RepairError(f"--from '{condition}': {one.resource} can't be {states[one.resource]} and {one.state}; name one state")
     return states
 
 

@@ -38,8 +38,6 @@ from alula.trees.reading import node_name, type_name
 
 Tell = Callable[[str], None]
 TOGETHER = "Parallel"
-UNREAD = "ALU713"
-"""The finding about a property that can't be read."""
 MOST_SITUATIONS = 2_000
 """Of a mission with another fault than the one that is answered; where there are more, nothing is told of it."""
 SHARE = 0.3
@@ -198,9 +196,7 @@ class Search:
         for option, condition in (("--never", self._question.never), ("--goal", self._question.goal)):
             if condition:
                 text, _ = self._without_branch(self._missing, f"asked: never {condition}")
-                wrong = next((one for one in self._judge.check(text).findings if one.code == UNREAD), None)
-                if wrong is not None:
-                    raise RepairError(f"{option} '{condition}': {wrong.message}{f'; {wrong.hint}' if wrong.hint else ''}")
+                self._judge.refuse_unread(text, option, condition)
 
     def _without_branch(self, leave_out: Sequence[str], more: str = "") -> tuple[str, list[str]]:
         document = self._subject.document()

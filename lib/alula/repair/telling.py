@@ -126,7 +126,7 @@ def plan_as_text(answer: planning.Answer) -> str:
     """Return lines for a terminal."""
     if answer.plan is None:
         when = " before the search was ended" if answer.stopped else ""
-        head = "impossible" if answer.impossible else f"unknown: none of {answer.tried} courses was proved{when}"
+        head = "impossible" if answer.impossible else f"unknown: no course of skills was proved{when} ({answer.tried} tried)"
         return "\n".join([head, *(f"  {one}" for one in answer.reasons)]) + "\n"
     plan = answer.plan
     lines = [f"planned, proved by check: {', then '.join(plan.steps)}; {plan.nodes} nodes", "", plan.text]

@@ -5,7 +5,7 @@ from __future__ import annotations
 from argparse import Action, ArgumentParser, Namespace
 from pathlib import Path
 
-from alula.cli.parser import completed_by, json_option
+from alula.cli.parser import completed_by, json_option, time_option
 
 NOTATIONS = ("paper", "rl")
 FORMAT = "4"
@@ -34,9 +34,7 @@ def check(parser: ArgumentParser) -> None:
         "--closed-world", action="store_true", help="assume that transitions that are neither extern nor used by an effect are never taken"
     )
     parser.add_argument("--no-proofs", dest="proofs", action="store_false", help="skip the proofs")
-    parser.add_argument(
-        "--time", type=float, default=PROOFS_S, metavar="SECONDS", help=f"time limit for the proofs of a file (default {PROOFS_S:g})"
-    )
+    time_option(parser, PROOFS_S, " for the proofs of a file")
     parser.add_argument(
         "--play", type=int, metavar="N", help="play counterexample N of the output: in running managers, or as a run of the mission"
     )
@@ -130,7 +128,7 @@ def _search(parser: ArgumentParser, what: str) -> None:
         metavar="K",
         help="how many faults may come, one after another: 1 or 2 (default 2)",
     )
-    parser.add_argument("--time", type=float, default=REPAIR_S, metavar="SECONDS", help=f"time limit (default {REPAIR_S:g})")
+    time_option(parser, REPAIR_S, "")
     parser.add_argument("--out", type=Path, metavar="FILE", help=f"write {what} there (default: nothing is written)")
 
 

@@ -5,7 +5,7 @@ from __future__ import annotations
 from argparse import ArgumentParser
 from pathlib import Path
 
-from alula.cli.parser import completed_by, json_option
+from alula.cli.parser import completed_by, json_option, time_option
 
 FAULT = "WHAT[:HOW][@SECONDS[-SECONDS]]"
 ANSWERS_S = 120.0
@@ -150,10 +150,4 @@ def campaign(parser: ArgumentParser) -> None:
     parser.add_argument(
         "--dask", metavar="URL", help="use the workers of this Dask scheduler, such as tcp://host:8786 (default: this machine)"
     )
-    parser.add_argument(
-        "--time",
-        type=float,
-        default=ANSWERS_S,
-        metavar="SECONDS",
-        help=f"time limit for the proof of a mission's answers (default {ANSWERS_S:g})",
-    )
+    time_option(parser, ANSWERS_S, " for the proof of a mission's answers")
