@@ -67,7 +67,7 @@ class Tamperer:
     def _pass_on(self, came: list[bytes]) -> None:
         self.heard += came
         chance = self._chance
-        forged = bytearray(chance.choice(came))
+        forged = bytearray(chance.choice(came) or b"\0")  # an empty datagram may have come, too
         forged[chance.randrange(len(forged))] ^= 1 << chance.randrange(8)
         mixed = [*came, bytes(forged), chance.randbytes(chance.randrange(1500)), b"", *chance.choices(self.heard, k=2)]
         chance.shuffle(mixed)
