@@ -43,6 +43,7 @@ class TwoComputers:
         """Take two computers of a network; ``folder`` takes what they write."""
         self.network, self.folder = network, folder
         self.base, self.decision = network.computer("base"), network.computer("decision")
+        self._inside = {one.name: _namespace(_holder(one)) for one in (self.base, self.decision)}  # also told once the holder has died
         self._claim = claim_domain()  # of this machine, as shared memory is
         self._name = f"link_rig_{os.getpid()}"
         self._deployment = ROVER / f"deployments/{self._name}.yaml"
@@ -133,11 +134,10 @@ class TwoComputers:
 
     def kill_all(self, computer: Computer) -> None:
         """Kill all that runs on a computer, as when its power goes."""
-        holder = int(computer.enter[1].partition("=")[2])
-        inside = Path(f"/proc/{holder}/ns/net").readlink()
+        holder, inside = _holder(computer), self._inside[computer.name]
         for process in psutil.process_iter():
             with suppress(OSError, psutil.Error):
-                if process.pid != holder and Path(f"/proc/{process.pid}/ns/net").readlink() == inside:
+                if process.pid != holder and _namespace(process.pid) == inside:
                     process.kill()
 
     def close(self) -> None:
@@ -192,6 +192,15 @@ class Mission:
         said = json.loads(summary.read_text(encoding="utf-8"))
         died = [f"{one['name']} died ({one['how']})" for one in said["died"]]
         return End(str(said["outcome"]), "; ".join([*([said["reason"]] if said["reason"] else []), *died]))
+
+
+def _holder(computer: Computer) -> int:
+    """Return the process that keeps a computer's network there."""
+    return int(computer.enter[1].partition("=")[2])
+
+
+def _namespace(pid: int) -> Path:
+    return Path(f"/proc/{pid}/ns/net").readlink()
 
 
 @contextmanager
