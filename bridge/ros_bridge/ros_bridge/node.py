@@ -8,16 +8,17 @@ import shutil
 import sys
 import threading
 import time
+from contextlib import nullcontext, suppress
 from pathlib import Path
 from typing import TYPE_CHECKING
 
 import rclpy
 from rclpy.executors import SingleThreadedExecutor
 
-from alula.common.fast_dds import leave
+from alula.common.fast_dds import leave, small_segment
 from alula.common.files import write_json
 from ros_bridge import actions, services, topics
-from ros_bridge.config import ActionRoute, ServiceRoute, TopicRoute
+from ros_bridge.config import ActionRoute, Direction, ServiceRoute, TopicRoute
 from ros_bridge.conversion import Types
 from ros_bridge.diagnostics import open_diagnostics
 from ros_bridge.discovery import Discovery, GraphReader
@@ -45,6 +46,17 @@ SPIN_END_S = 1.0
 MAKERS: dict[type, Maker] = {TopicRoute: topics.make, ServiceRoute: services.make, ActionRoute: actions.make}
 
 
+def may_send_bulk(config: BridgeConfig, types: Types) -> bool:
+    """Tell whether large messages may be sent in ROS 2: images, clouds, or whatever discovery finds."""
+    for spec in config.topics:
+        with suppress(BridgeError):  # told when the route is opened
+            if spec.direction is Direction.ROS1_TO_ROS2:
+                pair = types.message(spec.type_name, spec.ros2_type, spec.md5sum)
+                if types.bulky(pair.ros2_name):
+                    return True
+    return bool(config.selection.include)
+
+
 class Bridge:
     """All routes, running. rclpy has to be initialised."""
 
@@ -53,7 +65,8 @@ class Bridge:
         self._rates = Rates()
         self._rates_hz: dict[Spec, float] = {}
         self._config = config
-        self._node = rclpy.create_node("ros_bridge")
+        with nullcontext() if may_send_bulk(config, types) else small_segment():
+            self._node = rclpy.create_node("ros_bridge")
         self._plane = Plane(load_library(), name, master)
         self._monitor = MasterMonitor(master, self._plane.node)
         context = Context(self._node, types, self._plane)

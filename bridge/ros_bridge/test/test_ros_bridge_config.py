@@ -7,9 +7,11 @@ from pathlib import Path
 import pytest
 
 from alula.language.robot import BridgedAction, BridgedService, BridgedTopic
-from ros_bridge.config import Direction, Reliability, RosVersion, ServiceRoute, TopicRoute
+from ros_bridge.config import BridgeConfig, Direction, Reliability, RosVersion, ServiceRoute, TopicRoute
 from ros_bridge.config_file import SERVICE_KEYS, TOPIC_KEYS, load_config, read_config
+from ros_bridge.conversion import Types, ament_prefixes
 from ros_bridge.errors import ConfigError
+from ros_bridge.node import may_send_bulk
 from ros_bridge.selection import Selection
 
 
@@ -180,3 +182,21 @@ def test_two_routes_into_one_name_are_refused_over_several_files(tmp_path):
     assert len(load_config([tmp_path / "a.yaml"]).topics) == 1
     with pytest.raises(ConfigError, match="/same: two routes lead there"):
         load_config([tmp_path / "a.yaml", tmp_path / "b.yaml"])
+
+
+def test_only_what_is_sent_in_ros_2_decides_how_much_shared_memory_the_bridge_takes():
+    types = Types(ament_prefixes())
+
+    def route(kind, direction=Direction.ROS1_TO_ROS2):
+        return TopicRoute("/it", "/it", direction, kind)
+
+    for config, bulk in (
+        (BridgeConfig(), False),
+        (BridgeConfig((route("uav_msgs/Obstacle"), route("rosgraph_msgs/Clock"))), False),
+        (BridgeConfig((route("rosgraph_msgs/Clock"), route("sensor_msgs/PointCloud2"))), True),
+        (BridgeConfig((route("sensor_msgs/Image"),)), True),
+        (BridgeConfig((route("sensor_msgs/Image", Direction.ROS2_TO_ROS1),)), False),
+        (BridgeConfig((route("nobody_msgs/Nothing"),)), False),  # told when the route is opened
+        (BridgeConfig(selection=Selection(include=("*",))), True),  # nobody knows yet what
+    ):
+        assert may_send_bulk(config, types) is bulk, config
