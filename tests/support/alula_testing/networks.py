@@ -17,6 +17,7 @@ from __future__ import annotations
 import itertools
 import os
 import subprocess
+import sys
 import tempfile
 from collections.abc import Iterator
 from contextlib import ExitStack, contextmanager
@@ -35,6 +36,7 @@ NOWHERE = "02:00:00:00:00:fe"
 
 PROGRAMS = ("ip", "nsenter", "unshare", "setpriv")
 HOLD = "mount --bind $1 /etc/hosts && ip link set lo up && echo ready && exec sleep infinity"
+BAD_CABLE = Path(__file__).with_name("bad_cable.py")
 SEE_HOSTS = 'mount --bind $0 /etc/hosts && exec "$@"'
 _numbers = itertools.count(1)
 
@@ -62,6 +64,8 @@ class Computer:
     enter: tuple[str, ...]
     interface: str
     hardware: str
+    port: str
+    """Its end of the cable at the switch."""
     gone: set[str] = field(default_factory=set)
 
     def command(self, *words: str) -> list[str]:
@@ -136,8 +140,8 @@ class Network:
     def _connect(self, name: str, enter: tuple[str, ...], pid: str) -> Computer:
         number = len(self._computers) + 1
         interface = f"al{self._number:x}n{number}"
-        computer = Computer(name, self._address(number), enter, interface, f"02:00:00:00:00:{number:02x}")
         port = f"p{number}"
+        computer = Computer(name, self._address(number), enter, interface, f"02:00:00:00:00:{number:02x}", port)
         _run(*self._in(self._switch), "ip", "link", "add", port, "type", "veth", "peer", "name", interface, "netns", pid)
         for words in (("master", "switch"), ("up",)):
             _run(*self._in(self._switch), "ip", "link", "set", port, *words)
@@ -190,6 +194,42 @@ class Network:
                 self._lead(computer, other)  # forgotten with the address
                 self._lead(other, computer)
                 other.ip("neighbour", "replace", old, "lladdr", NOWHERE, "dev", other.interface, "nud", "permanent")
+
+    @contextmanager
+    def without_address(self, computer: Computer) -> Iterator[None]:
+        """Take a computer's address from it, as when its lease ends: it answers nothing, and what is open on it can send nothing.
+
+        No end of a connection is told that the other one can't be reached.
+        """
+        computer.ip("address", "delete", f"{computer.address}/24", "dev", computer.interface)
+        try:
+            yield
+        finally:
+            computer.ip("address", "add", f"{computer.address}/24", "dev", computer.interface)
+            for other in self._computers:
+                if other is not computer:
+                    self._lead(computer, other)  # forgotten with the address
+
+    @contextmanager
+    def bad_cable(self, computer: Computer, *, delay_s: float, loss: float, seed: int) -> Iterator[None]:
+        """Have a computer's cable lose this part of the frames, and delay the others, each way (``alula_testing.bad_cable``)."""
+        inside = self._in(self._switch)
+        port, cable, ends = computer.port, f"cable{computer.port}", (f"near{computer.port}", f"far{computer.port}")
+        words = [*END_WITH_PARENT, *inside, sys.executable, str(BAD_CABLE), *ends, str(delay_s), str(loss), str(seed)]
+        process = subprocess.Popen(words, stdout=subprocess.PIPE, text=True)
+        try:
+            assert process.stdout is not None
+            assert process.stdout.readline() == "ready\n"
+            _run(*inside, "ip", "link", "add", cable, "type", "bridge")
+            for end, bridge in ((ends[0], cable), (ends[1], "switch"), (port, cable)):
+                _run(*inside, "ip", "link", "set", end, "master", bridge, "up")
+            _run(*inside, "ip", "link", "set", cable, "up")
+            yield
+        finally:
+            _run(*inside, "ip", "link", "set", port, "master", "switch")
+            subprocess.run([*inside, "ip", "link", "delete", cable], check=False)  # where it came so far
+            process.kill()
+            process.wait()
 
     def wait_reached(self, sender: Computer, receiver: Computer) -> None:
         """Return when packets from one come back from the other; needs ``ping`` no more than a closed port does."""
