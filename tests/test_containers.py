@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import os
+import shutil
 import subprocess
 from pathlib import Path
 
@@ -41,6 +42,41 @@ def test_compose_starts_each_world_once_where_the_others_find_it(scenario: str) 
     for name in ("functional", "bridge"):  # ROS 1 nodes tell peers the name under which these reach them
         assert services[name]["environment"]["ROS_HOSTNAME"] == name
     assert {service["environment"]["ROS_MASTER_URI"] for service in services.values()} == {"http://functional:11311"}
+
+
+MODULES = "import importlib.util, sys; sys.exit(' '.join(one for one in sys.argv[1:] if importlib.util.find_spec(one) is None) or 0)"
+PARSED = (
+    "import sys; from skillset_ros2.mission import parse; import rclpy.utilities as ros; print(parse(ros.remove_ros_args(sys.argv)[1:]))"
+)
+
+
+@pytest.mark.parametrize("scenario", ["mapping", "inspection"])
+def test_what_the_skills_world_starts_is_there_and_takes_its_words(scenario: str, tmp_path: Path) -> None:
+    """The commands are noted by a checkout whose ``setup/in_ros2`` runs nothing; its mission ends after the managers have begun."""
+    checkout, noted, begun = tmp_path / "alula", tmp_path / "noted", tmp_path / "begun"
+    os.mkfifo(begun)
+    for folder in ("docker", "setup"):
+        (checkout / folder).mkdir(parents=True)
+    shutil.copy(ALULA_ROOT / "docker/world", checkout / "docker/world")
+    for name in ("setup/places.sh", "scenarios"):
+        (checkout / name).symlink_to(ALULA_ROOT / name)
+    handed = f'case "$3" in *.managers) echo begun > {begun} ;; *) read -r _ < {begun} ;; esac'
+    (checkout / "setup/in_ros2").write_text(f'#!/bin/sh\necho "$*" >> {noted}\n{handed}\n', encoding="utf-8")
+    (checkout / "setup/in_ros2").chmod(0o755)
+    environment = {**os.environ, "OUT": str(tmp_path / "out")}
+    done = subprocess.run(
+        [str(checkout / "docker/world"), "skills", scenario], env=environment, capture_output=True, text=True, check=False
+    )
+    assert done.returncode == 0, done.stderr
+    commands = {words[2]: words[3:] for words in (line.split() for line in noted.read_text(encoding="utf-8").splitlines())}
+    assert set(commands) == {"skillset_ros2.managers", "skillset_ros2.mission"}
+    hooks = [word.partition("=")[2].partition(":")[0] for word in commands["skillset_ros2.managers"] if word.endswith(":make_hooks")]
+    assert len(hooks) == 3
+    found = run("setup/in_ros2", "python", "-c", MODULES, *commands, *hooks)
+    assert (found.returncode, found.stderr) == (0, "")
+    parsed = run("setup/in_ros2", "python", "-c", PARSED, *commands["skillset_ros2.mission"])
+    assert (parsed.returncode, parsed.stderr) == (0, "")
+    assert f"scenario='{scenario}'" in parsed.stdout
 
 
 @pytest.mark.parametrize(
