@@ -5,6 +5,8 @@ from __future__ import annotations
 import sys
 from pathlib import Path
 
+from alula.common.deployments import DeploymentError, load_deployment
+from alula.common.robots import find_robot
 from alula.records.conformance import Monitor
 from alula.report.deaths import read_deaths
 from alula.report.ends import close_account
@@ -33,8 +35,19 @@ def finish(spec: RunSpec, mission_exit: int | None, monitor: Monitor | None = No
             died=[{"name": d.name, "when_s": d.when_s, "how": d.how, "again_s": d.again_s} for d in died],
             mission_exit=mission_exit,
             conformance=None if monitor is None else monitor.verdict.as_dict(),
+            recorded=is_recorded(spec),
         )
     )
     for line in verdict_lines(summary, died, out):
         sys.stdout.write(line + "\n")
     return mission_exit if mission_exit is not None else GIVEN_UP
+
+
+def is_recorded(spec: RunSpec) -> bool:
+    """Tell whether the functional layer is recorded in a run; on a deployment it need not be."""
+    if not spec.deployment:
+        return True
+    try:
+        return bool(load_deployment(spec.deployment, find_robot()).topics)
+    except DeploymentError:  # written anew since the run began
+        return True

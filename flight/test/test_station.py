@@ -32,6 +32,7 @@ from alula.runtime.live.spec import RequestError, RunSpec
 from alula_flight import attached as attachments
 from alula_flight.attached import AttachedSupervisor, PartsWatch
 from alula_flight.command_line import parse
+from alula_flight.outcome import is_recorded
 from alula_flight.run import CANNOT_START, main
 from alula_flight.station import keeper as keepers
 from alula_flight.station import service as services
@@ -163,6 +164,17 @@ def test_a_silence_of_what_has_none_in_its_model_begins_nothing(robot, capsys):
     assert commands(["up", "robot"]) == 2
     assert "`silence`: rover.lnk has no `silence` in its model; did you mean `rover.link`?" in capsys.readouterr().err
     assert not (robot / ".alula/up/robot" / states.FILE).exists()
+
+
+def test_a_run_is_recorded_unless_its_deployment_records_nothing(robot):
+    path = robot / "deployments/robot.yaml"
+    said = path.read_text(encoding="utf-8")
+    assert is_recorded(RunSpec("patrol", "/out", "id"))
+    assert is_recorded(RunSpec("patrol", "/out", "id", deployment="robot")), "its scaffold records some topics"
+    path.write_text(re.sub(r"^record:.*(\n .*)*", "", said, flags=re.MULTILINE), encoding="utf-8")
+    assert not is_recorded(RunSpec("patrol", "/out", "id", deployment="robot"))
+    path.write_text("nonsense: 1", encoding="utf-8")
+    assert is_recorded(RunSpec("patrol", "/out", "id", deployment="robot"))
 
 
 def test_the_bridges_configuration_is_the_robots_file_or_what_set_up_has_generated(deployment, places):

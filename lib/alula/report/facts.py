@@ -23,6 +23,7 @@ class RunFacts:
 
     ``mock``: flown in virtual time, over mocks or from a record, so there is neither a bag nor a world nor a map, and no bridge.
     ``replay_of``: the run whose decisions were made again. ``seed`` None: not known, of a replay.
+    ``recorded``: its functional layer was recorded; a deployment may record nothing, and then it is no problem that there is no bag.
     ``conformance``: what a monitor says of the events; None without one.
     """
 
@@ -35,3 +36,4 @@ class RunFacts:
     mock: bool = False
     replay_of: str = ""
     conformance: Mapping[str, object] | None = None
+    recorded: bool = True

@@ -303,6 +303,13 @@ def test_each_file_may_be_missing(folder, missing):
         assert summary["recovery"] == {"failure_s": None, "detected_s": 30.25, "fallback_running_s": 30.45, "moving_again_s": None}
 
 
+def test_that_a_deployment_records_nothing_is_no_problem(folder):
+    (folder / "functional.bag").unlink()
+    summary = make_report(facts(folder, recorded=False))
+    assert [problem for problem in summary["problems"] if "functional.bag" in problem] == []
+    assert (summary["min_clearance_m"], summary["lift_off"]["source"]) == (None, "flight_status")
+
+
 def test_a_crash_in_flight(folder):
     t_s, position = poses()
     half = t_s < LIFT_OFF_S + 40.0

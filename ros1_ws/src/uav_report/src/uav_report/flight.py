@@ -57,8 +57,9 @@ class FlightReport:
 
     def observe(self, run: ReportedRun) -> Observed:
         """Read the bag of the functional layer."""
-        with run.problems.survive("functional.bag"):
-            self._recording = read_recording(run.folder, run.problems)
+        if run.facts.recorded:
+            with run.problems.survive("functional.bag"):
+                self._recording = read_recording(run.folder, run.problems)
         recording = self._recording
         simulator, path, guidance = recording.simulator, recording.path, recording.guidance
         return Observed(

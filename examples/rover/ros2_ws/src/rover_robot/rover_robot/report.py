@@ -35,8 +35,12 @@ class RoverReport(parts.NoPart):
         if self._run.facts.mock:
             return parts.Findings({"distance_m": None}, tasks=tasks)
         collisions: int | None = None
-        with self._run.problems.survive(BAG):
-            self._way, collisions = _truth(str(self._run.folder / BAG))
+        bag = self._run.folder / BAG
+        if bag.exists():
+            with self._run.problems.survive(BAG):
+                self._way, collisions = _truth(str(bag))
+        elif self._run.facts.recorded:
+            self._run.problems.note(f"{BAG} is missing: nothing is known of the rover's true path")
         since = phases.zero_s
         away = [place[1:] for place in self._way if place[0] >= since]
         driven_m = round(sum(map(math.dist, away, away[1:])), 2) if away else None
