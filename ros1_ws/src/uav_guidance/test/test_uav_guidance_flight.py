@@ -8,7 +8,7 @@ import pytest
 from guidance_fake_autopilot import GUIDED, LOITER
 
 from uav_guidance.guidance import Guidance
-from uav_guidance.requests import HeadingRequest, HoverRequest, LandRequest, PositionRequest, TakeoffRequest
+from uav_guidance.requests import HeadingRequest, HoverRequest, LandRequest, PositionRequest, StopRequest, TakeoffRequest
 from uav_guidance.settings import GuidanceSettings
 from uav_guidance.vectors import Vec3
 
@@ -188,6 +188,30 @@ def test_landing_interrupted_by_hover_goes_back_to_guided(flying):
     assert flying.report.course.reference == "hover"
     assert flying.vehicle.enu[2] > 1.0
     assert flying.vehicle.body.mode == GUIDED
+
+
+def test_who_stops_it_lets_a_landing_go_on_and_anything_else_hover(flying):
+    flying.go(10.0, 0.0)
+    assert flying.agreed(StopRequest()).accepted
+    assert flying.report.course.reference == "hover"
+    landing = flying.agreed(LandRequest())
+    flying.run(1.0)
+    stopped = flying.ask(StopRequest())
+    assert (stopped.accepted, stopped.procedure, stopped.reference_id) == (True, None, landing.reference_id)
+    again = flying.ask(LandRequest())
+    assert (again.accepted, again.procedure, again.reference_id) == (True, None, landing.reference_id)
+    flying.until(lambda r: not r.vehicle.armed)
+    assert flying.report.course.reference == "land"
+    assert flying.ask(StopRequest()).accepted, "on the ground there is nothing to end"
+
+
+def test_who_stops_it_before_lift_off_gives_the_take_off_up(flight):
+    flight.until(lambda r: r.authority)
+    flight.agreed(TakeoffRequest(3.0, 1.5))
+    flight.run(1.0)
+    assert flight.agreed(StopRequest()).accepted
+    flight.run(5.0)
+    assert (flight.vehicle.body.armed, flight.report.course.reference) == (False, "idle")
 
 
 def test_still_counts_when_something_holds_the_vehicle(flying):

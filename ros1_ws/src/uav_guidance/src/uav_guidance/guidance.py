@@ -30,6 +30,7 @@ from uav_guidance.requests import (
     PositionRequest,
     Refusal,
     Request,
+    StopRequest,
     TakeoffRequest,
     check_fence,
     check_flying,
@@ -96,6 +97,7 @@ class Guidance:
             PositionRequest: self._set_position,
             HeadingRequest: self._set_heading,
             HoverRequest: self._hover,
+            StopRequest: self._stop,
             LandRequest: self._land,
             AuthorityRequest: self._take_authority,
         }
@@ -292,9 +294,18 @@ class Guidance:
         require(self.vehicle.located, "the autopilot does not say where it is")
         return self._accept(Hold(self._settings), self._to_guided(), now_s)
 
+    def _stop(self, _request: StopRequest, now_s: float) -> GuidanceDecision:
+        self._require_authority(now_s)
+        on_ground = self.vehicle.on_ground and not isinstance(self._follower.reference, Takeoff)
+        if on_ground or isinstance(self._follower.reference, Land):
+            return GuidanceDecision(accepted=True, reference_id=self._reference_id)
+        return self._hover(HoverRequest(), now_s)
+
     def _land(self, _request: LandRequest, now_s: float) -> GuidanceDecision:
         self._require_authority(now_s)
         require(self.vehicle.armed or self.vehicle.off_ground or isinstance(self._follower.reference, Takeoff), "on the ground already")
+        if self._procedure is None and self.vehicle.mode == Mode.LAND and isinstance(self._follower.reference, Land):
+            return GuidanceDecision(accepted=True, reference_id=self._reference_id)  # who watches this one goes on
         self._authority.ask_land()
         self._follower.heading.locked = False
         return self._accept(Land(), [set_mode(Mode.LAND)], now_s)

@@ -137,6 +137,7 @@ class GuidanceNode:
         ToldService("~set_position", SetPositionReference, self._set_position)
         ToldService("~set_heading", SetHeadingReference, self._set_heading)
         ToldService("~hover", Command, lambda _: self._ask(requests.HoverRequest(), CommandResponse))
+        ToldService("~stop", Command, lambda _: self._ask(requests.StopRequest(), CommandResponse))
         ToldService("~land", Command, lambda _: self._ask(requests.LandRequest(), CommandResponse))
         ToldService("~take_authority", Command, lambda _: self._ask(requests.AuthorityRequest(), CommandResponse))
         ToldService("~check_fence", CheckFence, self._check_fence)

@@ -48,6 +48,11 @@ class HoverRequest:
 
 
 @dataclass(frozen=True)
+class StopRequest:
+    """End what is not supervised any more: as a hover, but a landing under way goes on, and a vehicle on the ground has nothing to end."""
+
+
+@dataclass(frozen=True)
 class LandRequest:
     """Request to land at the present place; it has no parameters."""
 
@@ -57,7 +62,7 @@ class AuthorityRequest:
     """An operator wants the companion to have the vehicle (again)."""
 
 
-Request = TakeoffRequest | PositionRequest | HeadingRequest | HoverRequest | LandRequest | AuthorityRequest
+Request = TakeoffRequest | PositionRequest | HeadingRequest | HoverRequest | StopRequest | LandRequest | AuthorityRequest
 
 
 @dataclass(frozen=True)
