@@ -10,6 +10,9 @@ import shutil
 from pathlib import Path
 
 import pytest
+from rosbags.highlevel import AnyReader
+from rosbags.rosbag1 import Writer
+from rosbags.typesys import get_types_from_msg
 
 import alula.cli.replay
 from alula.cli.replay import CANNOT_REPLAY, OTHERWISE, SAME
@@ -84,6 +87,44 @@ def test_a_failure_that_was_not_flown_is_decided_as_the_one_that_was(depth, tmp_
     assert (changed["outcome"], changed["reason"].split(" (")[0]) == (then["outcome"], then["reason"].split(" (")[0])
     difference = json.loads((tmp_path / "changed/replay.json").read_text())["difference"]
     assert (difference["now"]["kind"], difference["now"]["skill"]) == ("interrupt", "goto_straight")
+
+
+def with_heartbeats(source: Path, target: Path, *, until_s: float, again_s: float) -> None:
+    """Copy a bag, with heartbeats of navigation's reporters, which are silent between two moments of mission clock."""
+    gap_ns = range(round(until_s * 1e9), round(again_s * 1e9))
+    with AnyReader([source]) as reader, Writer(target) as writer:
+        types = reader.typestore
+        kinds = {one.topic: one.msgtype for one in reader.connections}
+        made = {topic: writer.add_connection(topic, kind, typestore=types) for topic, kind in kinds.items()}
+        state, states = (f"skillset_interfaces/msg/{name}" for name in ("ResourceState", "ResourceStates"))
+        for name in (state, states):
+            text = (ALULA_ROOT / f"bridge/interfaces/{name}.msg").read_text(encoding="utf-8")
+            types.register(get_types_from_msg(text, name))
+        stamp = types.types["builtin_interfaces/msg/Time"](0, 0)
+        header = types.types["std_msgs/msg/Header"](0, stamp, "")
+        link = types.types[state]("link", "UP", "", 0, "")
+        beat = types.serialize_ros1(types.types[states](header, "", 0, "navigation", [link]), states)
+        beats, due_ns = writer.add_connection("/navigation/reported", states, typestore=types), 0
+        for connection, stamp_ns, raw in reader.messages():
+            if stamp_ns >= due_ns:
+                due_ns = stamp_ns + 500_000_000
+                if stamp_ns not in gap_ns:
+                    writer.write(beats, stamp_ns, beat)
+            writer.write(made[connection.topic], stamp_ns, raw)
+
+
+def test_a_reporter_that_falls_silent_in_the_bag_makes_its_resource_unknown(tmp_path, capsys):
+    pytest.importorskip("uav_msgs")
+    for name, until_s in (("whole", 1e6), ("silent", 14.0)):
+        run = Path(shutil.copytree(RECORDINGS / "mapping", tmp_path / name, ignore=shutil.ignore_patterns("functional.bag")))
+        with_heartbeats(RECORDINGS / "mapping/functional.bag", run / "functional.bag", until_s=until_s, again_s=until_s + 3.0)
+    assert main([str(tmp_path / "whole"), "--from", "functional"]) == SAME, capsys.readouterr().err
+    assert main([str(tmp_path / "silent"), "--from", "functional", "--out", str(tmp_path / "again")]) == OTHERWISE
+    assert "keep_link" in capsys.readouterr().err
+    events = [one for one in read_record(tmp_path / "again") if one.value.get("resource") == "link"]
+    assert [one.value["to_state"] for one in events] == ["UP", "UNKNOWN"]
+    assert 15.5 < events[-1].stamp_s <= 16.1, "two seconds after the last heartbeat"
+    assert events[-1].value["reason"] == "not heard of for 2 s"
 
 
 BRANCHES = [f'<SubTree ID="{name.lower()}_navigation" name="{name} navigation" _autoremap="true"/>' for name in ("ZED", "LiDAR")]

@@ -68,13 +68,21 @@ class StalenessWatch:
         with self._lock:
             return None if name in self._watched or name not in self._heard_ns else self._middleware.now_ns() - self._heard_ns[name]
 
+    def forget(self) -> None:
+        """Watch no source until it is heard of again."""
+        with self._lock:
+            self._heard_ns.clear()
+            self._watched.clear()
+
     def _look_at(self, name: str, stamp_ns: int, limit_ns: int) -> None:
         def look() -> None:
             with self._lock:
-                latest_ns = self._heard_ns[name]
-                stale = latest_ns <= stamp_ns
+                latest_ns = self._heard_ns.get(name)
+                stale = latest_ns is not None and latest_ns <= stamp_ns
                 if stale:
                     self._watched.discard(name)
+            if latest_ns is None:
+                return
             if stale:
                 self._on_stale(name)
             else:

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import traceback
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Iterable, Mapping
 
 from alula.model.json_form import to_json
 from alula.model.model import Skillset
@@ -59,6 +59,14 @@ class LocalManagers:
     def transition(self, resource: str, to: str, reason: str = "") -> TransitionReply:
         """Take an extern transition, or say why not; ``reason``: why the resource is so, in words."""
         return self._managers.resources.transition(resource, to, reason)
+
+    def heard(self, resources: Iterable[str]) -> None:
+        """Note that the reporter of these resources was heard of: one with a ``silence`` is unknown when it is not again within that."""
+        self._managers.resources.heard(resources)
+
+    def expect_nothing(self) -> None:
+        """Take it that no reporter will be heard of any more; nothing becomes unknown by that."""
+        self._managers.resources.expect_nothing()
 
     def publish(self, name: str, value: object) -> None:
         """Give a data a new value; raise KeyError when the model has no such data."""

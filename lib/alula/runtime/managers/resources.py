@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import threading
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import replace
 from typing import Any
 
@@ -88,13 +88,20 @@ class ResourceManager:
                 self._publish(self._middleware.now_ns())
 
     def _on_reported(self, reported: ResourceStates) -> None:
-        """Note the resources that a reporter says it reports."""
+        self.heard(reported.resources)
+
+    def heard(self, resources: Iterable[str]) -> None:
+        """Note that the reporter of these resources was heard of."""
         now_ns = self._middleware.now_ns()
-        for name in self._silences.keys() & reported.resources.keys():
+        for name in self._silences.keys() & set(resources):
             self._staleness.heard(name, now_ns, round((self._silences[name].silence_s or 0.0) * 1e9))
             told = self._silence_told.pop(name, None)
             if told is not None and self._engine.resources[name].reason == told:
                 self._note(name, self._silences[name].initial, "")
+
+    def expect_nothing(self) -> None:
+        """Take it that no reporter will be heard of any more, which makes nothing unknown: a record has no more to say."""
+        self._staleness.forget()
 
     def _tell_silence(self, name: str) -> None:
         """Take a silent resource back, and say for how long it was not heard of, again each second until it is."""

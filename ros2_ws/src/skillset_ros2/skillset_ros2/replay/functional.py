@@ -29,6 +29,7 @@ from alula.runtime.core.events import EngineEvent, ExecutionEvent
 from alula.runtime.core.execution import Execution
 from alula.runtime.hooks import SkillHooks
 from alula.runtime.local import LocalManagers
+from alula.runtime.middleware import REPORTED
 from skillset_ros2.convert import fill, values_of
 from skillset_ros2.replay.actions import RecordedActionClient
 from skillset_ros2.replay.bag import CALLS, MESSAGE, Call, begin_of, entries_of, read_bag, read_calls
@@ -169,6 +170,8 @@ class RecordedFunctions(ReplayedRobot):
         for call in read_calls(bag):
             if not call.service.endswith("/transition"):
                 self._calls.setdefault(call.service, deque()).append(call)
+        self._reporters = {f"/{one.name}/{REPORTED.name}": one.name for one in skillsets}
+        """The skillset that each topic of reporters' heartbeats is about."""
         for skillset in skillsets:
             for resource in skillset.resources:
                 self.robot.on_state(skillset.name, resource.name, resource.initial)
@@ -178,7 +181,7 @@ class RecordedFunctions(ReplayedRobot):
     @property
     def topics(self) -> set[str]:
         """What of the bag is to be read."""
-        return {CALLS, *self._subscribers}
+        return {CALLS, *self._reporters, *self._subscribers}
 
     def _serve(self, skillset: Skillset) -> None:
         name = skillset.name
@@ -235,6 +238,8 @@ class RecordedFunctions(ReplayedRobot):
         """Take note that the bag has no more to say."""
         super().over()
         self._silent = True
+        for managers in self.world.managers.values():
+            managers.expect_nothing()
 
     # --- what the bag tells ------------------------------------------------------------------------------------------
 
@@ -247,6 +252,8 @@ class RecordedFunctions(ReplayedRobot):
         message = entry.value[MESSAGE]
         if entry.topic == CALLS:
             self._take_transition(json.loads(message.data))
+        elif entry.topic in self._reporters:
+            self.world.managers[self._reporters[entry.topic]].heard([one.name for one in message.resources])
         for callback in self._subscribers.get(entry.topic, ()) if not self._silent else ():
             callback(message)
 
