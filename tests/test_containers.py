@@ -45,9 +45,7 @@ def test_compose_starts_each_world_once_where_the_others_find_it(scenario: str) 
 
 
 MODULES = "import importlib.util, sys; sys.exit(' '.join(one for one in sys.argv[1:] if importlib.util.find_spec(one) is None) or 0)"
-PARSED = (
-    "import sys; from skillset_ros2.mission import parse; import rclpy.utilities as ros; print(parse(ros.remove_ros_args(sys.argv)[1:]))"
-)
+PARSED = "import sys, rclpy.utilities as ros; from skillset_ros2.mission import parse; print(parse(ros.remove_ros_args(sys.argv)[1:]))"
 
 
 @pytest.mark.parametrize("scenario", ["mapping", "inspection"])
@@ -63,10 +61,8 @@ def test_what_the_skills_world_starts_is_there_and_takes_its_words(scenario: str
     handed = f'case "$3" in *.managers) echo begun > {begun} ;; *) read -r _ < {begun} ;; esac'
     (checkout / "setup/in_ros2").write_text(f'#!/bin/sh\necho "$*" >> {noted}\n{handed}\n', encoding="utf-8")
     (checkout / "setup/in_ros2").chmod(0o755)
-    environment = {**os.environ, "OUT": str(tmp_path / "out")}
-    done = subprocess.run(
-        [str(checkout / "docker/world"), "skills", scenario], env=environment, capture_output=True, text=True, check=False
-    )
+    words, environment = [str(checkout / "docker/world"), "skills", scenario], {**os.environ, "OUT": str(tmp_path / "out")}
+    done = subprocess.run(words, env=environment, capture_output=True, text=True, check=False)
     assert done.returncode == 0, done.stderr
     commands = {words[2]: words[3:] for words in (line.split() for line in noted.read_text(encoding="utf-8").splitlines())}
     assert set(commands) == {"skillset_ros2.managers", "skillset_ros2.mission"}

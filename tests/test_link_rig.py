@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import os
+from dataclasses import replace
 
 import pytest
 from link_rig.cases import CASES, run_case
@@ -26,7 +27,8 @@ def driven(*legs):
 
 
 def judged(poses, end=SURVIVED, **options):
-    return judge(CUT, end, poses, **{"collisions": 0, "silent_after_s": 2.0, **options})
+    beats = [0.5 * n for n in range(200)]
+    return judge(options.pop("fault", CUT), end, poses, **{"beats": beats, "collisions": 0, "silent_after_s": 2.0, **options})
 
 
 def test_a_rover_that_stops_in_time_and_goes_on_is_told_with_its_times():
@@ -35,7 +37,7 @@ def test_a_rover_that_stops_in_time_and_goes_on_is_told_with_its_times():
     assert verdict.moved_on_s == pytest.approx(2.0, abs=STEP_S)
     assert verdict.stood_s == pytest.approx(5.5, abs=STEP_S)
     assert verdict.went_on_s == pytest.approx(2.5, abs=STEP_S)
-    assert verdict.row == "| link cut for 5 s | 2.0 | 0 | 5.5 | 2.5 | accomplished | - |\n"
+    assert verdict.row == "| link cut for 5 s | 2.0 | 0.5 | 0 | 5.5 | 2.5 | accomplished | - |\n"
     assert verdict.row.count("|") == HEAD.splitlines()[0].count("|")
 
 
@@ -54,6 +56,17 @@ def test_a_pause_of_a_driving_rover_is_no_stop():
 def test_a_rover_that_moves_unsupervised_is_wrong(legs, told):
     (wrong,) = judged(driven(*legs)).wrong
     assert wrong == told
+
+
+def test_a_rover_that_moves_while_its_managers_are_not_heard_is_wrong_whatever_the_fault():
+    drives, fault = driven((0.5, 13.0), (0.0, 5.0), (0.5, 5.0)), replace(CUT, stops=False)
+    heard = judged(drives, fault=fault)
+    assert heard.wrong == ()
+    assert heard.unheard_s == pytest.approx(0.5, abs=STEP_S)
+    until_then = [0.5 * n for n in range(20)]
+    unheard = judged(drives, fault=fault, beats=[*until_then, 17.0, *(18.0 + 0.5 * n for n in range(20))])
+    assert unheard.wrong == ("it moved for 3.5 s while nothing was heard of its managers: 3 s are allowed",)
+    assert judged(drives, fault=fault, beats=[]).unheard_s == 0.0, "a supervision that has not begun"
 
 
 def test_turning_is_moving():

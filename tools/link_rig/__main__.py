@@ -14,7 +14,7 @@ from pathlib import Path
 
 from alula_testing.networks import why_impossible
 from link_rig.cases import CASES, run_case
-from link_rig.computers import ROVER
+from link_rig.computers import ROVER, RigError
 from link_rig.verdicts import HEAD
 
 
@@ -34,7 +34,12 @@ def main(words: Sequence[str] | None = None) -> int:
         with tempfile.TemporaryDirectory(prefix="link_rig_") as temporary:
             folder = given.keep.resolve() / name if given.keep else Path(temporary)
             folder.mkdir(parents=True, exist_ok=True)
-            verdict = run_case(CASES[name], folder)
+            try:
+                verdict = run_case(CASES[name], folder)
+            except RigError as error:
+                wrong = True
+                sys.stderr.write(f"link_rig: {name}: {error}\n")
+                continue
         wrong |= bool(verdict.wrong)
         sys.stdout.write(verdict.row)
         sys.stdout.flush()

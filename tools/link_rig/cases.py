@@ -10,6 +10,7 @@ from dataclasses import dataclass
 from pathlib import Path
 
 from alula_testing.waits import until
+from alula_testing.wall_clock import LIBRARY, WallClock
 from link_rig.computers import LOOK_S, Mission, RigError, TwoComputers, two_computers
 from link_rig.verdicts import End, Fault, Verdict, driving_since, judge
 
@@ -17,6 +18,10 @@ DRIVES_S = 2.0
 """So long, in simulated seconds, has it driven when the fault comes."""
 MISSION_S = 600.0
 """Wall clock; a mission that lasts longer hangs."""
+DELAY_S, LOSS, SEED = 0.3, 0.2, 1
+"""Of a bad link: each way, of each frame."""
+STEP_S = 3600
+"""By so much the wall clock is set forward, and back."""
 LINK = ("link", "heartbeat", "silent")
 """What a true cause of a lost link names one of."""
 Act = Callable[[TwoComputers, Mission], AbstractContextManager[None]]
@@ -27,6 +32,7 @@ class Case:
     """A fault, prepared by ``act`` and made by entering what that returns.
 
     It lasts ``lasts_s`` simulated seconds at least. ``again``: the mission can't survive it, and another one has to be accomplished.
+    ``stops``: as long as it lasts nobody can supervise the rover. ``sets_clock``: the decision side has a wall clock of its own.
     """
 
     name: str
@@ -34,6 +40,8 @@ class Case:
     lasts_s: float
     cause: tuple[str, ...]
     again: bool = False
+    stops: bool = True
+    sets_clock: bool = False
 
 
 def _cut(rig: TwoComputers, _mission: Mission) -> AbstractContextManager[None]:
@@ -46,6 +54,30 @@ def _to_base(rig: TwoComputers, _mission: Mission) -> AbstractContextManager[Non
 
 def _to_decision(rig: TwoComputers, _mission: Mission) -> AbstractContextManager[None]:
     return rig.network.cut(rig.base, rig.decision, one_way=True)
+
+
+def _address(rig: TwoComputers, _mission: Mission) -> AbstractContextManager[None]:
+    return rig.network.without_address(rig.decision)
+
+
+def _bad(rig: TwoComputers, _mission: Mission) -> AbstractContextManager[None]:
+    return rig.network.bad_cable(rig.decision, delay_s=DELAY_S, loss=LOSS, seed=SEED)
+
+
+@contextmanager
+def _master(rig: TwoComputers, _mission: Mission) -> Iterator[None]:
+    rig.kill_master()
+    yield
+    rig.start_master()
+
+
+@contextmanager
+def _clock(rig: TwoComputers, _mission: Mission) -> Iterator[None]:
+    if rig.clock is None:
+        raise RigError("the clock of the decision side can't be set")
+    rig.clock.step(STEP_S)
+    yield
+    rig.clock.step(-STEP_S)
 
 
 def _kill(part: str) -> Act:
@@ -69,10 +101,16 @@ def _reboot(rig: TwoComputers, _mission: Mission) -> Iterator[None]:
 
 
 CASES: Mapping[str, Case] = {
+    "cut-0.2": Case("link cut for 0.2 s", _cut, 0.2, LINK),
     "cut-5": Case("link cut for 5 s", _cut, 5.0, LINK),
     "cut-30": Case("link cut for 30 s", _cut, 30.0, LINK),
+    "cut-120": Case("link cut for 120 s", _cut, 120.0, LINK),
     "to-base": Case("nothing passes to the base for 30 s", _to_base, 30.0, LINK),
     "to-decision": Case("nothing passes to the decision side for 30 s", _to_decision, 30.0, LINK),
+    "half-open": Case("the decision computer without its address for 30 s", _address, 30.0, LINK),
+    "bad": Case(f"{LOSS:.0%} loss and {DELAY_S:g} s of delay each way for 30 s", _bad, 30.0, LINK, stops=False),
+    "master": Case("the ROS master killed, and another one after 5 s", _master, 5.0, ("master", *LINK), stops=False),
+    "clock": Case("the decision side's clock an hour ahead for 10 s", _clock, 10.0, (), stops=False, sets_clock=True),
     "bridge": Case("the bridge killed", _kill("bridge"), 0.0, ("bridge", *LINK)),
     "managers": Case("the managers killed", _kill("managers"), 0.0, ("managers", *LINK)),
     "mission": Case("the mission killed", _kill("mission"), 0.0, ("mission died",), again=True),
@@ -82,7 +120,9 @@ CASES: Mapping[str, Case] = {
 
 def run_case(case: Case, folder: Path) -> Verdict:
     """Run a whole mission with the fault while it drives; ``folder`` takes what is written. Judge it by the simulator's truth."""
-    with two_computers(folder) as rig:
+    if case.sets_clock and LIBRARY is None:
+        raise RigError("the clock of a computer can't be set here: apt install faketime")
+    with two_computers(folder, WallClock(folder) if case.sets_clock else None) as rig:
         mission = rig.start_mission()
         until(lambda: mission.ended or _drives(rig), "the rover drives", every_s=LOOK_S)
         if mission.ended:
@@ -93,9 +133,17 @@ def run_case(case: Case, folder: Path) -> Verdict:
             until(lambda: _now(rig) >= begun_s + case.lasts_s, "simulated time passes", MISSION_S, LOOK_S)
         ended_s = _now(rig)
         until(lambda: mission.ended, f"the mission ends ({folder})", MISSION_S, LOOK_S)
-        fault = Fault(case.name, begun_s, ended_s, case.cause)
+        fault = Fault(case.name, begun_s, ended_s, case.cause, case.stops)
         following = _one_more(rig) if case.again else None
-        return judge(fault, mission.end, rig.poses(), collisions=rig.collisions, silent_after_s=rig.silent_after_s, following=following)
+        return judge(
+            fault,
+            mission.end,
+            rig.poses(),
+            beats=rig.beats(),
+            collisions=rig.collisions,
+            silent_after_s=rig.silent_after_s,
+            following=following,
+        )
 
 
 def _one_more(rig: TwoComputers) -> End:

@@ -19,6 +19,7 @@ from alula.common.processes import node_name, processes_of_run
 from alula_testing.networks import Computer, Network
 from alula_testing.ros1 import end_process
 from alula_testing.waits import until
+from alula_testing.wall_clock import WallClock
 from link_rig.verdicts import End, Pose
 
 ALULA_ROOT = Path(__file__).resolve().parents[2]
@@ -27,6 +28,8 @@ LAUNCH = ROVER / "ros1_ws/src/rover_navigation/launch/functional.launch"
 WORLD = ROVER / "worlds/office.yaml"
 DEAD_MAN = ROVER / "ros1_ws/src/rover_navigation/config/dead_man.yaml"
 SKILLSETS = ("base", "perception", "power", "cargo")
+IN_ROS1 = str(ALULA_ROOT / "setup/in_ros1")
+MASTER_PORT = 11311
 LOOK_S = 0.1
 FOREIGN = ("ROS_", "ALULA_", "PYTHON", "AMENT", "CMAKE")
 """Variables of the caller that begin so are not the computers'."""
@@ -39,14 +42,15 @@ class RigError(Exception):
 class TwoComputers:
     """The rover's base on one computer and its decision side on the other."""
 
-    def __init__(self, network: Network, folder: Path) -> None:
-        """Take two computers of a network; ``folder`` takes what they write."""
+    def __init__(self, network: Network, folder: Path, clock: WallClock | None = None) -> None:
+        """Take two computers of a network; ``folder`` takes what they write, ``clock`` is the decision side's where that is to be set."""
         self.network, self.folder = network, folder
         self.base, self.decision = network.computer("base"), network.computer("decision")
         self._inside = {one.name: _namespace(_holder(one)) for one in (self.base, self.decision)}  # also told once the holder has died
         self._claim = claim_domain()  # of this machine, as shared memory is
         self._name = f"link_rig_{os.getpid()}"
         self._deployment = ROVER / f"deployments/{self._name}.yaml"
+        self.clock = clock
         self._processes: list[subprocess.Popen[bytes]] = []
         self._truth = folder / "truth.jsonl"
         self._missions = 0
@@ -58,16 +62,31 @@ class TwoComputers:
 
     def start_base(self) -> None:
         """Start master, simulator and functional layer, and the watch of the truth."""
-        environment = {**self._environment(), "ALULA_ROBOT": str(ROVER), "ROS_HOME": str(self.folder / "ros")}
-        ros1 = self.base.ros1_environment(self.base)
-        environment |= {name: ros1[name] for name in ("ROS_MASTER_URI", "ROS_IP")}
-        in_ros1 = str(ALULA_ROOT / "setup/in_ros1")
-        base = self._start("base", self.base, [in_ros1, "roslaunch", "-p", "11311", str(LAUNCH), f"world:={WORLD}"], environment)
+        self.start_master()
+        base = self._start("base", self.base, [IN_ROS1, "roslaunch", str(LAUNCH), f"world:={WORLD}"], self._base_environment)
         watch = Path(__file__).with_name("truth_watch.py")
-        self._start("truth", self.base, [in_ros1, "python3", str(watch), str(self._truth)], environment)
+        self._start("truth", self.base, [IN_ROS1, "python3", str(watch), str(self._truth)], self._base_environment)
         until(lambda: self.poses() or base.poll() is not None, f"the rover's simulator tells where it is ({self.folder})", every_s=LOOK_S)
         if base.poll() is not None:
             raise RigError(f"the base ended with {base.returncode}: {self.folder / 'base.log'}")
+
+    def start_master(self) -> None:
+        """Start the ROS master of the base, which knows of no node."""
+        words = [IN_ROS1, "rosmaster", "--core", "-p", str(MASTER_PORT)]
+        self._master = self._start("master", self.base, words, self._base_environment)
+        probe = self.base.command("bash", "-c", f"exec 3<>/dev/tcp/{self.base.address}/{MASTER_PORT}")
+        until(lambda: subprocess.run(probe, capture_output=True, check=False).returncode == 0, "the master answers", every_s=LOOK_S)
+
+    def kill_master(self) -> None:
+        """Kill the ROS master."""
+        self._master.kill()
+        self._master.wait()
+
+    @property
+    def _base_environment(self) -> dict[str, str]:
+        ros1 = self.base.ros1_environment(self.base, port=MASTER_PORT)
+        graph = {name: ros1[name] for name in ("ROS_MASTER_URI", "ROS_IP")}
+        return {**_own_environment(), "ALULA_ROBOT": str(ROVER), "ROS_HOME": str(self.folder / "ros"), **graph}
 
     @property
     def silent_after_s(self) -> float:
@@ -83,6 +102,15 @@ class TwoComputers:
         """Return where the rover truly was until now."""
         return [Pose(**one) for one in self._told() if "x" in one]
 
+    def beats(self) -> list[float]:
+        """Return when a heartbeat of the managers that move it came to the base, simulated time."""
+        beats, now_s = [], 0.0
+        for one in self._told():
+            now_s = float(one.get("stamp_s", now_s))
+            if "beat" in one:
+                beats.append(now_s)
+        return beats
+
     def _told(self) -> list[dict[str, Any]]:
         if not self._truth.exists():
             return []
@@ -96,7 +124,7 @@ class TwoComputers:
         self._deployment.parent.mkdir(exist_ok=True)
         lines = [
             "about: of a test, which removes it",
-            f"ros1: {{master: 'http://{self.base.address}:11311', address: {self.decision.address}}}",
+            f"ros1: {{master: 'http://{self.base.address}:{MASTER_PORT}', address: {self.decision.address}}}",
             f"ros2: {{domain: {self._claim.domain}}}",
             "managers:",
             *(f"  {name}: rover_robot.hooks.{name}:make_hooks" for name in SKILLSETS),
@@ -128,7 +156,7 @@ class TwoComputers:
         return ["env", "-C", str(ROVER), str(ALULA_ROOT / "alula"), *words]
 
     def _environment(self) -> dict[str, str]:
-        return {name: value for name, value in os.environ.items() if not name.startswith(FOREIGN)}
+        return {**_own_environment(), **({} if self.clock is None else self.clock.variables)}
 
     # --- both --------------------------------------------------------------------------------------------------------
 
@@ -194,6 +222,10 @@ class Mission:
         return End(str(said["outcome"]), "; ".join([*([said["reason"]] if said["reason"] else []), *died]))
 
 
+def _own_environment() -> dict[str, str]:
+    return {name: value for name, value in os.environ.items() if not name.startswith(FOREIGN)}
+
+
 def _holder(computer: Computer) -> int:
     """Return the process that keeps a computer's network there."""
     return int(computer.enter[1].partition("=")[2])
@@ -204,10 +236,10 @@ def _namespace(pid: int) -> Path:
 
 
 @contextmanager
-def two_computers(folder: Path) -> Iterator[TwoComputers]:
-    """Have the base run and the decision side be up."""
+def two_computers(folder: Path, clock: WallClock | None = None) -> Iterator[TwoComputers]:
+    """Have the base run and the decision side be up; ``clock`` is the decision side's, where that is to be set."""
     with Network() as network:
-        rig = TwoComputers(network, folder)
+        rig = TwoComputers(network, folder, clock)
         try:
             rig.start_base()
             rig.up()

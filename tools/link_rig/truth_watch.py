@@ -1,7 +1,8 @@
 """A node of ROS 1 beside the rover's simulator: writes down where the rover truly is, a JSON line a pose: ``truth_watch FILE``.
 
 ``{"at_s", "stamp_s", "x", "y", "theta"}``: monotonic clock of the machine and simulated time (s), metres and radians in the world's frame;
-a line ``{"at_s", "collisions"}`` at each word of the simulator's state.
+a line ``{"at_s", "collisions"}`` at each word of the simulator's state, and ``{"at_s", "beat": true}`` at each heartbeat of the managers
+that move the rover, as it comes to the base.
 """
 
 from __future__ import annotations
@@ -24,6 +25,7 @@ def main() -> None:
     with Path(rospy.myargv(sys.argv)[1]).open("w", buffering=1, encoding="utf-8") as file:
         rospy.Subscriber("/truth/odom", Odometry, lambda told: _write(file, **_pose_of(told)))
         rospy.Subscriber("/truth/state", String, lambda told: _write(file, collisions=json.loads(told.data)["collisions"]))
+        rospy.Subscriber("/base/alive", rospy.AnyMsg, lambda _: _write(file, beat=True), tcp_nodelay=True)
         rospy.spin()
 
 

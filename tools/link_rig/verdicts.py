@@ -12,7 +12,16 @@ STILL_M_S, STILL_RAD_S = 0.02, 0.05
 """A robot that moves and turns no faster stands."""
 MARGIN_S = 1.0
 """So much longer than the dead man's limit may it move, simulated seconds: a beat that is under way, and the way to a stop."""
-COLUMNS = ("fault", "moved on for, s", "collisions", "stood for, s", "went on after its end, s", "mission", "cause it says")
+COLUMNS = (
+    "fault",
+    "moved on for, s",
+    "unheard for, s",
+    "collisions",
+    "stood for, s",
+    "went on after its end, s",
+    "mission",
+    "cause it says",
+)
 HEAD = f"| {' | '.join(COLUMNS)} |\n{'|---' * len(COLUMNS)}|\n"
 
 
@@ -29,12 +38,16 @@ class Pose:
 
 @dataclass(frozen=True)
 class Fault:
-    """What was done, between two moments of simulated time; ``cause``: words of which a mission that is not accomplished names one."""
+    """What was done, between two moments of simulated time; ``cause``: words of which a mission that is not accomplished names one.
+
+    ``stops``: as long as it lasts nobody can supervise the robot, so that it has to stand.
+    """
 
     name: str
     begun_s: float
     ended_s: float
     cause: tuple[str, ...]
+    stops: bool = True
 
 
 @dataclass(frozen=True)
@@ -51,6 +64,7 @@ class Verdict:
 
     Attributes:
         moved_on_s: from the fault's begin until it stood.
+        unheard_s: the longest time for which it moved while nothing was heard of who supervises it.
         stood_s: how long it then stood.
         went_on_s: from the fault's end until it moved again; negative: it moved before that.
         collisions: how often it ran into something.
@@ -60,6 +74,7 @@ class Verdict:
     fault: Fault
     end: End
     moved_on_s: float | None
+    unheard_s: float
     stood_s: float | None
     went_on_s: float | None
     collisions: int
@@ -71,6 +86,7 @@ class Verdict:
         cells = (
             self.fault.name,
             _seconds(self.moved_on_s),
+            _seconds(self.unheard_s),
             str(self.collisions),
             _seconds(self.stood_s),
             _seconds(self.went_on_s),
@@ -81,7 +97,14 @@ class Verdict:
 
 
 def judge(
-    fault: Fault, end: End, poses: Sequence[Pose], *, collisions: int, silent_after_s: float, following: End | None = None
+    fault: Fault,
+    end: End,
+    poses: Sequence[Pose],
+    *,
+    beats: Sequence[float],
+    collisions: int,
+    silent_after_s: float,
+    following: End | None = None,
 ) -> Verdict:
     """Judge a mission by where the robot truly was.
 
@@ -89,6 +112,7 @@ def judge(
         fault: what was done meanwhile.
         end: how the mission ended.
         poses: where the robot was, in the order of time.
+        beats: when a heartbeat of who supervises it came to the base, simulated time.
         collisions: how often it ran into something.
         silent_after_s: the limit of the base's dead man, simulated seconds.
         following: how the mission after it ended, where there was one: it has to be accomplished.
@@ -97,8 +121,11 @@ def judge(
     moved_on_s = None if stood is None else max(0.0, stood[0] - fault.begun_s)
     goes_on = stood is not None and math.isfinite(stood[1])
     limit_s = silent_after_s + MARGIN_S
-    lasted_s = fault.ended_s - fault.begun_s
+    lasted_s = fault.ended_s - fault.begun_s if fault.stops else 0.0
+    unheard_s = _moved_unheard(poses, beats)
     wrong = []
+    if unheard_s > limit_s:
+        wrong.append(f"it moved for {unheard_s:.1f} s while nothing was heard of its managers: {limit_s:g} s are allowed")
     if lasted_s > limit_s and (moved_on_s is None or moved_on_s > limit_s):
         told = "all the time" if moved_on_s is None else f"for {moved_on_s:.1f} s"
         wrong.append(f"it moved on {told}: {limit_s:g} s are allowed")
@@ -114,6 +141,7 @@ def judge(
         fault,
         end,
         moved_on_s,
+        unheard_s,
         stood[1] - stood[0] if stood is not None and goes_on else None,
         stood[1] - fault.ended_s if stood is not None and goes_on else None,
         collisions,
@@ -129,15 +157,31 @@ def driving_since(poses: Sequence[Pose]) -> float | None:
     return None
 
 
+def _moved_unheard(poses: Sequence[Pose], beats: Sequence[float]) -> float:
+    """Return the longest time from a heartbeat to a moment at which the robot still moved, no other one having come, seconds."""
+    longest_s, index = 0.0, -1
+    for before, pose in pairwise(poses):
+        while index + 1 < len(beats) and beats[index + 1] <= before.stamp_s:
+            index += 1
+        if index >= 0 and _moves(before, pose):
+            longest_s = max(longest_s, pose.stamp_s - beats[index])
+    return longest_s
+
+
+def _moves(before: Pose, pose: Pose) -> bool:
+    """Tell whether the robot moved or turned between two moments."""
+    lasted_s = pose.stamp_s - before.stamp_s
+    moves = math.hypot(pose.x - before.x, pose.y - before.y) > STILL_M_S * lasted_s
+    return moves or abs(math.remainder(pose.theta - before.theta, math.tau)) > STILL_RAD_S * lasted_s
+
+
 def _pauses(poses: Sequence[Pose]) -> Iterator[tuple[float, float]]:
     """Return from when until when the robot stood, simulated time; the last one ends at infinity where it stands at the end."""
     begun_s: float | None = None
     for before, pose in pairwise(poses):
-        lasted_s = pose.stamp_s - before.stamp_s
-        if lasted_s <= 0.0:
+        if pose.stamp_s <= before.stamp_s:
             continue
-        moves = math.hypot(pose.x - before.x, pose.y - before.y) > STILL_M_S * lasted_s
-        moves = moves or abs(math.remainder(pose.theta - before.theta, math.tau)) > STILL_RAD_S * lasted_s
+        moves = _moves(before, pose)
         if not moves and begun_s is None:
             begun_s = before.stamp_s
         elif moves and begun_s is not None:

@@ -32,7 +32,7 @@ def make_tap(name: str) -> int:
 
 def carry(taps: list[int], delay_s: float, loss: float, chance: random.Random) -> None:
     """Carry frames between two taps until the process is ended."""
-    others = dict(zip(taps, reversed(taps)))
+    others = dict(zip(taps, reversed(taps), strict=True))
     waiting: deque[tuple[float, int, bytes]] = deque()
     while True:
         wait_s = max(0.0, waiting[0][0] - time.monotonic()) if waiting else None
@@ -54,7 +54,7 @@ def main(names: list[str], delay_s: float, loss: float, seed: int) -> None:
     taps = [make_tap(name) for name in names]
     sys.stdout.write("ready\n")
     sys.stdout.flush()
-    carry(taps, delay_s, loss, random.Random(seed))
+    carry(taps, delay_s, loss, random.Random(seed))  # noqa: S311
 
 
 if __name__ == "__main__":
