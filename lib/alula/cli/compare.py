@@ -35,7 +35,8 @@ def main(arguments: Sequence[str] | None = None) -> int:
     """Compare; return the exit code."""
     given = parse(sys.argv[1:] if arguments is None else arguments)
     try:
-        compared = compare([load_side(path, name) for path, name in zip(given.runs, names(given.runs), strict=True)])
+        sides = [load_side(path, name) for path, name in zip(given.runs, names(given.runs), strict=True)]
+        compared = compare(sides, given.within)
         if given.svg is not None:
             from alula.records.comparing.picture import draw  # late: matplotlib takes a moment
 

@@ -65,6 +65,11 @@ def json_option(parser: argparse.ArgumentParser, what: str) -> None:
     parser.add_argument("--json", action="store_true", help=f"print {what} as JSON, an object a line")
 
 
+def within_option(parser: argparse.ArgumentParser, what: str) -> None:
+    """Add ``--within SECONDS``."""
+    parser.add_argument("--within", type=_seconds, metavar="SECONDS", help=what)
+
+
 def time_option(parser: argparse.ArgumentParser, default_s: float, what: str) -> None:
     """Add ``--time SECONDS``; ``what`` it limits, as the help says it."""
     words = f"time limit{what} (default {default_s:g})"

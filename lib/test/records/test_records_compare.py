@@ -13,7 +13,8 @@ from alula.cli.compare import main
 from alula.common import run_log
 from alula.common.faults import parse_fault
 from alula.common.robots import find_robot
-from alula.records.comparing.telling import spread
+from alula.records.comparing import ComparedDecision, Side, compare
+from alula.records.comparing.telling import lines, spread
 from alula.runtime.core.events import event_record
 
 
@@ -48,6 +49,43 @@ def test_another_flight_is_told_with_its_first_other_decision_and_its_figures(fo
     text = "".join(ET.parse(picture).getroot().itertext())  # noqa: S314 - our own
     assert "zed-fails: degraded" in text
     assert "perception.lidar_depthmap" in text
+
+
+def decided(name, *decisions):
+    return Side(name, "degraded", [ComparedDecision(what, at_s) for what, at_s in decisions], [], {}, {})
+
+
+FIRST = decided("first", ("start a.x", 1.0), ("start b.y", 2.0), ("interrupt a.x", 9.0), ("start a.x", 10.0))
+
+
+@pytest.mark.parametrize(
+    ("decisions", "at", "told"),
+    [
+        ([("start b.y", 1.4), ("start a.x", 1.6), ("interrupt a.x", 9.9), ("start a.x", 10.9)], None, ""),
+        ([("start a.x", 1.0), ("start b.y", 2.0), ("interrupt a.x", 10.1), ("start a.x", 10.2)], 2, "interrupt a.x at 10.10 s in other"),
+        ([("start a.x", 1.0), ("start b.y", 2.0), ("interrupt a.x", 9.0)], 3, "start a.x at 10.00 s in first; nothing more in other"),
+        ([*((one.what, one.at_s) for one in FIRST.decisions), ("start c.z", 11.0)], 4, "nothing more in first; start c.z at 11.00 s"),
+        ([("start a.x", 0.0), ("start a.x", 1.0), ("start b.y", 2.0), ("interrupt a.x", 9.0)], 3, "start a.x at 10.00 s in first"),
+        ([], 0, "start a.x at 1.00 s in first; nothing more in other"),
+    ],
+    ids=["places", "late", "missing", "more", "earlier", "none"],
+)
+def test_decisions_within_seconds_may_change_places(decisions, at, told):
+    """The k-th time that something is decided is held against the k-th time in the first run."""
+    compared = compare([FIRST, decided("other", *decisions)], 1.0)
+    assert [one and one.at for one in compared.differences] == [at]
+    assert told in "\n".join(lines(compared))
+    assert compare([FIRST, FIRST], 0.0).alike
+
+
+def test_the_command_takes_seconds(folders, capsys):
+    pair = [str(folders["nominal"]), str(folders["again"])]
+    assert main([*pair, "--within", "0.5"]) == 0
+    assert "same decisions within 0.5 s: " in capsys.readouterr().out
+    assert main([str(folders["nominal"]), str(folders["zed-fails"]), "--within", "0.5", "--json"]) == 1
+    assert json.loads(capsys.readouterr().out)["within_s"] == 0.5
+    with pytest.raises(SystemExit, match="2"):
+        main([*pair, "--within", "nan"])
 
 
 def test_json_has_every_figure_and_decision(folders, capsys):

@@ -5,7 +5,7 @@ from __future__ import annotations
 from argparse import ArgumentParser
 from pathlib import Path
 
-from alula.cli.parser import completed_by, json_option, time_option
+from alula.cli.parser import completed_by, json_option, time_option, within_option
 
 FAULT = "WHAT[:HOW][@SECONDS[-SECONDS]]"
 ANSWERS_S = 120.0
@@ -139,6 +139,7 @@ def compare(parser: ArgumentParser) -> None:
     parser.add_argument("runs", type=Path, nargs="+", metavar="RUN", help="two or more folders of runs, or logs")
     json_option(parser, "the comparison")
     parser.add_argument("--svg", type=Path, metavar="FILE", help="also draw the skills of all runs over time")
+    within_option(parser, "each decision may come sooner or later than in the first run by so much, and change places (default: in order)")
 
 
 def campaign(parser: ArgumentParser) -> None:

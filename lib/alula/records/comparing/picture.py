@@ -37,9 +37,9 @@ def _timeline(compared: Compared) -> Figure:
         for skill, begin_s, end_s in side.spans:
             axes.barh(skills.index(skill) * height + number, max(end_s - begin_s, 0.05), 0.85, begin_s, color=COLOURS[number], linewidth=0)
         axes.barh([0], [0], color=COLOURS[number], label=f"{side.name}: {side.outcome or 'outcome not known'}")
-        at = compared.differs_at[number - 1] if number else None
-        if at is not None and at < len(side.decisions):
-            axes.axvline(side.decisions[at].at_s, color=COLOURS[number], linestyle="--", linewidth=1.0)
+        difference = compared.differences[number - 1] if number else None
+        if difference is not None and difference.other is not None:
+            axes.axvline(difference.other.at_s, color=COLOURS[number], linestyle="--", linewidth=1.0)
     axes.set_yticks([row * height + (len(sides) - 1) / 2 for row in range(len(skills))], skills)
     axes.invert_yaxis()
     axes.set_xlabel("seconds since the departure; dashed: the first decision that is not that of the first run")

@@ -3,8 +3,10 @@
 from __future__ import annotations
 
 import json
+from collections import Counter
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
+from functools import partial
 from itertools import zip_longest
 from pathlib import Path
 from typing import Any
@@ -59,16 +61,32 @@ class Side:
 
 
 @dataclass(frozen=True)
+class Difference:
+    """Where a run decides otherwise than the first one.
+
+    Attributes:
+        at: the number of the decision, in the run that has it: the first one, where both do.
+        first: that of the first run; None: it has none more.
+        other: that of the other one; None: it has none more.
+    """
+
+    at: int
+    first: ComparedDecision | None
+    other: ComparedDecision | None
+
+
+@dataclass(frozen=True)
 class Compared:
-    """The runs, and for each but the first where it decides otherwise than the first: the number of the decision, None: nowhere."""
+    """The runs, and for each but the first where it decides otherwise than the first, None: nowhere; ``within_s``: as `compare`."""
 
     sides: Sequence[Side]
-    differs_at: Sequence[int | None]
+    differences: Sequence[Difference | None]
+    within_s: float | None = None
 
     @property
     def alike(self) -> bool:
         """Tell whether all have decided the same."""
-        return all(at is None for at in self.differs_at)
+        return not any(self.differences)
 
     @property
     def units(self) -> Mapping[str, str]:
@@ -91,15 +109,43 @@ def load_side(path: Path, name: str) -> Side:
     return Side(name, run.outcome, decisions_of(run), list(_spans(run)), figures, {name: unit for name, (_, unit) in known.items()})
 
 
-def compare(sides: Sequence[Side]) -> Compared:
-    """Hold the decisions of each run against those of the first."""
-    first = [decision.what for decision in sides[0].decisions]
-    return Compared(sides, [_first_difference(first, [decision.what for decision in side.decisions]) for side in sides[1:]])
+def compare(sides: Sequence[Side], within_s: float | None = None) -> Compared:
+    """Hold the decisions of each run against those of the first.
+
+    They have to come in the same order, whenever they do. With ``within_s`` they have to come when those of the first do, sooner or later
+    by so many seconds at most: each time a skill is started or interrupted against the same time in the first run. Decisions about
+    several skills may then change places as far as these times let them, which they do in runs of different trees.
+    """
+    first = sides[0].decisions
+    differ = _in_order if within_s is None else partial(_at_about_the_same_time, within_s=within_s)
+    return Compared(sides, [differ(first, side.decisions) for side in sides[1:]], within_s)
 
 
-def _first_difference(ours: Sequence[str], theirs: Sequence[str]) -> int | None:
+def _in_order(ours: Sequence[ComparedDecision], theirs: Sequence[ComparedDecision]) -> Difference | None:
     pairs = enumerate(zip_longest(ours, theirs))
-    return next((at for at, (one, other) in pairs if one != other), None)
+    differences = (Difference(at, one, other) for at, (one, other) in pairs if one is None or other is None or one.what != other.what)
+    return next(differences, None)
+
+
+def _at_about_the_same_time(ours: Sequence[ComparedDecision], theirs: Sequence[ComparedDecision], within_s: float) -> Difference | None:
+    mine, others = _numbered(ours), _numbered(theirs)
+    found: list[tuple[float, Difference]] = []
+    for key, (at, one) in mine.items():
+        _, other = others.get(key, (0, None))
+        if other is None or abs(other.at_s - one.at_s) > within_s:
+            found.append((one.at_s, Difference(at, one, other)))
+    found += [(other.at_s, Difference(at, None, other)) for key, (at, other) in others.items() if key not in mine]
+    return min(found, key=lambda one: one[0], default=(0.0, None))[1]
+
+
+def _numbered(decisions: Sequence[ComparedDecision]) -> dict[tuple[str, int], tuple[int, ComparedDecision]]:
+    """Return each decision with its number, by what it is, and how often that has been decided before."""
+    seen = Counter[str]()
+    found: dict[tuple[str, int], tuple[int, ComparedDecision]] = {}
+    for at, one in enumerate(decisions):
+        found[one.what, seen[one.what]] = at, one
+        seen[one.what] += 1
+    return found
 
 
 def decisions_of(run: RecordedRun) -> list[ComparedDecision]:

@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Iterator, Sequence
 from statistics import median
 
-from alula.records.comparing.sides import Compared, Side
+from alula.records.comparing.sides import Compared, ComparedDecision, Side
 
 SIDE_BY_SIDE = 6
 """More runs than these are shown as distributions."""
@@ -23,7 +23,14 @@ def as_dict(compared: Compared) -> dict[str, object]:
         {"run": side.name, "outcome": side.outcome, "figures": dict(side.figures), "decisions": _plain(side)} for side in compared.sides
     ]
     distributions = {name: spread(values) for name, values in _known(compared).items()}
-    return {"alike": compared.alike, "differs_at": list(compared.differs_at), "runs": sides, "distributions": distributions}
+    differs_at = [one and one.at for one in compared.differences]
+    return {
+        "alike": compared.alike,
+        "within_s": compared.within_s,
+        "differs_at": differs_at,
+        "runs": sides,
+        "distributions": distributions,
+    }
 
 
 def _plain(side: Side) -> list[dict[str, object]]:
@@ -75,14 +82,14 @@ def _decisions(compared: Compared) -> Iterator[str]:
     """Yield where each run decides otherwise than the first."""
     first = compared.sides[0]
     if compared.alike:
-        yield f"same decisions: {len(first.decisions)} decisions"
-    for side, at in zip(compared.sides[1:], compared.differs_at, strict=True):
-        if at is not None:
-            yield f"decision {at + 1} differs: {_told(first, at)}; {_told(side, at)}"
+        within = "" if compared.within_s is None else f" within {compared.within_s:g} s"
+        yield f"same decisions{within}: {len(first.decisions)} decisions"
+    for side, one in zip(compared.sides[1:], compared.differences, strict=True):
+        if one is not None:
+            yield f"decision {one.at + 1} differs: {_told(first, one.first)}; {_told(side, one.other)}"
 
 
-def _told(side: Side, at: int) -> str:
-    if at >= len(side.decisions):
+def _told(side: Side, decision: ComparedDecision | None) -> str:
+    if decision is None:
         return f"nothing more in {side.name}"
-    decision = side.decisions[at]
     return f"{decision.what} at {decision.at_s:.2f} s in {side.name}"
