@@ -15,6 +15,7 @@ from genpy.message import fill_message_args
 from ros_bridge_peer_loop import report, run
 
 KEEP = []
+LET_GO = threading.Event()
 
 
 def serialized(message):
@@ -155,7 +156,7 @@ def connections(topic):
 
 
 def serve(service, type, behaviour, seconds=0.0):  # noqa: A002
-    """Behaviours: echo, raise, slow, die."""
+    """Behaviours: echo, raise, slow (by ``seconds``), held (until ``let_go``), die."""
     service_class = roslib.message.get_service_class(type)
 
     def handle(request):
@@ -164,6 +165,8 @@ def serve(service, type, behaviour, seconds=0.0):  # noqa: A002
             raise ValueError("the handler is broken")
         if behaviour == "die":
             os._exit(1)
+        if behaviour == "held":
+            LET_GO.wait()
         threading.Event().wait(seconds)
         return filled(service_class._response_class(), {"success": request.data, "message": "from ROS 1"})
 
@@ -200,6 +203,7 @@ COMMANDS = {
     "play": play,
     "connections": connections,
     "serve": serve,
+    "let_go": LET_GO.set,
     "call": call,
 }
 

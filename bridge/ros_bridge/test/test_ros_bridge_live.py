@@ -16,6 +16,7 @@ topics:
 services:
   - {name: /bt/in_ros1, server: ros1, type: std_srvs/SetBool, timeout_s: 4.0}
   - {name: /bt/in_ros1_hasty, server: ros1, type: std_srvs/SetBool, timeout_s: 0.5}
+  - {name: /bt/held, server: ros1, type: std_srvs/SetBool, timeout_s: 60.0}
   - {name: /bt/in_ros1_plain, server: ros1, type: std_srvs/Empty, timeout_s: 0.5}
   - {name: /bt/in_ros2, server: ros2, type: std_srvs/SetBool, timeout_s: 4.0}
   - {name: /bt/in_ros2_hasty, server: ros2, type: std_srvs/SetBool, timeout_s: 0.5}
@@ -107,14 +108,14 @@ def test_ros1_client_gets_an_error_when_the_ros2_server_raises_or_goes(ros1, ros
 
 
 def test_slow_services_stall_no_topic(ros1, ros2, master):
-    """While two calls of 2 s are under way, each message of a topic arrives before the next one is sent."""
+    """While two calls are under way, each message of a topic arrives before the next one is sent."""
     slow = Ros1Peer(master)
-    slow.do("serve", service="/bt/in_ros1", type="std_srvs/SetBool", behaviour="slow", seconds=2.0)
+    slow.do("serve", service="/bt/held", type="std_srvs/SetBool", behaviour="held")
     slow.do("subscribe", topic="/bt/down", type="std_msgs/String")
     publisher = ros2.publisher("/bt/down", String, 200)
     wait_ros1_receives(slow, publisher, "/bt/down")
     replies: list = []
-    callers = [threading.Thread(target=lambda: replies.append(ros2.call("/bt/in_ros1", SetBool, SetBool.Request()))) for _ in range(2)]
+    callers = [threading.Thread(target=lambda: replies.append(ros2.call("/bt/held", SetBool, SetBool.Request()))) for _ in range(2)]
     for caller in callers:
         caller.start()
     slow.expect("request")
@@ -124,6 +125,7 @@ def test_slow_services_stall_no_topic(ros1, ros2, master):
         event = slow.expect("message", topic="/bt/down")
         assert bytes.fromhex(event["hex"])[4:] == f"{number:03}".encode()
     assert replies == []  # so all of it happened while the calls were under way
+    slow.do("let_go")
     for caller in callers:
         caller.join()
     assert [response.message for response in replies] == ["from ROS 1"] * 2
