@@ -7,7 +7,7 @@ from dataclasses import replace
 
 import pytest
 from link_rig.cases import CASES, run_case
-from link_rig.verdicts import HEAD, End, Fault, Pose, driving_since, judge
+from link_rig.verdicts import HEAD, End, Fault, Pose, Survived, driving_since, judge, judge_kills
 
 STEP_S = 0.05
 CUT = Fault("link cut for 5 s", 10.0, 15.0, ("link",))
@@ -67,6 +67,21 @@ def test_a_rover_that_moves_while_its_managers_are_not_heard_is_wrong_whatever_t
     unheard = judged(drives, fault=fault, beats=[*until_then, 17.0, *(18.0 + 0.5 * n for n in range(20))])
     assert unheard.wrong == ("it moved for 3.5 s while nothing was heard of its managers: 3 s are allowed",)
     assert judged(drives, fault=fault, beats=[]).unheard_s == 0.0, "a supervision that has not begun"
+
+
+def test_missions_that_are_killed_at_have_to_name_what_was_killed_and_the_last_one_is_accomplished():
+    def judged(*missions):
+        beats = [0.5 * n for n in range(200)]
+        return judge_kills("3 kills", missions, driven((0.5, 20.0)), beats=beats, collisions=0, silent_after_s=2.0)
+
+    true, false = End("degraded", "the bridge died"), End("given_up", "no map")
+    fine = judged(Survived(true, ("bridge",)), Survived(SURVIVED, ()))
+    assert (fine.wrong, fine.end) == ((), End("1 accomplished, 1 degraded", "1: the bridge died"))
+    assert fine.row == "| 3 kills | - | 0.5 | 0 | - | - | 1 accomplished, 1 degraded | 1: the bridge died |\n"
+    assert judged(Survived(false, ("bridge",)), Survived(SURVIVED, ())).wrong == (
+        "mission 1 ended with 'no map', which names none of: bridge",
+    )
+    assert len(judged(Survived(SURVIVED, ()), Survived(true, ())).wrong) == 1
 
 
 def test_turning_is_moving():

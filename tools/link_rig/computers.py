@@ -15,7 +15,7 @@ import psutil
 import yaml
 
 from alula.common.network import claim_domain
-from alula.common.processes import node_name, processes_of_run
+from alula.common.processes import command_line, node_name, processes_of_run
 from alula_testing.networks import Computer, Network
 from alula_testing.ros1 import end_process
 from alula_testing.waits import until
@@ -144,8 +144,22 @@ class TwoComputers:
 
     def pid_of(self, part: str) -> int:
         """Return the process of a part that is up."""
-        said = json.loads(self._alula("status", self._name, "--json").stdout)
-        return int(said["parts"][part]["pid"])
+        return self.kept()[part]
+
+    def kept(self) -> dict[str, int]:
+        """Return the processes of the parts that are up, and of their keeper."""
+        said = json.loads((ROVER / ".alula/up" / self._name / "state.json").read_text(encoding="utf-8"))
+        parts = {name: int(one["pid"]) for name, one in said["parts"].items()}
+        return {name: pid for name, pid in {**parts, "keeper": int(said["keeper"])}.items() if pid}
+
+    def nodes(self) -> dict[str, int]:
+        """Return the nodes of the base that roslaunch has started."""
+        inside, found = self._inside[self.base.name], {}
+        for process in psutil.process_iter():
+            with suppress(OSError, psutil.Error):
+                if _namespace(process.pid) == inside and (name := node_name(process)):
+                    found[name] = process.pid
+        return found
 
     def _alula(self, *words: str) -> subprocess.CompletedProcess[str]:
         words = tuple(self.decision.command(*self._words(*words)))
@@ -201,15 +215,32 @@ class Mission:
 
     @property
     def ended(self) -> bool:
-        """Tell whether `alula run` has ended."""
-        return self._run.poll() is not None
+        """Tell whether `alula run` has ended, and all that it has started."""
+        return self._run.poll() is not None and not self._processes
 
     @property
     def pid(self) -> int:
         """Return the process of the mission itself, which decides."""
-        run_id = json.loads((self._folder / "run.json").read_text(encoding="utf-8"))["run_id"]
-        (mission,) = [one for one in processes_of_run(run_id) if node_name(one) == "mission"]
-        return int(mission.pid)
+        return self.processes["mission"]
+
+    @property
+    def processes(self) -> dict[str, int]:
+        """Return the processes of `alula run`: ``front``, ``supervisor`` and ``mission``, where they are there."""
+        found = {"front": self._run.pid} if self._run.poll() is None else {}
+        for one in self._processes:
+            if node_name(one) == "mission":
+                found["mission"] = one.pid
+            elif "alula_flight.attached" in command_line(one):
+                found["supervisor"] = one.pid
+        return found
+
+    @property
+    def _processes(self) -> list[psutil.Process]:
+        try:
+            run_id = json.loads((self._folder / "run.json").read_text(encoding="utf-8"))["run_id"]
+        except (OSError, ValueError):  # it has not come so far
+            return []
+        return processes_of_run(run_id)
 
     @property
     def end(self) -> End:

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from collections import Counter
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 from itertools import pairwise
@@ -125,14 +126,14 @@ def judge(
     unheard_s = _moved_unheard(poses, beats)
     wrong = []
     if unheard_s > limit_s:
-        wrong.append(f"it moved for {unheard_s:.1f} s while nothing was heard of its managers: {limit_s:g} s are allowed")
+        wrong.append(_moved_on(unheard_s, limit_s))
     if lasted_s > limit_s and (moved_on_s is None or moved_on_s > limit_s):
         told = "all the time" if moved_on_s is None else f"for {moved_on_s:.1f} s"
         wrong.append(f"it moved on {told}: {limit_s:g} s are allowed")
     if stood is not None and goes_on and lasted_s > limit_s and stood[1] < fault.ended_s:
         wrong.append(f"it moved again {fault.ended_s - stood[1]:.1f} s before the fault's end")
     if collisions:
-        wrong.append(f"it ran into something {collisions} times")
+        wrong.append(_ran_into(collisions))
     if end.outcome != ACCOMPLISHED and not any(word in end.reason for word in fault.cause):
         wrong.append(f"the mission ended with '{end.reason}', which names none of: {', '.join(fault.cause)}")
     if following is not None and following.outcome != ACCOMPLISHED:
@@ -147,6 +148,39 @@ def judge(
         collisions,
         tuple(wrong),
     )
+
+
+@dataclass(frozen=True)
+class Survived:
+    """How a mission ended during which processes were killed; ``cause``: words of which one is to be named if it was not accomplished."""
+
+    end: End
+    cause: tuple[str, ...]
+
+
+def judge_kills(
+    name: str, missions: Sequence[Survived], poses: Sequence[Pose], *, beats: Sequence[float], collisions: int, silent_after_s: float
+) -> Verdict:
+    """Judge missions that followed each other while processes were killed; the last one was not disturbed, and has to be accomplished."""
+    outcomes = Counter(one.end.outcome for one in missions)
+    told = [f"{number}: {one.end.reason}" for number, one in enumerate(missions, 1) if one.end.reason]
+    end = End(", ".join(f"{count} {outcome}" for outcome, count in sorted(outcomes.items())), "; ".join(told))
+    unheard_s, limit_s = _moved_unheard(poses, beats), silent_after_s + MARGIN_S
+    wrong = [_moved_on(unheard_s, limit_s)] if unheard_s > limit_s else []
+    if collisions:
+        wrong.append(_ran_into(collisions))
+    for number, one in enumerate(missions, 1):
+        if one.end.outcome != ACCOMPLISHED and not any(word in one.end.reason for word in one.cause):
+            wrong.append(f"mission {number} ended with '{one.end.reason}', which names none of: {', '.join(one.cause)}")
+    return Verdict(Fault(name, 0.0, 0.0, ()), end, None, unheard_s, None, None, collisions, tuple(wrong))
+
+
+def _moved_on(unheard_s: float, limit_s: float) -> str:
+    return f"it moved for {unheard_s:.1f} s while nothing was heard of its managers: {limit_s:g} s are allowed"
+
+
+def _ran_into(collisions: int) -> str:
+    return f"it ran into something {collisions} times"
 
 
 def driving_since(poses: Sequence[Pose]) -> float | None:
