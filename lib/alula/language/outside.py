@@ -17,7 +17,7 @@ Arrow = tuple[str, str, str]
 
 
 def untaken(skillset: Skillset) -> frozenset[Arrow]:
-    """Return the arrows to states that no effect leads to and no extern arrow either."""
+    """Return the transitions to states that no effect leads to and no extern transition either."""
     taken = {(change.resource, change.target) for effect in _effects(skillset) for change in effect.assignments}
     return frozenset(
         (resource.name, arrow.source, arrow.target)
@@ -28,7 +28,7 @@ def untaken(skillset: Skillset) -> frozenset[Arrow]:
 
 
 def opened(skillset: Skillset, arrows: frozenset[Arrow]) -> Skillset:
-    """Return the skillset with these arrows extern as well."""
+    """Return the skillset with these transitions extern as well."""
     return replace(skillset, resources=tuple(_opened(resource, arrows) for resource in skillset.resources))
 
 

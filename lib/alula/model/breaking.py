@@ -1,4 +1,4 @@
-"""Which arrows of resources can break an invariant: what makes a transition of the functional layer a failure."""
+"""Which transitions of resources can break an invariant: what makes a transition of the functional layer a failure."""
 
 from __future__ import annotations
 
@@ -10,12 +10,12 @@ from alula.model.model import Resource, Skillset, Transition
 
 
 def breaks(skillset: Skillset, resource: Resource, arrow: Transition) -> bool:
-    """Tell whether an arrow can make an invariant false that was not."""
+    """Tell whether a transition can make an invariant false that was not."""
     return any(can_break(skillset, one.condition, resource, arrow) for skill in skillset.skills for one in skill.invariants)
 
 
 def can_break(skillset: Skillset, condition: Expression, resource: Resource, arrow: Transition) -> bool:
-    """Tell whether an arrow can make a condition false that was not."""
+    """Tell whether a transition can make a condition false that was not."""
     names = list(dict.fromkeys(atom.resource for atom in atoms(condition) if isinstance(atom, ResourceIs)))
     if resource.name not in names:
         return False

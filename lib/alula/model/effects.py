@@ -23,7 +23,7 @@ def effects_of(skill: Skill) -> Iterator[Effect]:
 def effect_changes(skillset: Skillset, execution: Running, effect: Effect, place: str, states: States) -> tuple[Change, ...]:
     """Return what an effect of a skill changes from these states; ``place`` names it where the model does not.
 
-    Every assignment, one after another, must be an arrow for skills from the state that its resource is in then; one to that
+    Every assignment, one after another, must be a transition for skills from the state that its resource is in then; one to that
     very state is possible, too, and changes nothing.
 
     Raises:
@@ -34,7 +34,7 @@ def effect_changes(skillset: Skillset, execution: Running, effect: Effect, place
 
 
 def event_changes(skillset: Skillset, event: Event, states: States) -> tuple[Change, ...]:
-    """Return what an event changes from these states; it may take any arrow, extern ones too. Raise EffectError as above."""
+    """Return what an event changes from these states; it may make any transition, extern ones too. Raise EffectError as above."""
     return _changes(skillset, event.effect, states, f"event {event.name}", f"event {event.name}", any_arrow=True)
 
 

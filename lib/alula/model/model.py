@@ -44,7 +44,7 @@ class Data:
 
 @dataclass(frozen=True)
 class Transition:
-    """An arrow of a resource; an extern one is taken by the functional layer only, others by skills only."""
+    """A transition of a resource; an extern one is made by the functional layer only, others by skills only."""
 
     source: str
     target: str
@@ -56,10 +56,10 @@ class Transition:
 class Resource:
     """A state machine. ``states`` keeps the order of the source.
 
-    ``all_transitions`` tells that every arrow that is not extern was asked for by ``transition all``; they are in ``transitions``.
+    ``all_transitions`` tells that every transition that is not extern was asked for by ``transition all``; they are in ``transitions``.
 
     ``silence_s``: when its reporter has not been heard of for so many seconds, the managers take the resource back to its initial state,
-    which then means unknown. Those extern arrows are in ``transitions`` as well, the last of them. None: it is never taken back.
+    which then means unknown. Those extern transitions are in ``transitions`` as well, the last of them. None: it is never taken back.
     """
 
     name: str
@@ -79,14 +79,14 @@ class Resource:
         return tuple(self._targets.get((source, extern), ()))
 
     def reachable(self) -> frozenset[str]:
-        """Return the states with a way of arrows from the initial one, extern or not."""
+        """Return the states with a path of transitions from the initial one, extern or not."""
         return frozenset(
             reachable_from([self.initial], lambda state: (*self.targets(state, extern=False), *self.targets(state, extern=True)))
         )
 
     @cached_property
     def _targets(self) -> Mapping[tuple[str, bool], Mapping[str, None]]:
-        """The arrows by source and kind; the targets of each in the order of the source."""
+        """The transitions by source and kind; the targets of each in the order of the source."""
         index: dict[tuple[str, bool], dict[str, None]] = {}
         for arrow in self.transitions:
             index.setdefault((arrow.source, arrow.extern), {})[arrow.target] = None

@@ -196,7 +196,7 @@ class ResourceView(Generic[StateT]):
         return reached
 
     def transition(self, to: StateT, reason: str = "") -> Pending[TransitionReply]:
-        """Take an extern transition, as the functional layer does; refused with a reason when the model has no such arrow."""
+        """Take an extern transition, as the functional layer does; refused with a reason when the model has no such transition."""
         return self._client.transition(self.name, to, reason)
 
 

@@ -80,7 +80,7 @@ SEMANTICS = [
     ("ALU201", "type P skill f { input { ^P: P } result { R } }", "`P` is the name of a type", "otherwise"),
     ("ALU201", "skill f { result { R ^R } }", "result `R` is defined twice", ""),
     ("ALU201", uses("e {} ^e {}"), "effect `e` is defined twice", ""),
-    ("ALU201", "resource r { initial A A -> B ^A -> B B -> A }", "arrow `A -> B` of `r` is given twice", ""),
+    ("ALU201", "resource r { initial A A -> B ^A -> B B -> A }", "transition `A -> B` of `r` is given twice", ""),
     ("ALU201", "resource ^r { state { A B A } initial A A -> B B -> A }", "state `A` of `r` is listed twice", ""),
     (
         "ALU202",
@@ -115,7 +115,7 @@ SEMANTICS = [
     (
         "ALU209",
         "resource r { state { A B C } initial A A -> B B -> A } " + uses("e: ^r -> C"),
-        "no arrow leads",
+        "no transition leads",
         "to `B`",
     ),
     (
@@ -154,7 +154,7 @@ SEMANTICS = [
     (
         "ALU306",
         f"resource eye {{ silence 2 s {EYE} }} " + asks("invariant { ^i: resource = (not eye == SHUT and eye != OPEN) }"),
-        "holds while nothing is heard of `eye`, which is `UNKNOWN` then",
+        "holds while the reporter of `eye` is silent and `eye` is `UNKNOWN`",
         "`eye == UNKNOWN` or `!= UNKNOWN`",
     ),
     (

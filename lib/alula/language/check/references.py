@@ -114,15 +114,15 @@ def _arrow(effect: Effect, resource: Resource, target: str, span: Span, *, any_a
         return
     name = _called(effect)
     if arrows:
-        message = f"{name} would take `{resource.name}` to `{target}`, but only the functional layer may (every arrow there is extern)"
-        hint = f"add an arrow without `extern` to resource `{resource.name}` if skills are to take it"
+        message = f"{name} would take `{resource.name}` to `{target}`, but only the functional layer may (every transition there is extern)"
+        hint = f"add a transition without `extern` to resource `{resource.name}` if skills are to take it"
         yield error("ALU210", message, span, hint=hint)
         return
     targets = dict.fromkeys(arrow.target for arrow in resource.transitions if not arrow.extern)
     hint = f"skills can take it to {quoted(list(targets))}" if targets else f"add `STATE -> {target}` to resource `{resource.name}`"
     # A resource in the initial state may stay there, though the effect then never does anything.
     tell = warning if target == resource.initial else error
-    yield tell("ALU209", f"{_called(effect)} would take `{resource.name}` to `{target}`, but no arrow leads there", span, hint=hint)
+    yield tell("ALU209", f"{_called(effect)} would take `{resource.name}` to `{target}`, but no transition leads there", span, hint=hint)
 
 
 def _called(effect: Effect) -> str:

@@ -81,7 +81,7 @@ def _unheard(skillset: Skillset, skill: Skill) -> Iterator[Diagnostic]:
             said = {(atom.resource, atom.state) for atom in atoms(one.condition) if isinstance(atom, ResourceIs)}
             for name in dict.fromkeys(_excluded(one.condition, holds=True)):
                 if name in initial and (name, initial[name]) not in said:
-                    message = f"{kind} `{one.name}` holds while nothing is heard of `{name}`, which is `{initial[name]}` then"
+                    message = f"{kind} `{one.name}` holds while the reporter of `{name}` is silent and `{name}` is `{initial[name]}`"
                     hint = f"ask for the states that are good, or say `{name} == {initial[name]}` or `!= {initial[name]}` as well"
                     yield warning("ALU306", message, one.span, hint=hint)
 

@@ -71,7 +71,7 @@ def _states(resource: Resource) -> Iterator[Diagnostic]:
                 yield unknown_state(resource, state, word(arrow.span, state))
         key = (arrow.source, arrow.target, arrow.extern)
         if key in seen:
-            yield error("ALU201", f"the arrow `{arrow.source} -> {arrow.target}` of `{resource.name}` is given twice", arrow.span)
+            yield error("ALU201", f"the transition `{arrow.source} -> {arrow.target}` of `{resource.name}` is given twice", arrow.span)
         seen.add(key)
 
 
@@ -81,7 +81,7 @@ def _initial(resource: Resource) -> Iterator[Diagnostic]:
         hint = f"add `initial {resource.states[0]}`" if resource.states else "add `initial STATE`"
         yield error("ALU207", f"resource `{resource.name}` has no initial state", resource.span, hint=hint)
         return
-    message = f"the initial state `{resource.initial}` of `{resource.name}` has no arrow"
+    message = f"the initial state `{resource.initial}` of `{resource.name}` has no transition"
     hint = nearest(resource.initial, ends)
     if resource.initial not in resource.states:
         yield error("ALU208", message, resource.span, hint=hint)
@@ -107,11 +107,11 @@ def _silence(resource: Resource) -> Iterator[Diagnostic]:
     if silence_s is None or initial not in resource.states:
         return
     if not silence_s >= SHORTEST_SILENCE_S:
-        hint = f"reporters are heard of every 0.5 s: take {SHORTEST_SILENCE_S:g} s or more"
+        hint = f"reporters send a heartbeat every 0.5 s: take {SHORTEST_SILENCE_S:g} s or more"
         yield error("ALU226", f"the silence of `{resource.name}` is {silence_s:g} s", resource.span, hint=hint)
     reported = dict.fromkeys(arrow.target for arrow in resource.transitions if arrow.extern and arrow.target != initial)
     if not reported:
-        message = f"`{resource.name}` has a silence, and nobody reports it: no extern arrow leads away from `{initial}`"
+        message = f"`{resource.name}` has a silence, and nobody reports it: no extern transition leads away from `{initial}`"
         yield error("ALU226", message, resource.span, hint=f"add `extern {initial} -> STATE`, or leave `silence` out")
     for state in reported:
         if not resource.has_arrow(initial, state, extern=True):

@@ -75,7 +75,7 @@ class _ResourceReader:
         if len(states) > MAX_STATES or source.arrows > MAX_ARROWS:
             message = f"resource `{name.text}` has {len(states)} states; there may be {MAX_STATES}"
             if len(states) <= MAX_STATES:
-                message = f"with resource `{name.text}` the file has {source.arrows} arrows; there may be {MAX_ARROWS}"
+                message = f"with resource `{name.text}` the file has {source.arrows} transitions; there may be {MAX_ARROWS}"
             hint = "numbers are data, not states: let the functional layer publish them"
             source.report("ALU109", message, self.cursor.span(name), hint=hint)
             return Resource(name.text, states[:MAX_STATES], self.initial, (), span=self.cursor.span(name))
@@ -128,7 +128,7 @@ class _ResourceReader:
         if self.cursor.here.kind is not Kind.NAME:
             raise self.cursor.fail("a state", "`initial`", "`extern`", "`}`")
         source = self.cursor.name("a state")
-        self.cursor.expect("->", hint="an arrow is written `A -> B` or `extern A -> B`")
+        self.cursor.expect("->", hint="a transition is written `A -> B` or `extern A -> B`")
         target = self.cursor.name("a state")
         self.transitions.append(Transition(source.text, target.text, extern, span=self.cursor.span(source, target)))
 

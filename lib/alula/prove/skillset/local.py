@@ -20,7 +20,7 @@ from alula.model.span import NOWHERE, Span
 from alula.prove.limits import Deadline
 from alula.prove.skillset.solver import Solver
 
-EFFECT_HINT = "a change must be an arrow from the state that the resource is in, unless it is in the wanted state already"
+EFFECT_HINT = "a change must be a transition from the state that the resource is in, unless it is in the wanted state already"
 
 
 @dataclass(frozen=True)

@@ -31,7 +31,7 @@ def prove(
 ) -> list[Diagnostic]:
     """Return what is wrong with a skillset that the checker finds no error in, in the order of the source.
 
-    An arrow that nothing in the model takes may be taken from outside (see ``outside``), unless ``closed_world``. What could not
+    A transition that nothing in the model makes may be made from outside (see ``outside``), unless ``closed_world``. What could not
     be decided within ``timeout_s`` seconds is a finding as well (ALU540). The skillset must be free of errors of
     ``alula.language.check``: every name in it leads somewhere. ``most`` is how many situations are looked at one by one before they
     are taken as sets, ``copies`` how many executions of one skill at once. ``tell`` hears now and then what takes long.
@@ -63,7 +63,7 @@ class _Search:
     copies: int
 
     def findings(self, outside: frozenset[Arrow] = frozenset()) -> list[Diagnostic]:
-        """Return all global findings, where these arrows are taken from outside as well."""
+        """Return all global findings, where these transitions are made from outside as well."""
         skillset = opened(self.skillset, outside) if outside else self.skillset
         abstraction = without_data(skillset, self.deadline, outside)
         self.deadline.doing = "situations one by one"
@@ -88,7 +88,7 @@ class _Search:
             return [*refuted.values(), *unsure, _undecided(others, self.deadline)]
 
     def open_findings(self) -> list[Diagnostic]:
-        """Return the findings of the model alone, and the errors that arrows which nothing takes lead to."""
+        """Return the findings of the model alone, and the errors that transitions which nothing makes lead to."""
         findings = self.findings()
         arrows = untaken(self.skillset)
         if not arrows:
@@ -100,8 +100,8 @@ class _Search:
 
 
 def _from_outside(finding: Diagnostic) -> Diagnostic:
-    """Say of a finding that it needs arrows which nothing in the model takes."""
-    missing = "nothing in the model takes the arrow that comes from outside"
+    """Say of a finding that it needs transitions which nothing in the model makes."""
+    missing = "nothing in the model makes the transition that comes from outside"
     hint = f"{missing}: make it `extern`, add a skill or event that takes it, or use `--closed-world`"
     return replace(finding, hint=f"{finding.hint}; {hint}" if finding.hint else hint)
 

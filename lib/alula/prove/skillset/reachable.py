@@ -62,7 +62,7 @@ def _start_fails(graph: Graph, skill: Skill) -> bool:
 
 
 def unreachable_states(skillset: Skillset, seen: list[set[str]]) -> list[Diagnostic]:
-    """Return ALU521 for states that have a way of arrows to them, but no execution that takes it."""
+    """Return ALU521 for states that a path of transitions leads to, but no execution."""
     findings = []
     for resource, states in zip(skillset.resources, seen, strict=True):
         by_arrows = resource.reachable()
@@ -70,7 +70,7 @@ def unreachable_states(skillset: Skillset, seen: list[set[str]]) -> list[Diagnos
         if missing:
             more = f" and {len(missing) - MANY} more" if len(missing) > MANY else ""
             names = ", ".join(f"`{state}`" for state in missing[:MANY])
-            hint = "nothing that can happen takes the arrows that lead there"
+            hint = "nothing that can happen makes the transitions that lead there"
             findings.append(Diagnostic("ALU521", f"`{resource.name}` never gets to {names}{more}", resource.span, Severity.WARNING, hint))
     return findings
 
