@@ -127,7 +127,7 @@ def main(arguments: Sequence[str] | None = None) -> int:
     sys.stderr.write(f"{out / 'coverage.html'}\n")
     if lost:
         sys.stderr.write(
-            f"alula campaign: {len(lost)} runs were lost with who did them ({_listed(lost)}); the same command does them again\n"
+            f"alula campaign: {len(lost)} runs were lost with their workers ({_listed(lost)}); the same command does them again\n"
         )
     return TROUBLE if lost or coverage.troubled or coverage.unknown else DONE
 

@@ -37,7 +37,7 @@ class Command:
         needs: what it needs in a checkout.
         robot: whether it is about a robot, and nothing can be done without one.
         packages_with: the option with which the library's module does it, and packages are enough.
-        same_as: the command that this one is another word for.
+        same_as: the command that this one is another name of.
         open: what it takes besides is known to the robot, or to the program that it starts; only that can print its help.
     """
 
@@ -94,22 +94,22 @@ GROUPS: dict[str, Sequence[Command]] = {
         Command("test", "run the robot's tests, in Alula's checkout its own: [--quick] [pytest arguments]", None, robot=True, open=True),
         Command(
             "doctor",
-            "say what is missing of the installation, or wrong with a deployment, and how to mend it",
+            "report what is missing of the installation, or wrong with a deployment, and how to mend it",
             live.doctor,
             needs=Needs.NOTHING,
         ),
     ),
     "Missions": (
         _run("run", "run a mission live, in a ROS graph of its own; with --mock over mocks, in a second"),
-        _run("fly", "another word for run", same_as="run"),
+        _run("fly", "run a mission: the same as run", same_as="run"),
         _records("replay", "make the decisions of a recorded mission again, with one thing changed", runs.replay, robot=True),
         _records("campaign", "run scenarios many times with faults, and report the response to each failure", runs.campaign, robot=True),
     ),
     "Models and trees": (
         _models("check", "check skill models and missions: errors and warnings with their places, then proofs", models.check),
-        _models("odds", "tell how likely a mission is accomplished, degraded, given up, or neither", models.odds),
-        _models("repair", "write the fallback branch that a mission lacks for a fault or a counterexample, proved", models.repair),
-        _models("plan", "write a mission that reaches a goal, from nothing, proved", models.plan),
+        _models("odds", "compute how likely a mission is accomplished, degraded, given up, or neither", models.odds),
+        _models("repair", "write and prove the fallback branch that a mission lacks for a fault or a counterexample", models.repair),
+        _models("plan", "write and prove a mission that reaches a goal, from nothing", models.plan),
         _models("tree", "draw a mission; with answers tick it without any robot", models.tree),
         _models("palette", "write a robot's skills as a TreeNodesModel for Groot2", models.palette),
         _models("generate", "make interfaces, managers and the bridge's configuration from a robot's skill models", models.generate),
@@ -117,22 +117,24 @@ GROUPS: dict[str, Sequence[Command]] = {
     ),
     "A running robot": (
         Command("console", "serve the operator's page: start a mission, watch it, understand it", live.console, "alula.cli.console"),
-        Command("up", "start what of a deployment stays up between missions: bridge, managers, recorder, page", live.up, robot=True),
-        Command("down", "end what up has started", live.down, robot=True),
-        Command("status", "say how the parts of a deployment are", live.status, robot=True),
+        Command(
+            "up", "start the parts of a deployment that stay up between missions: bridge, managers, recorder, page", live.up, robot=True
+        ),
+        Command("down", "end the parts that up has started", live.down, robot=True),
+        Command("status", "show the state of a deployment's parts", live.status, robot=True),
         Command("service", "have systemd keep a deployment up: install, remove, or print its unit", live.service, robot=True),
         Command("panel", "show running skillsets in the terminal, and control them manually", live.panel),
-        Command("skills", "list what the skillsets have and how it is", live.talking()),
+        Command("skills", "list the skills, resources and data of running skillsets, with their states", live.talking()),
         Command("start", "run a skill to its end; Ctrl-C interrupts it", live.talking(live.skill, live.inputs)),
         Command("interrupt", "interrupt all executions of a skill", live.talking(live.skill)),
-        Command("events", "show executions and transitions", live.talking(live.events)),
+        Command("events", "show executions and transitions, as they were or as they happen", live.talking(live.events)),
         Command("why", "say what keeps a skill from starting", live.talking(live.skill, live.inputs)),
-        Command("transition", "take an extern transition, as the functional layer does", live.talking(live.state)),
-        Command("data", "show the values of the data manager", live.talking(live.data)),
+        Command("transition", "make an extern transition, as the functional layer does", live.talking(live.state)),
+        Command("data", "show the values of data", live.talking(live.data)),
         Command("mock", "serve a robot's skillsets as mocks on ROS 2: the same interface, scripted behaviour", live.mock),
         Command("bridge", "bridge topics, services and actions between ROS 1 and ROS 2", None, open=True),
     ),
-    "What runs have left": (
+    "Records of runs": (
         _records("expect", "write expectations from a run, or check a run against them", runs.expect),
         _records("conform", "check a run, a record or a bag against the models: they must allow every event", runs.conform),
         _records("compare", "show runs side by side, and whether their missions made the same decisions", runs.compare),

@@ -61,7 +61,7 @@ def test_a_worker_that_dies_loses_only_its_run(second: str, rows: list[int], cod
     with begin(tmp_path, second) as campaign:
         _, said = campaign.communicate(timeout=300)
     assert (rows_of(tmp_path), campaign.returncode) == (rows, code), said
-    told = "alula campaign: 1 runs were lost with who did them (1); the same command does them again\n"
+    told = "alula campaign: 1 runs were lost with their workers (1); the same command does them again\n"
     assert (told in said) is (second == "dies")
 
 

@@ -20,7 +20,7 @@ def console(parser: ArgumentParser) -> None:
     which = parser.add_mutually_exclusive_group()
     which.add_argument("--run", metavar="DIR|latest", default=LATEST, help="show this run's folder first (default: the newest)")
     which.add_argument("--domain", type=int, metavar="N", help="show the run under way in this DDS domain first")
-    on = which.add_argument("--on", metavar="DEPLOYMENT", help="show this deployment first, which is up here")
+    on = which.add_argument("--on", metavar="DEPLOYMENT", help="show this deployment first; it has to be up here")
     completed_by(on, "deployments")
     parser.add_argument(
         "--beside", type=Path, action="append", default=[], metavar="DIR", help="show the runs of the robot in this folder, too; repeatable"
@@ -51,7 +51,9 @@ def panel(parser: ArgumentParser) -> None:
 
 def _on(place: Any) -> None:
     """Add the name of a deployment that is up."""
-    completed_by(place.add_argument("--on", metavar="DEPLOYMENT", help="the skillsets of this deployment, which is up here"), "deployments")
+    completed_by(
+        place.add_argument("--on", metavar="DEPLOYMENT", help="the skillsets of this deployment; it has to be up here"), "deployments"
+    )
 
 
 def mocks(parser: ArgumentParser) -> None:
@@ -101,13 +103,13 @@ def deployed(parser: ArgumentParser) -> None:
 def up(parser: ArgumentParser) -> None:
     """Add what ``alula up`` takes."""
     completed_by(parser.add_argument("deployment", metavar="DEPLOYMENT", help="name in deployments/"), "deployments")
-    parser.add_argument("--restart", action="append", default=[], metavar="PART", help="end this part, and start it again; repeatable")
+    parser.add_argument("--restart", action="append", default=[], metavar="PART", help="restart this part; repeatable")
 
 
 def down(parser: ArgumentParser) -> None:
     """Add what ``alula down`` takes."""
     deployed(parser)
-    parser.add_argument("--now", action="store_true", help="also under a mission that runs")
+    parser.add_argument("--now", action="store_true", help="end them also while a mission runs")
 
 
 def status(parser: ArgumentParser) -> None:
@@ -118,14 +120,14 @@ def status(parser: ArgumentParser) -> None:
 
 def doctor(parser: ArgumentParser) -> None:
     """Add what ``alula doctor`` takes."""
-    words = "look at this one on what runs, instead of at the installation: names, master, nodes, bindings, ROS 2, clocks, disk"
+    words = "examine this deployment on what runs, instead of the installation: names, master, nodes, bindings, ROS 2, clocks, disk"
     completed_by(parser.add_argument("deployment", nargs="?", metavar="DEPLOYMENT", help=words), "deployments")
     json_option(parser, "what was found of a deployment")
 
 
 def service(parser: ArgumentParser) -> None:
     """Add what ``alula service`` takes."""
-    words = parser.add_argument("words", nargs="+", metavar="[install|remove] DEPLOYMENT", help="what is done, and with which deployment")
+    words = parser.add_argument("words", nargs="+", metavar="[install|remove] DEPLOYMENT", help="what to do, and with which deployment")
     completed_by(words, "deployments")
     parser.add_argument("--print", dest="told", action="store_true", help="print the unit, and change nothing")
     parser.add_argument("--system", action="store_true", help="a unit of the system, which starts at boot (default: of the user)")
@@ -145,7 +147,7 @@ def inputs(parser: ArgumentParser) -> None:
 def state(parser: ArgumentParser) -> None:
     """Add a resource and its state."""
     completed_by(parser.add_argument("resource", metavar="SKILLSET.RESOURCE", help="a resource of a skillset"), "resources")
-    completed_by(parser.add_argument("state", metavar="STATE", help="the state that it is to have"), "states")
+    completed_by(parser.add_argument("state", metavar="STATE", help="the state to change to"), "states")
 
 
 def data(parser: ArgumentParser) -> None:

@@ -74,28 +74,35 @@ def odds(parser: ArgumentParser) -> None:
     """Add what ``alula odds`` takes."""
     parser.add_argument("file", type=Path, metavar="FILE", help=MISSION_HELP)
     changes = parser.add_argument(
-        "--with", dest="changes", action="append", default=[], metavar="FAULT=UNITS", help="what it would bring: camera=2, or camera=never"
+        "--with",
+        dest="changes",
+        action="append",
+        default=[],
+        metavar="FAULT=UNITS",
+        help="compute the odds as if a thing had so many units, or never failed: camera=2, camera=never",
     )
     completed_by(changes, "units")
     world = parser.add_argument("--world", default="", metavar="FILE|NAME", help="inputs of the mission (default: those of its scenario)")
     completed_by(world, "worlds")
     parser.add_argument(
-        "--unlikely", type=float, default=UNLIKELY, metavar="P", help=f"less likely situations are not looked at ({UNLIKELY:g})"
+        "--unlikely", type=float, default=UNLIKELY, metavar="P", help=f"leave out situations that are less likely ({UNLIKELY:g})"
     )
-    parser.add_argument("--most", type=int, default=MOST_SITUATIONS, metavar="N", help=f"situations looked at ({MOST_SITUATIONS})")
-    parser.add_argument("--svg", type=Path, metavar="FILE", help="write a picture there, too")
+    parser.add_argument(
+        "--most", type=int, default=MOST_SITUATIONS, metavar="N", help=f"bound on the situations that are searched ({MOST_SITUATIONS})"
+    )
+    parser.add_argument("--svg", type=Path, metavar="FILE", help="also draw the odds there")
     json_option(parser, "the odds")
 
 
 def repair(parser: ArgumentParser) -> None:
     """Add what ``alula repair`` takes."""
     parser.add_argument("file", type=Path, metavar="FILE", help=MISSION_HELP)
-    completed_by(parser.add_argument("--fault", default="", metavar="NAME", help="the fault that is to be survived"), "faults")
-    parser.add_argument("--finding", type=int, default=0, metavar="N", help="the counterexample of `alula check` that is to be answered")
-    parser.add_argument("--goal", default="", metavar="CONDITION", help="what is as good as an accomplished mission, as in properties")
+    completed_by(parser.add_argument("--fault", default="", metavar="NAME", help="the fault to survive"), "faults")
+    parser.add_argument("--finding", type=int, default=0, metavar="N", help="the number of the counterexample of `alula check` to answer")
+    parser.add_argument("--goal", default="", metavar="CONDITION", help="a condition that counts as accomplished, as in properties")
     parser.add_argument("--within", default="", metavar="NODE", help="where the branch has to stand (default: anywhere)")
     _search(parser, "the mission with the branch")
-    parser.add_argument("--svg", type=Path, metavar="FILE", help="draw the mission with the branch there, which gets a band")
+    parser.add_argument("--svg", type=Path, metavar="FILE", help="draw the mission there, with the branch in a band")
     json_option(parser, "the branch")
 
 
@@ -108,9 +115,9 @@ def plan(parser: ArgumentParser) -> None:
         metavar="SKILLSETS",
         help="a robot's folder, or its skillsets (default: the current folder's robot)",
     )
-    goal = "what is to be reached: skillset.resource == STATE, several with and, or, not; or a role that skills provide"
+    goal = "the goal: skillset.resource == STATE, several with and, or, not; or a role that skills provide"
     parser.add_argument("--goal", default="", metavar="CONDITION", help=goal)
-    start = "what is so at first: skillset.resource == STATE, several with and (default: as after power-up)"
+    start = "the initial states: skillset.resource == STATE, several with and (default: as after power-up)"
     parser.add_argument("--from", dest="start", default="", metavar="CONDITION", help=start)
     _search(parser, "the mission")
     json_option(parser, "the mission")
@@ -118,7 +125,7 @@ def plan(parser: ArgumentParser) -> None:
 
 def _search(parser: ArgumentParser, what: str) -> None:
     """Add what both searches for branches take."""
-    parser.add_argument("--never", default="", metavar="CONDITION", help="what no run of the mission may come to")
+    parser.add_argument("--never", default="", metavar="CONDITION", help="a condition that no run of the mission may reach")
     parser.add_argument("--using", action="append", default=[], metavar="SKILLS", help="skills that may be added (default: all)")
     parser.add_argument(
         "--most-faults",
@@ -141,26 +148,30 @@ def tree(parser: ArgumentParser) -> None:
         metavar="FILE",
         help=f"{MISSION_HELP}; then files and folders whose trees it uses; a folder alone: each of its trees that is a part of no other",
     )
-    parser.add_argument("--svg", type=Path, metavar="FILE", help="write the drawing there, too")
+    parser.add_argument("--svg", type=Path, metavar="FILE", help="also write the drawing there")
     parser.add_argument("--palette", type=Path, action="append", default=[], metavar="FILE", help=PALETTE_HELP)
     _trees(parser)
     answers = 'what leaves answer: {"leaf name": ["RUNNING", "SUCCESS"], ...}, and entries, enums, stand-ins in sections'
     parser.add_argument("--answers", type=Path, metavar="FILE", help=answers)
-    parser.add_argument("--seed", type=int, metavar="N", help="with answers, of those that chance gives: ANY (0)")
-    parser.add_argument("--to", choices=[FORMAT], help="convert a file of BehaviorTree.CPP 3 instead, and tell what is left to decide")
-    parser.add_argument("--out", type=Path, metavar="FILE", help="with --to, where it is written (default: the standard output)")
-    parser.add_argument("--ticks", type=int, metavar="N", help=f"with answers, how often it is ticked ({TICKS})")
-    parser.add_argument("--trace", action="store_true", help="with answers, tell of each tick what changed: statuses, entries")
-    parser.add_argument("--html", type=Path, metavar="FILE", help="with answers, write a page that steps through the ticks")
+    parser.add_argument("--seed", type=int, metavar="N", help="with --answers: seed of the answer ANY (default 0)")
+    parser.add_argument("--to", choices=[FORMAT], help="convert a file of BehaviorTree.CPP 3 instead, and list what is left to decide")
+    parser.add_argument("--out", type=Path, metavar="FILE", help="with --to: the file to write (default: the standard output)")
+    parser.add_argument("--ticks", type=int, metavar="N", help=f"with --answers: number of ticks (default {TICKS})")
+    parser.add_argument("--trace", action="store_true", help="with --answers: print what each tick changed: statuses, entries")
+    parser.add_argument("--html", type=Path, metavar="FILE", help="with --answers: write a page that steps through the ticks")
     json_option(parser, "the tree, or each tick,")
 
 
 def palette(parser: ArgumentParser) -> None:
     """Add what ``alula palette`` takes."""
-    of_trees = "or trees of others: what they declare"
+    of_trees = "or other programs' trees: what they declare"
     parser.add_argument("places", nargs="*", metavar="FOLDER", help=f"the robot's models, as skillsets/uav; {of_trees}")
     parser.add_argument("--nav2", choices=NAV2_RELEASES, help="without a FOLDER: Nav2's nodes as this release declares them")
-    parser.add_argument("--guess", action="store_true", help="of trees of others, what they use and nobody declares, as its uses show")
+    parser.add_argument(
+        "--guess",
+        action="store_true",
+        help="of other programs' trees: guess the declaration of each node that nobody declares from its uses",
+    )
 
 
 def generate(parser: ArgumentParser) -> None:
@@ -200,4 +211,4 @@ def completion(parser: ArgumentParser) -> None:
 
 def command(parser: ArgumentParser) -> None:
     """Add what ``alula help`` takes."""
-    completed_by(parser.add_argument("command", nargs="?", metavar="COMMAND", help="the command that it is about"), "commands")
+    completed_by(parser.add_argument("command", nargs="?", metavar="COMMAND", help="the command"), "commands")

@@ -30,8 +30,10 @@ def every_run(parser: ArgumentParser) -> None:
     parser.add_argument("--seed", type=int, default=0, help="seed of all random choices (default 0)")
     parser.add_argument("--out", type=Path, metavar="DIR", help="folder for the results (default: runs/TIME-SCENARIO of the robot)")
     parser.add_argument("--monitor", action="store_true", help="check every event against the models")
-    parser.add_argument("--groot", nargs="?", const="", metavar="[HOST:]PORT", help="show the tree to Groot2 and its like (127.0.0.1:1667)")
-    parser.add_argument("--limit", type=float, default=0.0, metavar="SECONDS", help="end the run after so long, by the mission clock")
+    parser.add_argument(
+        "--groot", nargs="?", const="", metavar="[HOST:]PORT", help="serve the tree to Groot2 and other viewers (127.0.0.1:1667)"
+    )
+    parser.add_argument("--limit", type=float, default=0.0, metavar="SECONDS", help="end the run after this time of mission clock")
     parser.add_argument("--mock", action="store_true", help="run over mocks in virtual time: without simulator and ROS, in about a second")
     parser.add_argument(
         "--behaviour", type=Path, action="append", default=[], metavar="FILE", help="with --mock: behaviour file, on top of the robot's"
@@ -56,7 +58,7 @@ def run(parser: ArgumentParser) -> None:
     parser.add_argument(
         "--commanded",
         action="store_true",
-        help="of a scenario without a mission: simulated time waits for who calls the skills from outside",
+        help="with a scenario without a mission: have simulated time wait for the program that calls the skills",
     )
     parser.add_argument("--options", dest="tell_options", action="store_true", help="print the robot's own options as JSON, and exit")
 
