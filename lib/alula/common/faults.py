@@ -37,7 +37,7 @@ class FaultError(AlulaError):
 @public("alula.parts")
 @dataclass(frozen=True)
 class FaultRequest:
-    """Something that fails.
+    """A fault that is asked for: what fails, how, and when.
 
     Attributes:
         what: the thing.
@@ -169,7 +169,7 @@ def parse_fault(text: str, known: Mapping[str, Sequence[str]] | None = None) -> 
 
 @public("alula.parts")
 def parse_faults(text: str, known: Mapping[str, Sequence[str]] | None = None) -> list[FaultRequest]:
-    """Read faults between commas; raises FaultError."""
+    """Read a list of faults with commas between them, as `--fail` has each; raise FaultError."""
     return [parse_fault(word, known) for word in text.split(",") if word.strip()]
 
 

@@ -22,7 +22,7 @@ class ScenarioError(AlulaError):
 @public("alula.parts")
 @dataclass(frozen=True)
 class Scenario:
-    """One scenario.
+    """A scenario of a robot: a mission, its world, its skillsets and its launch file.
 
     Attributes:
         name: as on the command line.

@@ -13,7 +13,7 @@ END_SIGNALS = (signal.SIGINT, signal.SIGTERM, signal.SIGHUP)
 
 @public("alula.parts")
 class StopEvent(threading.Event):
-    """An event that a signal's handler may set, also while the main thread waits for it, or is about to be told of another signal.
+    """An event that handlers of signals may set at any time, also while the main thread waits for it.
 
     The lock of a plain event is not its thread's own: a handler that sets it while the main thread holds it waits for ever.
     """

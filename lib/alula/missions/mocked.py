@@ -64,7 +64,7 @@ class Listener(Recorder, Protocol):
 
 @public()
 class MockedMission:
-    """A mission from power-up to its end.
+    """A mission over mocks, from power-up to its end.
 
     Args:
         skillsets: those that the plan names.

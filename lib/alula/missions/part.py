@@ -14,7 +14,7 @@ from alula.trees.node import Node
 @public("alula.parts")
 @dataclass(frozen=True)
 class MissionPart:
-    """Nodes of its own, which files call as `alula.trees.register` has it, and the memory of its missions.
+    """What a robot adds to missions: nodes, by the names of `alula.trees.register`, and the memory of its missions.
 
     ``check_inputs`` raises InputError for inputs that the robot's missions can't use: before the run, not in the middle of it.
     """

@@ -25,7 +25,7 @@ T = TypeVar("T")
 
 @public()
 def load_behaviour(paths: Sequence[str | Path], skillsets: Sequence[Skillset]) -> Behaviour:
-    """Read behaviour files; what a later one says comes before what an earlier one says.
+    """Read behaviour files of mocks; the rules of a later file come before those of an earlier one.
 
     Raises:
         BehaviourError: with file, line, what is wrong and what would be right.

@@ -9,7 +9,7 @@ from alula.common.public import public
 
 @public()
 class ExecutionState(Enum):
-    """Where an execution is. PAUSED and INTERRUPTING are phases of running: invariants are watched and resources held."""
+    """The state of an execution. PAUSED and INTERRUPTING are phases of running: invariants are watched and resources held."""
 
     REQUESTED = "REQUESTED"
     RUNNING = "RUNNING"

@@ -28,7 +28,7 @@ Entry = tuple[str, float | None, object]
 @public("alula.parts")
 @dataclass(frozen=True)
 class ReportedRun:
-    """What a report is about."""
+    """The run that a report is about."""
 
     facts: RunFacts
     scenario: Scenario

@@ -48,7 +48,7 @@ class TreeError(AlulaError):
 
 @public("alula.trees")
 class FileError(TreeError):
-    """A tree's file is wrong; ``problem`` says where."""
+    """A file of trees can't be used; ``problem`` has the place and what is wrong."""
 
     def __init__(self, problem: Problem) -> None:
         super().__init__(str(problem))

@@ -411,7 +411,7 @@ NodeT = TypeVar("NodeT", bound=Node)
 
 @public("alula.trees")
 def register(name: str) -> Callable[[type[NodeT]], type[NodeT]]:
-    """Give a class of nodes the name by which files have it, such as ``rover.NextDoor``; what is not registered has its class's name."""
+    """Register a class of nodes under the name that files use, such as ``rover.NextDoor``; without it that is the class's name."""
 
     def named(node: type[NodeT]) -> type[NodeT]:
         node.registered_name = name
@@ -433,7 +433,7 @@ class Leaf(Node):
 
 @public("alula.trees")
 class SyncAction(Leaf):
-    """An action that is done in one tick."""
+    """A leaf that acts, and is done in one tick: derive from it, and write `update`."""
 
     may_run = False
 
@@ -447,7 +447,7 @@ class SyncAction(Leaf):
 
 @public("alula.trees")
 class Condition(Leaf):
-    """A leaf that asks, and changes nothing."""
+    """A leaf that answers a question, and changes nothing."""
 
     category = Category.CONDITION
     may_run = False
@@ -455,7 +455,7 @@ class Condition(Leaf):
 
 @public("alula.trees")
 class Action(Leaf):
-    """An action that may take several ticks."""
+    """A leaf that may take several ticks: derive from it, and write `on_start`, `on_running` and `on_halted`."""
 
     may_run = True
 
@@ -487,7 +487,7 @@ class Action(Leaf):
 
 @public("alula.trees")
 class Control(Node):
-    """A node with children."""
+    """A node with several children, which it ticks in an order of its own."""
 
     category = Category.CONTROL
 
@@ -513,7 +513,7 @@ class Control(Node):
 
 @public("alula.trees")
 class Decorator(Control):
-    """A node with one child."""
+    """A node with one child, whose answer it changes, repeats or delays."""
 
     category = Category.DECORATOR
 

@@ -14,7 +14,7 @@ from py_trees import common
 if TYPE_CHECKING:
 
     class Status(Enum):
-        """As py_trees has it, which is seen untyped."""
+        """How a node ended its last tick, by py_trees' names; INVALID: it is idle."""
 
         SUCCESS = "SUCCESS"
         FAILURE = "FAILURE"

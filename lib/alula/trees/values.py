@@ -49,7 +49,7 @@ class StandIn:
 @public("alula.trees")
 @dataclass(frozen=True, eq=False)
 class PortType:
-    """A type: ``parse`` reads text, ``cast`` takes a value that is no text; both raise ValueError."""
+    """A type of ports: ``parse`` reads text, ``cast`` takes a value that is no text; both raise ValueError."""
 
     name: str
     parse: Callable[[str], object] = field(repr=False)

@@ -32,7 +32,7 @@ class Controller(Protocol):
 
 @public()
 class Execution:
-    """One execution of a skill. Its attributes are written by the engine only, and read from any thread.
+    """One execution of a skill, as its hooks see it; only the engine writes its attributes, any thread reads them.
 
     ``result`` is the result's name in the model when TERMINATED, the precondition's when NOT_READY, the invariant's when
     RESOURCE_INVARIANT_VIOLATED, else empty. ``unmet`` is what was not as the skill needs it when it was refused as NOT_READY or ended by

@@ -49,7 +49,7 @@ class Clock(Protocol):
 
 @public("alula.parts")
 class RunPart:
-    """Adds nothing; a robot's part overrides what it needs.
+    """What a robot adds to its live runs; this base adds nothing, and a robot's class overrides what it needs.
 
     The front, which needs no ROS, calls ``add_options`` to ``words``. The supervisor calls ``launch_arguments``, and the rest when its
     rospy node is there; ROS is imported there only.

@@ -23,7 +23,7 @@ class RequestError(AlulaError):
 @public("alula.parts")
 @dataclass(frozen=True)
 class RunSpec:
-    """One run.
+    """What a live run is asked to be.
 
     Attributes:
         scenario: its name.

@@ -30,7 +30,7 @@ class LocalClient(Client):
 
 @public()
 class LocalWorld:
-    """Serves skillsets and hands out clients; deterministic: the same calls make the same run.
+    """Managers and clients of skillsets in one process and in virtual time; the same calls make the same run.
 
     Args:
         skillsets: served from the beginning.

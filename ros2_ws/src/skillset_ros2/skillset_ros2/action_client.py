@@ -9,7 +9,7 @@ from rclpy.action import ActionClient as RclpyActionClient  # noqa: TID251
 
 
 class ActionClient(RclpyActionClient):  # type: ignore[misc]  # rclpy ships no types
-    """rclpy's client of an action, for threads other than the one that spins its node.
+    """A client of an action whose methods may be called in any thread, as those of rclpy's own may not.
 
     rclpy 7.1.6 sends a request first and notes it then, without a lock: a response that the spinning thread takes in between is dropped
     ("Ignoring unexpected goal response"), and its future never ends. Here responses wait until their request is noted.

@@ -41,7 +41,9 @@ class Goal(Call):
 
 
 class ActionSkill(FunctionSkill[Goal]):
-    """Sends a goal, follows its feedback, and says how it ended; an interruption cancels the goal and waits until it is over.
+    """A skill whose function is an action: sends a goal, follows its feedback, and ends as the goal ends.
+
+    An interruption cancels the goal and waits until it is over.
 
     The skill's inputs fill the goal's fields of the same names, the feedback's ``progress`` (0 to 1) is the skill's, the goal's final
     status says the result, and the ``message`` of the server's result why; ``goal``, ``part_done`` and ``ending`` change that.

@@ -13,7 +13,7 @@ HEARTBEAT_S = 0.5
 
 
 class Heartbeat:
-    """Says twice a second of mission clock that a node which reports these resources is alive.
+    """Sends a heartbeat twice a second of mission clock: the node that reports these resources is alive.
 
     Managers take a resource with a ``silence`` back to its initial state when that is not heard any more. A node that is heard again
     has to report anew what it is: follow ``SkillsetClient.on_change``.

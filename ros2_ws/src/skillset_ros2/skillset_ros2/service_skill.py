@@ -21,7 +21,7 @@ class ServiceCall(Call):
 
 
 class ServiceSkill(FunctionSkill[ServiceCall]):
-    """Calls a service; the answer's ``success`` says the result, its ``message`` why.
+    """A skill whose function is a service: the answer's ``success`` gives the result, its ``message`` the reason.
 
     An interruption calls ``stop_server`` and is done when that has answered; without one it only waits no more, as the caller of a
     service can't take its call back.

@@ -13,7 +13,7 @@ PERIOD_S = 0.2
 
 
 class Watch:
-    """Calls what it is given every period of mission clock, on the executor of its node: one timer for all hooks of a node.
+    """Calls functions every period of mission clock, on the executor of its node: one timer for all hooks of a node.
 
     Where nothing publishes ``/clock`` its mission clock is the wall clock without the steps that NTP may take: what hooks
     measure by it does not end early or late. ``Node.create_timer`` and ``Node.get_clock`` follow such a step.
