@@ -41,9 +41,7 @@ def never_read(whole: Whole) -> Iterator[Problem]:
 def _unread(access: Access, names: list[str]) -> Problem:
     message = f"`{access.name}` is written, and nothing reads it"
     alike = nearest(access.name, names)
-    cure = (
-        alike if alike.startswith("did you mean") else "take it away, or have the mission report it: an output port of the main tree's model"
-    )
+    cure = alike if alike.startswith("did you mean") else "take it away, or report it: an output port of the main tree's model"
     return of_access(access, "ALU624", message, cure, warning=True)
 
 

@@ -74,7 +74,7 @@ def tree_types(places: Sequence[str], *, guess: bool) -> Iterator[NodeType]:
         yield from robot_types(places[0])
         return
     if not library.documents:
-        raise TreeError(f"{places[0]}: there are no trees, so there is nothing to tell of")
+        raise TreeError(f"{places[0]}: there are no trees in it")
     declared = [one for one in library.models.values() if one.category is not Category.SUBTREE]
     if not guess:
         yield from declared

@@ -54,7 +54,7 @@ def groot_address(wanted: str | None) -> str:
 
 def shown_at(groot: str) -> str:
     """Say where viewers find the tree."""
-    return f"Groot2 and its like find the tree at {groot}"
+    return f"Groot2 and other viewers find the tree at {groot}"
 
 
 def run_folder(wanted: Path | None, scenario: str) -> Path:

@@ -214,7 +214,7 @@ class Needs(Condition):
 class NoteReason(SyncAction):
     """Keeps what went wrong up to here as the mission's reason; or, with a text, adds that to what went wrong: no skill tells it."""
 
-    ports = (input_port("text", STRING, "", "what went wrong; empty: what the skills told"),)
+    ports = (input_port("text", STRING, "", "what went wrong; empty: what the skills reported"),)
     ends = SUCCEEDS
     memory: Blackboard
 

@@ -70,7 +70,7 @@ def outcome_words(summary: Mapping[str, Any], died: Sequence[Death], out: Path, 
     if code in BY_EXIT_CODE and all(death.again_s is not None for death in died):  # else it may be the supervisor's
         return f"{MEANING[BY_EXIT_CODE[code]]} (by its exit code; its own account is lost)"
     names = ", ".join(dict.fromkeys(death.name for death in died))
-    return f"the mission came to no outcome: {f'{names} died' if names else 'the run ended early'}; {out / 'logs'} tells why"
+    return f"the mission came to no outcome: {f'{names} died' if names else 'the run ended early'}; {out / 'logs'} has the reasons"
 
 
 def death_lines(died: Sequence[Death]) -> list[str]:

@@ -161,7 +161,7 @@ class ResourceView(Generic[StateT]):
         """
         state = self._client.resources.get(self.name)
         if state is None:
-            raise RuntimeError(f"nothing was heard of {self._client.skillset}.{self.name} yet; call wait_ready first")
+            raise RuntimeError(f"no state of {self._client.skillset}.{self.name} has been received yet; call wait_ready first")
         return cast("StateT", state)
 
     @property

@@ -244,11 +244,7 @@ class _Sizes:
                 inner = type_name(element)
                 if inner in stack:
                     way = " in ".join(f"'{one}'" for one in [inner, *reversed(stack[stack.index(inner) :])])
-                    self._report(
-                        Problem(
-                            element.place, f"a tree contains itself: {way}", "a loop is what Repeat and its like are for", code="ALU007"
-                        )
-                    )
+                    self._report(Problem(element.place, f"a tree contains itself: {way}", "write a loop with Repeat", code="ALU007"))
                 elif inner in self._files.trees:
                     stack.append(inner)
 

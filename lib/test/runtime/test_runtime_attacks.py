@@ -176,7 +176,7 @@ def test_an_end_that_cannot_be_told_with_its_values_is_told_without_them():
     bench.engine._outbox._listener = listener
     assert bench.run().terminate("DONE", "there", {"reached": 2.0})
     assert (told[-1].state, told[-1].result, told[-1].outputs) == (S.TERMINATED, "DONE", {})
-    assert told[-1].message.startswith("there (inputs and outputs could not be told: UnicodeEncodeError")
+    assert told[-1].message.startswith("there (inputs and outputs could not be published: UnicodeEncodeError")
 
 
 # --- hooks that do not return -------------------------------------------------------------------------------------------

@@ -99,7 +99,7 @@ def test_an_entry_that_is_written_later_may_be_the_programs_before():
 
 def test_a_folder_without_trees_has_nothing_to_guess(tmp_path, capsys):
     assert main([str(tmp_path), "--guess"]) == 2
-    assert capsys.readouterr().err == f"alula palette: {tmp_path}: there are no trees, so there is nothing to tell of\n"
+    assert capsys.readouterr().err == f"alula palette: {tmp_path}: there are no trees in it\n"
 
 
 @pytest.mark.parametrize(

@@ -27,7 +27,7 @@ WRONG = {
     "<Sleep ID='x' msec='3'/>": '8: <Sleep> takes no ID; the tag is its type; call it by name="..."',
     "<main/>": "1: unknown node 'main'; it is a tree: write <SubTree ID=\"main\"/>",
     "<SubTree ID='man'/>": "10: there is no tree 'man'; did you mean main?",
-    "<SubTree ID='main'/>": "1: a tree contains itself: 'main' in 'main'; a loop is what Repeat and its like are for",
+    "<SubTree ID='main'/>": "1: a tree contains itself: 'main' in 'main'; write a loop with Repeat",
     "<ReactiveSequence><AsyncSequence><AlwaysSuccess/></AsyncSequence><AsyncSequence><AlwaysSuccess/></AsyncSequence></ReactiveSequence>": (
         "66: a second AsyncSequence in a ReactiveSequence; only one child may take several ticks"
     ),

@@ -61,6 +61,6 @@ def _without_values(event: EngineEvent, error: Exception) -> EngineEvent:
     """Return an event without the values of hooks and callers; its message says why they are missing."""
     if not isinstance(event, ExecutionEvent):
         return event
-    reason = f"inputs and outputs could not be told: {error_line(error)}"
+    reason = f"inputs and outputs could not be published: {error_line(error)}"
     message = f"{event.message} ({reason})" if event.message else reason
     return replace(event, message=as_text(message), inputs={}, outputs={})
