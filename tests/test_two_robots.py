@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import json
 import os
+import shutil
 import subprocess
 from pathlib import Path
 from typing import Any
@@ -13,19 +14,23 @@ import pytest
 
 from alula.common.processes import processes_of_run
 from alula.common.record import EVENTS, read_record
+from alula.prove.limits import Deadline
+from alula.repair.repairing import Question, Search
+from alula.repair.subject import Subject
+from repair_bench.cases import without_the_others_turn
 
 ALULA_ROOT = Path(__file__).resolve().parents[1]
 FLEET = ALULA_ROOT / "examples/two_robots"
 
 
-def command(module: str, *words: str) -> subprocess.CompletedProcess[str]:
-    environment = {**os.environ, "ALULA_ROBOT": str(FLEET)}
+def command(module: str, *words: str, fleet: Path = FLEET) -> subprocess.CompletedProcess[str]:
+    environment = {**os.environ, "ALULA_ROBOT": str(fleet)}
     command = [str(ALULA_ROOT / "setup/in_ros2"), "python", "-m", f"alula.cli.{module}", *words]
     return subprocess.run(command, capture_output=True, text=True, check=False, env=environment)
 
 
-def run(out: Path, code: int, *words: str) -> dict[str, Any]:
-    done = command("run", "meet", "--mock", "--out", str(out), *words)
+def run(out: Path, code: int, *words: str, fleet: Path = FLEET) -> dict[str, Any]:
+    done = command("run", "meet", "--mock", "--out", str(out), *words, fleet=fleet)
     assert done.returncode == code, done.stdout + done.stderr
     assert (out / "report.html").is_file()
     return dict(json.loads((out / "summary.json").read_text(encoding="utf-8")))
@@ -85,6 +90,33 @@ def test_the_mission_of_both_is_checked_and_drawn_by_their_models(tmp_path: Path
     palette = command("palette", str(FLEET)).stdout
     assert '<Action ID="rover_base.drive_to">' in palette
     assert '<Action ID="drone_navigation.takeoff">' in palette
+
+
+def test_the_branch_by_which_the_other_robot_goes_there_is_written_again(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    """It is deleted first; the drone is still for `arrival`, and the rover, which comes later, is so, too."""
+    fleet = tmp_path / "fleet"
+    shutil.copytree(FLEET, fleet, ignore=shutil.ignore_patterns("runs", ".alula"))
+    (fleet / "robot.yaml").write_text(
+        (FLEET / "robot.yaml").read_text().replace("../..", str(ALULA_ROOT)).replace("../rover", str(ALULA_ROOT / "examples/rover"))
+    )
+    mission = without_the_others_turn(ALULA_ROOT, fleet / "missions").mission
+    assert run(tmp_path / "before", 1, "--fail", "drone_zed@4", fleet=fleet)["outcome"] == "given_up"
+    monkeypatch.setenv("ALULA_ROBOT", str(fleet))
+    subject = Subject.read(mission, pytest.fail)
+    search = Search(subject, Question("drone_zed", most_faults=1, others=False), Deadline.after(600.0, print), print)
+    repair = search.run().repair
+    assert repair is not None
+    assert (repair.branch.size, repair.left) == (1, ())
+    assert "rover_base.drive_to comes later, and is for arrival, too." in " ".join(repair.text.split())
+    mission.write_text(repair.text)
+    checked = command("check", str(mission), "--json", "--time", "600", fleet=fleet)
+    assert checked.returncode == 0, checked.stdout + checked.stderr
+    (file,) = json.loads(checked.stdout)["files"]
+    assert [one["severity"] for one in file["findings"]] == ["note"], "what the file accepts"
+    for words, outcome in (((), "accomplished"), (("--fail", "drone_zed@4"), "degraded"), (("--fail", "drone_zed@1"), "degraded")):
+        summary = run(tmp_path / f"{outcome}{''.join(words)}", 0, *words, fleet=fleet)
+        by_hand = run(tmp_path / f"hand{outcome}{''.join(words)}", 0, *words)
+        assert (summary["outcome"], skills(summary)) == (outcome, skills(by_hand))
 
 
 MISSION = """

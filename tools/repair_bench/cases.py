@@ -92,6 +92,19 @@ def without_chances(root: Path, folder: Path) -> Case:
     return Case(robot, folder / "patrol.xml", "person")
 
 
+def without_the_others_turn(root: Path, folder: Path) -> Case:
+    """Return the mission of drone and rover without what has the rover sent to where the drone came, when it can't fly on."""
+    robot = root / "examples/two_robots"
+    copied(robot, folder)
+    put(
+        folder / "meet.xml",
+        "",
+        r' *<Fallback name="fly there, or as far as it goes">\n',
+        r' *<Script name="not all the way"[^>]*/>\n *</Fallback>\n',
+    )
+    return Case(robot, folder / "meet.xml", "drone_zed")
+
+
 def without_sensor(root: Path, folder: Path) -> Case:
     """Return the drone's mapping as it is, which nothing can map without the LiDAR."""
     copied(root, folder)
@@ -104,6 +117,7 @@ ROBOTS: Mapping[str, Callable[[Path, Path], Case]] = {
     "drone, lidar": without_sensor,
     "drone, radio": without_video_end,
     "rover, person": without_chances,
+    "two robots, zed": without_the_others_turn,
 }
 
 # --- robots that grow ------------------------------------------------------------------------------------------------

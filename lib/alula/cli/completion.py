@@ -22,7 +22,7 @@ from alula.cli.checkout import Checkout, checkout
 from alula.cli.parser import Parser, words_completing
 from alula.cli.table import COMMANDS, Command, parse
 from alula.common.deployments import deployment_names
-from alula.common.robots import FAULTS, RobotError, RobotFolder, find_robot
+from alula.common.robots import RobotError, RobotFolder, find_robot
 from alula.common.scenarios import ScenarioError, load_scenario, scenario_names
 
 if TYPE_CHECKING:
@@ -149,12 +149,11 @@ def _faults(robot: RobotFolder, _: Namespace) -> Iterable[str]:
 
 
 def _in_file(robot: RobotFolder) -> Iterable[str]:
-    from alula.records.causes.fault_file import load_effects
+    from alula.records.causes.fault_file import effects_of
     from alula.records.errors import AnalysisError
 
-    file = robot.file(FAULTS)
     try:
-        return [] if file is None else load_effects(file, _models(robot)).known
+        return effects_of(robot, _models(robot)).known
     except AnalysisError:
         return []
 

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Iterable, Mapping
 from dataclasses import replace
 
 from alula.common.robots import RobotFolder, fleet_name
@@ -52,3 +52,9 @@ def places_of(fleet: RobotFolder) -> dict[str, tuple[str, str]]:
 def in_fleet(robot: str, skillsets: tuple[Skillset, ...]) -> tuple[Skillset, ...]:
     """Return a robot's skillsets under their names in a fleet."""
     return tuple(replace(one, name=fleet_name(robot, one.name)) for one in skillsets)
+
+
+def of_robot(robot: str, skillsets: Iterable[Skillset]) -> tuple[Skillset, ...]:
+    """Return the skillsets of a fleet that are a robot's, under their own names."""
+    before = fleet_name(robot, "")
+    return tuple(replace(one, name=one.name.removeprefix(before)) for one in skillsets if one.name.startswith(before))

@@ -3,9 +3,11 @@
 from __future__ import annotations
 
 import itertools
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from fractions import Fraction
+
+from alula.odds.system import DEPARTURE
 
 
 @dataclass(frozen=True)
@@ -150,6 +152,14 @@ class Figures:
     def at_use(self) -> frozenset[str]:
         """The faults that come at a use of something."""
         return frozenset(name for name, fault in self.faults.items() if fault.chances)
+
+    def named(self, name: Callable[[str], str]) -> Figures:
+        """Return them for skillsets and faults that are called otherwise: ``name`` makes what begins with such a name of what is here."""
+        faults = {
+            name(what): replace(one, chances={use if use == DEPARTURE else name(use): chance for use, chance in one.chances.items()})
+            for what, one in self.faults.items()
+        }
+        return Figures(faults, {name(skill): one for skill, one in self.skills.items()})
 
     def with_fault(self, name: str, **changed: object) -> Figures:
         """Return the figures with some of a fault's changed."""

@@ -22,7 +22,9 @@ from alula.model.model import Skill
 from alula.odds.figures import NEVER, Figures
 from alula.odds.system import DEPARTURE, Kind, Outcome, Step
 from alula.prove.mission.conditions import true_in
+from alula.prove.mission.measured import DATA, FRESH
 from alula.prove.mission.oracle import Asked
+from alula.prove.mission.own import actions, failing_among
 from alula.prove.mission.state import Event, State
 from alula.prove.mission.state import Kind as Happens
 from alula.prove.mission.system import System
@@ -75,6 +77,7 @@ class MissionSteps:
         self._figures = figures
         self._states = {pair for several in brought.values() for pair in several}
         self._at_first = frozenset(at_first)
+        self._actions = actions(system.nodes)
 
     def initial(self) -> list[Place]:
         """Return the situation at power-up."""
@@ -148,7 +151,9 @@ class MissionSteps:
         told = [(*_waited(event.choices), state._replace(state=after)) for event, after in ticks]
         still = [(others, target) for waits, others, target in told if not waits]
         kind = Kind.NOW if _complete([others for others, _ in still]) else Kind.SOON
-        yield from (Step(kind if others else Kind.NOW, "tick", target) for others, target in still)
+        for others, target in still:
+            failing = failing_among(others, self._actions) or _silent(others)
+            yield Step(kind if others else Kind.NOW, "tick", target, failing=failing)
         if kind is Kind.SOON:
             least = min((len(waits) for waits, _, _ in told if waits), default=0)
             for waits, _, target in told:
@@ -228,6 +233,11 @@ def _touches(fault: FaultEffects, system: System) -> bool:
     ends += [f"{name} {one.name}" for name, skill in skills.items() for one in skill.invariants]
     shown = any(_any((*fault.states, *fault.later), text) for text in resources)
     return shown or any(_any(fault.ends, text) for text in (*ends, *(f"{name} {Happens.FAIL.value}" for name in skills)))
+
+
+def _silent(choices: Iterable[Asked]) -> str:
+    """Return data of which a tick finds no fresh value; empty: there are none."""
+    return next((str(one.question[1]) for one in choices if one.question[::2] == (DATA, FRESH) and one.answer is False), "")
 
 
 def _waited(choices: Sequence[Asked]) -> tuple[list[Asked], list[Asked]]:

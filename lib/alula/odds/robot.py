@@ -2,13 +2,13 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from pathlib import Path
 
 from alula.check.robot import Warn, models_of, part_of
 from alula.common.robots import FAULTS, RobotFolder, find_robot
 from alula.missions.scenario import by_mission, flown, inputs_of
-from alula.mock import Behaviour, load_behaviour
+from alula.mock import Behaviour
 from alula.mock.behaviour import Place
 from alula.model.model import Skillset
 from alula.odds.figures import Figures
@@ -19,7 +19,9 @@ from alula.prove.mission.findings import taken_as
 from alula.prove.mission.managers import Failures
 from alula.prove.mission.system import System, look_at
 from alula.records.causes.effects import FaultEffects
-from alula.records.causes.fault_file import load_effects
+from alula.records.causes.fault_file import effects_of
+from alula.records.mocks import behaviour_of
+from alula.records.models import members
 
 COUNTED = 100  # attempts and rounds, exactly: each has its share of the odds
 
@@ -106,8 +108,20 @@ def graph_of(
 
 
 def _of_faults(robot: RobotFolder, models: Sequence[Skillset]) -> tuple[Figures, Mapping[str, FaultEffects]]:
+    return figures_of(robot, models), effects_of(robot, models).known
+
+
+def figures_of(robot: RobotFolder, models: Sequence[Skillset]) -> Figures:
+    """Return the figures of a robot with these models; those of a fleet are its robots', under the fleet's names.
+
+    Raises OddsError where a file can't be read or is wrong.
+    """
+    if robot.robots:
+        each = [figures_of(one.robot, one.skillsets).named(one.name) for one in members(robot, models)]
+        faults = {what: figures for one in each for what, figures in one.faults.items()}
+        return Figures(faults, {skill: figures for one in each for skill, figures in one.skills.items()})
     file = robot.file(FAULTS)
-    return (Figures(), {}) if file is None else (load_figures(file, models), load_effects(file, models).known)
+    return Figures() if file is None else load_figures(file, models)
 
 
 def brought_about(robot: RobotFolder, models: Sequence[Skillset]) -> tuple[Brought, frozenset[tuple[str, str]]]:
@@ -115,9 +129,15 @@ def brought_about(robot: RobotFolder, models: Sequence[Skillset]) -> tuple[Broug
 
     Raises AlulaError where a file of mocks can't be read.
     """
-    mocks = load_behaviour(robot.behaviour_files, models)
-    at_first = frozenset(_named(place, state) for one in mocks.timeline for place, state in one.states.items())
-    return _brought(mocks), at_first
+    several = list(_with_those_beside(behaviour_of(robot, skillsets=models)))
+    at_first = frozenset(_named(place, state) for mocks in several for one in mocks.timeline for place, state in one.states.items())
+    return {skill: pairs for mocks in several for skill, pairs in _brought(mocks).items()}, at_first
+
+
+def _with_those_beside(mocks: Behaviour) -> Iterator[Behaviour]:
+    yield mocks
+    for one in mocks.beside:
+        yield from _with_those_beside(one)
 
 
 def _brought(mocks: Behaviour) -> Brought:

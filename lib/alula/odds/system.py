@@ -49,6 +49,8 @@ class Step(Generic[State]):
         result: how an execution ends, or the precondition by which a request is refused.
         uses: what is used from here on: skills that start, as ``skillset.skill``, and DEPARTURE.
         seconds: how long a WAIT is; 0: the figures of the skill ``name`` say so.
+        failing: what is taken to fail though no fault says so: an action of the robot's own of which nobody knows what it does, or data
+            of which no fresh value is there.
     """
 
     kind: Kind
@@ -57,6 +59,7 @@ class Step(Generic[State]):
     result: str = ""
     uses: tuple[str, ...] = ()
     seconds: float = 0.0
+    failing: str = ""
 
 
 class LabelledSystem(Protocol[State]):

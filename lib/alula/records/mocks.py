@@ -4,20 +4,21 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import replace
-from functools import partial
 from pathlib import Path
 
-from alula.common.robots import RobotFolder, fleet_name
+from alula.common.robots import RobotFolder
 from alula.mock import Behaviour, load_behaviour
-from alula.records.models import robot_model
+from alula.model.model import Skillset
+from alula.records.models import members, robot_model
 
 
-def behaviour_of(robot: RobotFolder, files: Sequence[Path] = ()) -> Behaviour:
-    """Return what a robot's mocks do, with behaviour files on top.
+def behaviour_of(robot: RobotFolder, files: Sequence[Path] = (), skillsets: Sequence[Skillset] | None = None) -> Behaviour:
+    """Return what a robot's mocks do, with behaviour files on top; ``skillsets`` in the place of the robot's own.
 
     Raises:
         AnalysisError, SkillRuntimeError: a model or a file is wrong, with its place.
     """
-    own = load_behaviour([*robot.behaviour_files, *files], robot_model(robot).skillsets)
-    beside = [behaviour_of(one, robot.mocks_on_top(name)).named(partial(fleet_name, name)) for name, one in robot.robots.items()]
+    models = robot_model(robot).skillsets if skillsets is None else skillsets
+    own = load_behaviour([*robot.behaviour_files, *files], models)
+    beside = [behaviour_of(one.robot, one.mocks, one.skillsets).named(one.name) for one in members(robot, models)]
     return replace(own, beside=tuple(beside))

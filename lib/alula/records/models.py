@@ -3,12 +3,13 @@
 from __future__ import annotations
 
 import functools
-from collections.abc import Iterable, Mapping, Sequence
+from collections.abc import Callable, Iterable, Mapping, Sequence
+from dataclasses import dataclass
 from pathlib import Path
 
-from alula.common.robots import RobotError, RobotFolder, find_robot
+from alula.common.robots import RobotError, RobotFolder, find_robot, fleet_name
 from alula.language.errors import LanguageError
-from alula.language.fleet import together
+from alula.language.fleet import of_robot, together
 from alula.language.load import load_robot, load_skillset
 from alula.language.robot import Robot
 from alula.model.model import Skillset
@@ -23,6 +24,32 @@ def robot_model(folder: RobotFolder) -> Robot:
         return _loaded(folder.skillsets, tuple(path.stat().st_mtime_ns for path in sorted(folder.skillsets.glob("*"))))
     except (LanguageError, OSError) as error:
         raise AnalysisError(str(error)) from None
+
+
+@dataclass(frozen=True)
+class Member:
+    """A robot of a fleet.
+
+    Attributes:
+        robot: its folder.
+        skillsets: its models, under their own names.
+        name: makes what begins with a name in the fleet, of a skillset or a fault, of what begins with the robot's own.
+        mocks: the files by which the fleet adds to what its mocks do.
+    """
+
+    robot: RobotFolder
+    skillsets: tuple[Skillset, ...]
+    name: Callable[[str], str]
+    mocks: tuple[Path, ...]
+
+
+def members(fleet: RobotFolder, skillsets: Iterable[Skillset]) -> list[Member]:
+    """Return the robots of a fleet that has these models; none of a robot."""
+    several = tuple(skillsets)
+    return [
+        Member(robot, of_robot(name, several), functools.partial(fleet_name, name), tuple(fleet.mocks_on_top(name)))
+        for name, robot in fleet.robots.items()
+    ]
 
 
 @functools.lru_cache(maxsize=8)

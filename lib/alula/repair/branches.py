@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import copy
+import re
 from collections.abc import Iterator
 from dataclasses import dataclass
 from enum import IntEnum
@@ -24,8 +25,9 @@ class Rank(IntEnum):
     """What a branch leads to; those that lead to better are tried first."""
 
     GOES_ON = 0
-    ENDS_WELL = 1
-    GIVES_UP = 2
+    LEAVES_OUT = 1
+    ENDS_WELL = 2
+    GIVES_UP = 3
 
 
 @dataclass(frozen=True)
@@ -78,9 +80,21 @@ class Branch:
         return node_name(self.use)
 
     def as_xml(self) -> str:
-        """Return the subtree as it will stand in the file."""
-        around = list(_lines(self.use, 0)) if self.around else []
-        return "\n".join([*around, *(_lines_of_tree(self) if self.tree is not None else [])])
+        """Return what is put into the file: its subtree, else the node that is put in."""
+        use = list(_lines(self.use, 0)) if self.around or self.tree is None else []
+        use[:0] = self._comment(WIDTH)
+        return "\n".join([*use, *(_lines_of_tree(self) if self.tree is not None else [])])
+
+    def comment_at(self, lead: str) -> list[str]:
+        """Return the same behind a line break and an indentation."""
+        return [f"{lead}{line}" for line in self._comment(WIDTH - len(lead) + 1)]
+
+    def _comment(self, width: int) -> list[str]:
+        """Return why a node is put in that has no tree of its own, which would say it."""
+        if self.tree is not None or self.around:
+            return []
+        lines = wrap(_said(" ".join(self.why)), width - len("<!--  -->"))
+        return [f"{'     ' if number else '<!-- '}{line}{' -->' if line is lines[-1] else ''}" for number, line in enumerate(lines)]
 
     def written(self, subject: Subject, leave_out: tuple[str, ...] = (), more: str = "") -> tuple[str, list[str]]:
         """Return the mission's file with it, and the properties that ask for nodes of these names, which are left out.
@@ -132,9 +146,12 @@ def _insert(document: Document, branch: Branch) -> None:
     elif parent.tag in FALLBACKS:
         lead = _lead(parent, element)
         place = parent.content.index(element)
-        parent.content[place + 1 : place + 1] = [lead, use]
+        parent.content[place + 1 : place + 1] = [*branch.comment_at(lead), lead, use]
     else:
-        _wrap(parent, element, use, f"{node_name(element)}, or else")
+        lead = _lead(parent, element) + STEP
+        outer = _wrap(parent, element, use, f"{node_name(element)}, or else")
+        place = outer.content.index(use) - 1
+        outer.content[place:place] = branch.comment_at(lead)
     if branch.tree is not None:
         top = next(one for one in root.children if any(part is element for part in one.iterate()))
         text = f"\n\n{_indented(_lines_of_tree(branch), 1)}"
@@ -142,8 +159,10 @@ def _insert(document: Document, branch: Branch) -> None:
         root.content[place + 1 : place + 1] = [text]
 
 
-def _wrap(parent: Element, element: Element, use: Element, name: str) -> None:
-    _put_around(parent, element, node("Fallback", node(HOLE), use, name=name))
+def _wrap(parent: Element, element: Element, use: Element, name: str) -> Element:
+    outer = node("Fallback", node(HOLE), use, name=name)
+    _put_around(parent, element, outer)
+    return outer
 
 
 def _with_hole(use: Element) -> Element:
@@ -197,9 +216,14 @@ def tree_lines(name: str, top: Element) -> list[str]:
 
 def _lines_of_tree(branch: Branch) -> list[str]:
     assert branch.tree is not None  # noqa: S101 - who asks has one
-    said = [f"{STEP}{line}" for one in branch.why for line in wrap(one, WIDTH - 2 * len(STEP))]
+    said = [f"{STEP}{line}" for one in branch.why for line in wrap(_said(one), WIDTH - 2 * len(STEP))]
     comment = ["<!--", *said, "-->"] if said else []
     return [*comment, *tree_lines(branch.use_id, branch.tree)]
+
+
+def _said(text: str) -> str:
+    """Return what a comment of XML may say: names that authors give may have two hyphens side by side, a comment must not."""
+    return re.sub("-(?=-)", "- ", text)
 
 
 def _lines(element: Element, level: int) -> Iterator[str]:

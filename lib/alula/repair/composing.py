@@ -115,7 +115,7 @@ class Composer:
         leaf = instead if instead is not None else self.sources.leaf(purpose, known)
         several = [[leaf]] if leaf is not None else []
         for role in purpose.skill.needs:
-            providers = self.courses.providers(here, role.name)
+            providers = self.courses.providers(here, role.name, purpose)
             watching = [one for one in (self.sources.leaf(each, {}) for each in providers) if one is not None]
             several = [[*one, watch] for one in several for watch in (watching if self.alternatives else watching[:1])]
         ways = [_watched(one[0], one[1:]) for one in several]

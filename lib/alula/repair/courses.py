@@ -117,7 +117,7 @@ class Courses:
     def after(self, here: Here, purpose: Purpose) -> Here | None:
         """Return what is so after a success of a skill; None: it can't start, or what it needs can't run."""
         started = self._started(here, purpose)
-        if started is None or any(not self.providers(here, role.name) for role in purpose.skill.needs):
+        if started is None or any(not self.providers(here, role.name, purpose) for role in purpose.skill.needs):
             return None
         model, execution = self._models[purpose.skillset.name], started.running[0]
         ended = semantics.terminate(model, started, execution, purpose.skill.successes[0].name).situation
@@ -135,9 +135,9 @@ class Courses:
         """Tell whether a skill is one of those that courses are made of."""
         return purpose in self._acting
 
-    def providers(self, here: Here, role: str) -> list[Purpose]:
-        """Return the skills that can fill a role while another one runs."""
-        return [one for one in self._purposes.watching(role) if self._started(here, one) is not None]
+    def providers(self, here: Here, role: str, needed: Purpose) -> list[Purpose]:
+        """Return the skills that can fill a role while one runs that needs it."""
+        return [one for one in self._purposes.watching(role, needed) if self._started(here, one) is not None]
 
     def _started(self, here: Here, purpose: Purpose) -> Situation | None:
         model = self._models[purpose.skillset.name]

@@ -3,8 +3,9 @@
 The world's moves are those that the odds are computed from (`MissionSteps`): what a mission's skills bring about, what the functional layer
 does in time, the chosen faults in their order, each at any moment, and whatever a fault that is there may bring about. A fault that has
 come stays, but it ends skills badly no more often than faults may come. Requests are not refused, and executions not ended, by data of
-which nothing is known, unless a fault that is there does that. Executions end well; fairness is the prover's: what can happen again and
-again happens some time. So a mission survives when, from every situation that it can come into, it can still be accomplished.
+which nothing is known, unless a fault that is there does that. Data are told, and actions of the robot's own do not fail of which nobody
+knows what they do. Executions end well; fairness is the prover's: what can happen again and again happens some time. So a mission survives
+when, from every situation that it can come into, it can still be accomplished.
 
 A state that comes `later`, of what others do about a fault, such as an autopilot that flies home by itself, may be one after which no
 mission can do anything. So situations without such states are looked at first: a mission that survives in these does under an assumption.
@@ -64,7 +65,7 @@ class Fate:
         faults: those that come, in their order.
         outcomes: how it can end after them; ``none``: it may also wait for ever.
         survives: it is always accomplished, degraded or not.
-        safe: it always ends, and the robot is at rest, at home or somebody else's then.
+        safe: it always ends, and each robot is at rest, at home or somebody else's then.
         run: what happens in a run after which it can't be accomplished any more.
         states: those of the resources then.
         situations: how many were looked at.
@@ -103,13 +104,13 @@ def fate_of(
     skillsets: Sequence[Skillset],
     faults: Sequence[str],
     deadline: Deadline,
-    rest: Sequence[tuple[str, str]] = (),
+    rest: Sequence[Sequence[tuple[str, str]]] = (),
     most: int | None = None,
     goal: Expression | None = None,
     strikes: int = MOST_FAULTS,
     reached: Expression | None = None,
 ) -> Fate | None:
-    """Return it; None: there are more situations than ``most``. ``rest`` are states of resources in which a robot is safe.
+    """Return it; None: there are more situations than ``most``. ``rest`` are states of resources, in one of which each robot is safe.
 
     With a ``goal``, a mission survives, too, when it comes to be true after the faults; what has to be ``reached`` is true at a good end.
     Faults end skills badly ``strikes`` times.
@@ -134,7 +135,7 @@ def fate_of(
         return None
     lost = graph.first_without_way(is_good) if later else lost_before
     ended = [one for one in graph.before if steps.outcome(one.place) is not None]
-    at_rest = all(not rest or any(steps.resource(one.place, name) == state for name, state in rest) for one in ended)
+    at_rest = all(any(steps.resource(one.place, name) == state for name, state in safe) for one in ended for safe in rest)
     safe = at_rest and graph.first_without_way(lambda here: steps.outcome(here.place) is not None) is None
     last = [steps.outcome(one.place) for one in graph.before if one.come == len(faults) and one in graph.ends]
     outcomes = frozenset("none" if one is None else one.value for one in last)
@@ -214,15 +215,20 @@ def needs(steps: MissionSteps, skillsets: Sequence[Skillset], skill: str, deadli
         deadline.check()
         if steps.outcome(here.place) in GOOD:
             return False
-        for step, there in _following(steps, here, (), ends, 0):
+        for step, there in _following(steps, here, (), ends, 0, also_failing=True):
             if skill not in step.uses and there not in seen:
                 seen.add(there)
                 todo.append(there)
     return True
 
 
-def _following(steps: MissionSteps, here: Here, faults: Sequence[str], ends: _Ends, strikes: int) -> list[tuple[Step[Place], Here]]:
-    """Return the steps that are taken; while the software is at work, nothing but a fault comes between."""
+def _following(
+    steps: MissionSteps, here: Here, faults: Sequence[str], ends: _Ends, strikes: int, *, also_failing: bool = False
+) -> list[tuple[Step[Place], Here]]:
+    """Return the steps that are taken; while the software is at work, nothing but a fault comes between.
+
+    ``also_failing``: what may fail though no fault says so, fails, too.
+    """
     place = here.place
     found: list[tuple[Step[Place], Here]] = []
     several = list(steps.steps(place))
@@ -234,6 +240,8 @@ def _following(steps: MissionSteps, here: Here, faults: Sequence[str], ends: _En
                 if here.come < len(faults) and step.name == faults[here.come]:
                     found.append((step, there._replace(come=here.come + 1)))
             case Kind.MENDED:
+                pass
+            case _ if step.failing and not also_failing:
                 pass
             case Kind.END if step.result not in ends.good[step.name]:
                 pass

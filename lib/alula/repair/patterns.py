@@ -3,6 +3,7 @@
 - What failed once more, where a fault is no more than its bad end, or once what it needs was brought about.
 - A subtree of the files that nothing uses.
 - What failed, with skills that stand for those that can't run (`standing_in`).
+- Nothing, where a later step fills the role of what failed all the same, with other skillsets: another robot of a fleet.
 - The place that the mission calls safe; rest, where the author calls the mission degraded then.
 - What the mission does to come to rest, and giving up.
 """
@@ -42,7 +43,7 @@ class Patterns:
         self._subject = subject
         self._most_faults = most_faults
         self._most_nodes = most
-        self._purposes = Purposes(subject.skillsets, subject.brought)
+        self._purposes = Purposes(subject.skillsets, subject.brought, subject.robot.robots)
         self._using = frozenset(using)
         self._trees = subject.files.trees
         sources = Sources(subject.files, palette_of(subject.files, subject.skillsets, subject.part))
@@ -67,6 +68,10 @@ class Patterns:
         found = [self._purposes.known[failing.skill], *self._purposes.alike(failing.skill)]
         return [one for one in found if one.name == failing.skill or not self._using or one.name in self._using]
 
+    def may_leave_out(self, failing: Failing) -> bool:
+        """Tell whether the mission may go on without what failed, as something else is for the same."""
+        return any(True for place in self.places(failing.leaf) for _ in self._remedies.without(place, failing))
+
     def places(self, leaf: Node) -> Iterator[Node]:
         """Yield the nodes of the mission's own file that a branch may stand beside, from the leaf up."""
         at: Node | None = leaf
@@ -79,6 +84,7 @@ class Patterns:
         yield from list(self._remedies.around(place, failing, states)) or self._again(place, failing)
         beside = [*self._unused(place, failing), *self._stand_ins.beside(place, failing)]
         beside += self._remedies.other_ways(place, failing, states)
+        beside += self._remedies.without(place, failing)
         if place.parent is None or (place.parent.parent is None and _in_fallback(place)):
             beside += self._remedies.at_the_safe_place(place, failing, states)
             beside += self._coming_to_rest(place, failing)

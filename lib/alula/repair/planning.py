@@ -101,7 +101,7 @@ class Planner:
             subject = Subject.read(path, tell)
         self._start = _states_of(aim.start, subject.skillsets)
         self._subject = _begun_in(subject, self._start)
-        self._purposes = Purposes(self._subject.skillsets, self._subject.brought)
+        self._purposes = Purposes(self._subject.skillsets, self._subject.brought, subject.robot.robots)
         wrong = [one for one in aim.using if one not in self._purposes.known]
         if wrong:
             raise RepairError(f"--using {wrong[0]}: there is no such skill; there are {', '.join(sorted(self._purposes.known))}")
@@ -166,7 +166,7 @@ class Planner:
         here = Here(states)
         for purpose in self._purposes.known.values():
             unmet = [one for one in purpose.skill.preconditions if not here.fulfils((purpose.skillset.name, one.condition))]
-            missing = [one.name for one in purpose.skill.needs if not self._courses.providers(here, one.name)]
+            missing = [one.name for one in purpose.skill.needs if not self._courses.providers(here, one.name, purpose)]
             if purpose.achieves and (unmet or missing):
                 yield f"{purpose.name} can't start at first: {', '.join([*(one.name for one in unmet), *missing])}"
 
@@ -223,10 +223,14 @@ class Planner:
 
     def _rest(self, course: Course) -> list[Element]:
         """Return what brings the robot to rest from anywhere in the course; nothing where it is at rest all the time."""
-        safe = self._subject.at_rest
-        moving = [one for one in course.heres if safe and not any(one.states.get(name) == state for name, state in safe)]
+        robots = self._subject.at_rest
+
+        def is_safe(here: Here) -> bool:
+            return all(any(here.states.get(name) == state for name, state in safe) for safe in robots)
+
+        moving = [one for one in course.heres if not is_safe(one)]
         for here in moving[:1]:
-            found = self._courses.to(here.states, lambda other: any(other.heres[-1].states.get(name) == state for name, state in safe))
+            found = self._courses.to(here.states, lambda other: is_safe(other.heres[-1]))
             for way in islice(found, 1):
                 return self._composer.after_one_another(way, None, {}, {})
         return []
@@ -236,7 +240,7 @@ class Planner:
         asked: dict[tuple[str, str], str] = {}
         for number, step in enumerate(course.steps):
             here = course.heres[number]
-            beside = [one for role in step.skill.needs for one in self._courses.providers(here, role.name)[:1]]
+            beside = [one for role in step.skill.needs for one in self._courses.providers(here, role.name, step)[:1]]
             for one in (step, *beside):
                 for resource, state in asked_of_others(one):
                     name = f"{one.skillset.name}.{resource.name}"

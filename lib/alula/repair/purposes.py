@@ -13,6 +13,7 @@ from __future__ import annotations
 from collections.abc import Collection, Iterator, Mapping, Sequence
 from dataclasses import dataclass
 
+from alula.common.robots import fleet_name
 from alula.model.conditions import NO_DATA, judge
 from alula.model.expressions import ResourceIs
 from alula.model.model import Resource, Skill, Skillset
@@ -27,12 +28,14 @@ class Purpose:
         skill: its model.
         achieves: its successful results; none: it is there to run.
         holds: the resources that its start changes, each with the state that it takes it to.
+        robot: of a fleet, the one that has it.
     """
 
     skillset: Skillset
     skill: Skill
     achieves: frozenset[str]
     holds: Mapping[str, str]
+    robot: str
 
     @property
     def name(self) -> str:
@@ -51,16 +54,24 @@ class Purpose:
 
 
 class Purposes:
-    """What the skills of a robot are for; ``brought``: what their mocks bring about in the functional layer."""
+    """What the skills of a robot are for, or of the ``robots`` of a fleet; ``brought``: what their mocks bring about.
 
-    def __init__(self, skillsets: Sequence[Skillset], brought: Mapping[str, Collection[tuple[str, str]]] | None = None) -> None:
+    In a fleet, no robot's skill stands for another one's, or fills a role that another one needs: it does so somewhere else.
+    """
+
+    def __init__(
+        self,
+        skillsets: Sequence[Skillset],
+        brought: Mapping[str, Collection[tuple[str, str]]] | None = None,
+        robots: Collection[str] = (),
+    ) -> None:
         self.brought = brought or {}
-        self.known = {f"{of.name}.{one.name}": _purpose(of, one) for of in skillsets for one in of.skills}
+        self.known = {f"{of.name}.{one.name}": _purpose(of, one, _robot_of(of, robots)) for of in skillsets for one in of.skills}
 
     def stand_ins(self, name: str) -> list[Purpose]:
         """Return the skills that may stand for this one, those first that are most like it."""
         mine = self.known[name]
-        found = [one for one in self.known.values() if one.name != name and _stands_for(one, mine)]
+        found = [one for one in self.known.values() if one.name != name and one.robot == mine.robot and _stands_for(one, mine)]
         return sorted(found, key=lambda one: (len(_words(one) ^ _words(mine)), one.name))
 
     def alike(self, name: str) -> list[Purpose]:
@@ -69,9 +80,9 @@ class Purposes:
         same = {one.name for one in self._of(mine) if (one.inputs, one.achieves) == (mine.inputs, mine.achieves)}
         return [one for one in self.known.values() if one.name != name and (one.name in same or mine.roles & one.roles)]
 
-    def watching(self, role: str) -> list[Purpose]:
-        """Return the skills that fill a role while they run."""
-        return [one for one in self.known.values() if not one.achieves and role in one.roles]
+    def watching(self, role: str, needed: Purpose) -> list[Purpose]:
+        """Return the skills that fill a role while they run, for one that needs it."""
+        return [one for one in self.known.values() if not one.achieves and role in one.roles and one.robot == needed.robot]
 
     def holders(self, needed: Purpose, instead: Purpose) -> list[Purpose] | None:
         """Return skills that hold what ``needed`` holds and ``instead`` does not, one for each resource; None: nothing holds one."""
@@ -94,9 +105,13 @@ class Purposes:
         return (one for one in self.known.values() if one.skillset.name == other.skillset.name)
 
 
-def _purpose(skillset: Skillset, skill: Skill) -> Purpose:
+def _robot_of(skillset: Skillset, robots: Collection[str]) -> str:
+    return max((one for one in robots if skillset.name.startswith(fleet_name(one, ""))), key=len, default="")
+
+
+def _purpose(skillset: Skillset, skill: Skill, robot: str) -> Purpose:
     achieves = frozenset(one.name for one in skill.successes)
-    return Purpose(skillset, skill, achieves, {one.resource: one.target for one in skill.start.assignments})
+    return Purpose(skillset, skill, achieves, {one.resource: one.target for one in skill.start.assignments}, robot)
 
 
 def _stands_for(one: Purpose, other: Purpose) -> bool:

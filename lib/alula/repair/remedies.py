@@ -62,9 +62,11 @@ class Remedies:
         used = {type_name(one) for tree in trees for one in tree.iterate()} & set(self._purposes.known)
         roles = {role for name in used for role in self._purposes.known[name].roles}
         here = Here(self._at_rest(states))
+        robot = self._purposes.known[failing.skill].robot
         for purpose in self._purposes.known.values():
             if (
-                self._courses.may_use(purpose)
+                purpose.robot == robot
+                and self._courses.may_use(purpose)
                 and purpose.roles & roles
                 and len(purpose.inputs) == 1
                 and self._courses.after(here, purpose) is not None
@@ -89,7 +91,32 @@ class Remedies:
                 if step is not None:
                     yield self._end(place, failing, purpose, step, f"{plain(purpose.name)} instead", "@degraded := true", Rank.GOES_ON)
 
+    def without(self, place: Node, failing: Failing) -> Iterator[Branch]:
+        """Yield that a part is left out, where a later step fills its role all the same, with skillsets that it does not use.
+
+        So one robot of two gives up its task, and the other one goes there.
+        """
+        above = place.parent
+        if above is None or above.wiring.element.tag != "Sequence":
+            return
+        mine = self._in(place)
+        roles = {role for one in mine if one.achieves for role in one.roles}
+        skillsets = {one.skillset.name for one in mine}
+        later = [one for other in above.children[above.children.index(place) + 1 :] for one in self._in(other)]
+        instead = [one for one in later if one.achieves and one.roles & roles and one.skillset.name not in skillsets]
+        if instead:
+            (first, *_), name = instead, node_name(place.wiring.element)
+            role = " and ".join(sorted(first.roles & roles))
+            why = f"When {failing.words}: {first.name} comes later, and is for {role}, too."
+            script = node("Script", name=f"not done: {name}", code="@degraded := true")
+            yield Branch(script, None, place.wiring.element.place, (why,), rank=Rank.LEAVES_OUT)
+
     # --- parts -------------------------------------------------------------------------------------------------------
+
+    def _in(self, place: Node) -> list[Purpose]:
+        """Return the skills of a part of the mission, with those of the trees that it uses."""
+        names = dict.fromkeys(type_name(one.wiring.element) for one in place.iterate())
+        return [self._purposes.known[name] for name in names if name in self._purposes.known]
 
     def _at_rest(self, states: States) -> dict[str, str]:
         """Return the states of all resources once the skills that ran have given theirs back."""

@@ -289,7 +289,12 @@ class Search:
         """Return why no tree can have done what a skill is for that the mission needs; empty where one might."""
         lines: list[str] = []
         try:
-            if not failing.states or failing.degrades or not self._judge.needs(text, failing.skill):
+            if (
+                not failing.states
+                or failing.degrades
+                or self._patterns.may_leave_out(failing)
+                or not self._judge.needs(text, failing.skill)
+            ):
                 return []
         except OutOfTimeError:
             return []

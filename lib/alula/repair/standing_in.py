@@ -67,8 +67,9 @@ class StandIns:
         """Tell whether each role that a skill needs is filled by another one, in the branch or beside it."""
         inside = {type_name(one) for one in top.iterate()} & set(self._purposes.known)
         beside = {name for name in _run_beside(place) if name != failing.skill} & set(self._purposes.known)
-        filled = {role for name in inside | beside for role in self._purposes.known[name].roles}
-        return all(role.name in filled for name in inside for role in self._purposes.known[name].skill.needs)
+        filled = {(one.robot, role) for one in map(self._purposes.known.__getitem__, inside | beside) for role in one.roles}
+        needing = [self._purposes.known[name] for name in inside]
+        return all((one.robot, role.name) in filled for one in needing for role in one.skill.needs)
 
     def _as_branch(self, made: _Made, at: Node, instead: Mapping[str, Purpose], failing: Failing) -> Branch:
         place = at.wiring.element

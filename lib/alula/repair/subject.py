@@ -13,7 +13,7 @@ from pathlib import Path
 
 from alula.check.findings import findings_of
 from alula.check.robot import Warn, models_of, part_of
-from alula.common.robots import FAULTS, RobotFolder, find_robot
+from alula.common.robots import RobotFolder, find_robot
 from alula.common.scenarios import Scenario
 from alula.language.errors import Diagnostic
 from alula.language.messages import Messages, messages_of
@@ -25,13 +25,16 @@ from alula.odds.robot import brought_about
 from alula.prove.mission.accepted import DESCRIPTION
 from alula.prove.mission.wanted import PROPERTY
 from alula.records.causes.effects import FaultEffects
-from alula.records.causes.fault_file import load_effects
+from alula.records.causes.fault_file import effects_of
+from alula.records.models import members
 from alula.repair.errors import RepairError
 from alula.trees.document import Document, Element, parse_document, read_source
 from alula.trees.library import Library
 from alula.trees.reading import TreeFiles, node_name
 from alula.trees.source import TreeSource
 
+AtRest = Sequence[tuple[str, str]]
+"""Each ``skillset.resource`` and its state: in one of them a robot need not be brought anywhere."""
 _ACTIVE = re.compile(r"active\(\s*['\"](?P<node>[^'\"]+)['\"]\s*\)")
 _PROPERTY = re.compile(rf"\s*{PROPERTY.pattern};?", re.DOTALL)
 
@@ -68,8 +71,7 @@ class Subject:
         models = models_of(robot, tell)
         if not models:
             raise RepairError(f"{path}: the robot in {robot.root} has no skills to repair it with")
-        file = robot.file(FAULTS)
-        faults = {} if file is None else load_effects(file, models).known
+        faults = effects_of(robot, models).known
         source = read_source(path)
         flown_as, scenario = _flown_as(path, parse_document(source, str(path)).root)
         tree = TreeSource(path) if scenario is None else flown(path, scenario)
@@ -86,11 +88,9 @@ class Subject:
         return {name: one.states for name, one in self.faults.items() if one.states}
 
     @property
-    def at_rest(self) -> list[tuple[str, str]]:
-        """The states of resources in which the robot need not be brought anywhere, as its file has them."""
-        said = (self.robot.departure, self.robot.rest, self.robot.taken)
-        names = {resource: of.name for of in self.skillsets for resource in of.resource_index}
-        return [(f"{names[one[0]]}.{one[0]}", one[1]) for one in said if one is not None and one[0] in names]
+    def at_rest(self) -> list[AtRest]:
+        """The states of resources in which each robot need not be brought anywhere, as its file has them."""
+        return _at_rest(self.robot, self.skillsets)
 
     def document(self) -> Document:
         """Return the file as data that may be changed."""
@@ -122,6 +122,17 @@ class Subject:
         there = {node_name(one) for one in elements}
         asked = (match["node"] for one in elements for match in _ACTIVE.finditer(one.get(DESCRIPTION)))
         return {name: None for name in asked if name not in there}
+
+
+def _at_rest(robot: RobotFolder, skillsets: Sequence[Skillset]) -> list[AtRest]:
+    """Return it for each robot of a fleet, else for the robot; nothing for one whose file says none."""
+    if robot.robots:
+        each = ((one.name, _at_rest(one.robot, one.skillsets)) for one in members(robot, skillsets))
+        return [[(name(at), state) for at, state in one] for name, several in each for one in several]
+    said = (robot.departure, robot.rest, robot.taken)
+    names = {resource: of.name for of in skillsets for resource in of.resource_index}
+    found = [(f"{names[one[0]]}.{one[0]}", one[1]) for one in said if one is not None and one[0] in names]
+    return [found] if found else []
 
 
 def _flown_as(path: Path, root: Element) -> tuple[Path, Scenario | None]:

@@ -7,13 +7,17 @@ from pathlib import Path
 
 import pytest
 
+from alula.check.robot import models_of as models_of_robot
+from alula.common.robots import load_robot_folder
 from alula.odds.errors import OddsError
 from alula.odds.figures import ANY_RATE, NEVER, FaultFigures, Figures, Range, SkillFigures, point
 from alula.odds.reading import load_figures
+from alula.odds.robot import figures_of
 from alula.odds.system import DEPARTURE
 from alula.records.causes.fault_file import load_effects
 from alula.records.models import models_of
 
+ALULA_ROOT = Path(__file__).resolve().parents[3]
 DRONE = models_of(["navigation", "perception", "mapping", "video"])
 
 EXAMPLE = """
@@ -100,3 +104,18 @@ def test_what_is_wrong_is_told_with_its_place_and_the_cure(text: str, place: str
     with pytest.raises(OddsError) as caught:
         read(tmp_path, text)
     assert str(caught.value).startswith(f"{tmp_path / 'faults.yaml'}:{place}: {complaint}")
+
+
+def test_figures_of_a_fleet_are_those_of_its_robots() -> None:
+    drone, fleet = load_robot_folder(ALULA_ROOT), load_robot_folder(ALULA_ROOT / "examples/two_robots")
+    own, theirs = (figures_of(one, models_of_robot(one, pytest.fail)) for one in (drone, fleet))
+    assert own.faults
+    assert {what: theirs.faults[f"drone_{what}"] for what in own.faults} == own.faults
+    assert {skill: theirs.skills[f"drone_{skill}"] for skill in own.skills} == own.skills
+
+
+def test_what_uses_are_is_named_with_the_skills() -> None:
+    fault = FaultFigures(chances={DEPARTURE: NEVER, "arm.grip": NEVER})
+    named = Figures({"grease": fault}, {"arm.grip": SkillFigures()}).named("left_{}".format)
+    assert (list(named.faults), list(named.skills)) == (["left_grease"], ["left_arm.grip"])
+    assert list(named.faults["left_grease"].chances) == [DEPARTURE, "left_arm.grip"]

@@ -2,12 +2,12 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Collection, Iterable, Mapping, Sequence
 from dataclasses import dataclass
 from typing import ClassVar
 
 from alula.missions.part import MissionPart
-from alula.prove.mission.oracle import UndecidedError
+from alula.prove.mission.oracle import Asked, UndecidedError
 from alula.prove.mission.reading import ANOTHER
 from alula.prove.mission.robot import Memory, Robot
 from alula.prove.mission.runnable import names_in, remembered, why_not
@@ -21,6 +21,8 @@ from alula.trees.status import FAILURE, IDLE, RUNNING, SKIPPED, SUCCESS, Answer,
 
 DECLARED = "the file declares it, and no class is known"
 OF_NAV2 = "Nav2 declares it, and no class is known"
+ANSWER = "answer"
+"""What the search asks of a leaf that may answer anything."""
 MOST = 20
 """Whole numbers that a node with children remembers are kept up to here; one that counts further may do anything."""
 
@@ -170,9 +172,20 @@ def _reads_unknown(node: Node) -> bool:
 
 def _free(robot: Robot, node: Node, options: tuple[str, ...]) -> Answer:
     """Return any answer of a leaf, which has written anything."""
-    answer = robot.oracle.choose(("answer", node.name), options)
+    answer = robot.oracle.choose((ANSWER, node.name), options)
     write(robot, node)
     return _ANSWERS[str(answer)]
+
+
+def actions(nodes: Iterable[Node]) -> frozenset[str]:
+    """Return the names of the robot's own leaves that do something: one of these fails, where a condition is no more than false."""
+    return frozenset(one.name for one in nodes if isinstance(one, Own) and one.category is Category.ACTION)
+
+
+def failing_among(choices: Iterable[Asked], names: Collection[str]) -> str:
+    """Return which of these leaves is taken to fail in a tick, though nobody knows what it does; empty: none."""
+    failed = (str(one.question[1]) for one in choices if one.question[0] == ANSWER and one.answer == FAILURE.value)
+    return next((name for name in failed if name in names), "")
 
 
 def write(robot: Robot, node: Node) -> None:

@@ -19,14 +19,14 @@ from alula.prove.limits import Deadline
 from alula.prove.mission.measured import of_data
 from alula.prove.mission.memory import Body, Keeper, TreeMemory
 from alula.prove.mission.oracle import Answer, Asked, Oracle, Question, UndecidedError, View
-from alula.prove.mission.own import DOES
+from alula.prove.mission.own import ANSWER, DOES
 from alula.prove.mission.unknown import COMPARE, MisfitError
 from alula.trees.node import Node
 from alula.trees.status import Status
 from alula.trees.tree import Tree
 
 TICK, ABORT = "tick", "abort"
-CHOSEN_ANEW = frozenset({DOES, "answer", COMPARE})
+CHOSEN_ANEW = frozenset({DOES, ANSWER, COMPARE})
 
 
 class Outcome(NamedTuple):

@@ -10,7 +10,7 @@ from __future__ import annotations
 
 import functools
 import itertools
-from collections.abc import Iterable, Iterator
+from collections.abc import Callable, Iterable, Iterator
 from dataclasses import dataclass, field
 from enum import Enum
 from fnmatch import fnmatchcase
@@ -42,6 +42,10 @@ class Alarms:
         """Return what it means that a resource, ``skillset.resource``, has come into a state."""
         said = f"{resource} {state}"
         return Alarm.ALWAYS if said in self.always else Alarm.AWAY if said in self.away else Alarm.NONE
+
+    def named(self, name: Callable[[str], str]) -> Alarms:
+        """Return them for skillsets that are called otherwise: ``name`` makes what begins with such a name of what begins with one here."""
+        return Alarms(frozenset(map(name, self.always)), frozenset(map(name, self.away)))
 
 
 def alarms_of(skillsets: Iterable[Skillset], shown: Iterable[str] | None = None) -> Alarms:

@@ -2,8 +2,8 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Mapping
-from dataclasses import dataclass, field
+from collections.abc import Callable, Iterable, Mapping
+from dataclasses import dataclass, field, replace
 from fnmatch import fnmatchcase
 
 from alula.mock import Behaviour
@@ -44,6 +44,11 @@ class FaultEffects:
         """Tell whether an execution can end like this because of the fault."""
         return _any(self.ends, f"{end.skillset}.{end.skill} {end.result or end.state.value}")
 
+    def named(self, name: Callable[[str], str]) -> FaultEffects:
+        """Return it for skillsets that are called otherwise: ``name`` makes what begins with such a name of what begins with one here."""
+        states, later, ends = (frozenset(name(one) for one in several) for several in (self.states, self.later, self.ends))
+        return replace(self, states=states, later=later, ends=ends)
+
 
 def _reported(change: TransitionEvent) -> bool:
     return change.cause == EXTERN
@@ -78,6 +83,10 @@ class EffectsByFault:
             return found
         later = [_named(change.states) for change in fault.changes]
         return FaultEffects(_named(fault.states), frozenset().union(*later), found.ends | _named(fault.ends), found.told)
+
+    def named(self, name: Callable[[str], str]) -> EffectsByFault:
+        """Return it for skillsets and faults that are called otherwise: ``name`` makes what begins with such a name of what is here."""
+        return EffectsByFault({name(what): one.named(name) for what, one in self.known.items()}, self.alarms.named(name))
 
     def _of_name(self, what: str) -> frozenset[str]:
         return frozenset(one for one in (*self.alarms.always, *self.alarms.away) if fnmatchcase(one, f"*.{what}_status *"))

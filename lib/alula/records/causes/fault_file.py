@@ -7,13 +7,13 @@ from fnmatch import fnmatchcase
 from pathlib import Path
 
 from alula.common.located_yaml import Located, choices, read_yaml
-from alula.common.robots import FAULTS, RobotError, find_robot
+from alula.common.robots import FAULTS, RobotError, RobotFolder, find_robot
 from alula.model.execution_state import ExecutionState as S
 from alula.model.model import Skill, Skillset
 from alula.records.causes.alarms import ANY, Alarms, alarms_of
 from alula.records.causes.effects import EffectsByFault, FaultEffects
 from alula.records.errors import AnalysisError
-from alula.records.models import robot_skillsets
+from alula.records.models import members, robot_skillsets
 
 EFFECTS, ARROWS, FIGURES = ("faults", "processes"), "arrows", "skills"
 SECTIONS = (*EFFECTS, ARROWS, FIGURES)
@@ -28,35 +28,45 @@ Members = Mapping[str, Collection[str]]
 
 
 def effects_of_robot() -> EffectsByFault:
-    """Return the effects that the robot declares; without ``faults.yaml`` those that follow from its models.
+    """Return the effects that the robot declares, as `effects_of` has them; raises AnalysisError, too, where a model has errors."""
+    return effects_of(*_robot_with_models())
+
+
+def effects_of(robot: RobotFolder, skillsets: Sequence[Skillset]) -> EffectsByFault:
+    """Return the effects that a robot with these skillsets declares; without ``faults.yaml`` those that follow from its models.
+
+    Those of a fleet are what its robots declare, under the fleet's names.
 
     Raises:
-        AnalysisError: a model has errors, or the file can't be read or is wrong; the message names file and line.
+        AnalysisError: a file can't be read or is wrong; the message names file and line.
     """
-    try:
-        file = find_robot().file(FAULTS)
-    except RobotError as error:
-        raise AnalysisError(str(error)) from None
-    return effects_of_models() if file is None else load_effects(file, robot_skillsets())
+    if robot.robots:
+        each = [effects_of(one.robot, one.skillsets).named(one.name) for one in members(robot, skillsets)]
+        always, away = frozenset().union(*(one.alarms.always for one in each)), frozenset().union(*(one.alarms.away for one in each))
+        return EffectsByFault({what: one for effects in each for what, one in effects.known.items()}, Alarms(always, away))
+    file = robot.file(FAULTS)
+    return EffectsByFault(alarms=alarms_of(skillsets)) if file is None else load_effects(file, skillsets)
 
 
 def effects_of_models() -> EffectsByFault:
     """Return the effects that follow from the robot's models; raises AnalysisError where they have errors."""
+    _, skillsets = _robot_with_models()
+    return EffectsByFault(alarms=alarms_of(skillsets))
+
+
+def _robot_with_models() -> tuple[RobotFolder, Sequence[Skillset]]:
     try:
         robot = find_robot()
-        there = bool(robot.robots) or robot.skillsets.is_dir()
     except RobotError as error:
         raise AnalysisError(str(error)) from None
-    return EffectsByFault(alarms=alarms_of(robot_skillsets() if there else ()))
+    there = bool(robot.robots) or robot.skillsets.is_dir()
+    return robot, robot_skillsets() if there else ()
 
 
 def states_of_faults(skillsets: Sequence[Skillset], warn: Callable[[str], object]) -> Mapping[str, frozenset[str]]:
     """Return the states in which the robot's faults show, those that have any; none where its file is wrong: ``warn`` is told."""
-    path = find_robot().file(FAULTS)
-    if path is None:
-        return {}
     try:
-        effects = load_effects(path, skillsets)
+        effects = effects_of(find_robot(), skillsets)
     except AnalysisError as error:
         warn(f"properties can name no fault: {error}")
         return {}
