@@ -41,6 +41,11 @@ def test_a_rover_that_stops_in_time_and_goes_on_is_told_with_its_times():
     assert verdict.row.count("|") == HEAD.splitlines()[0].count("|")
 
 
+def test_a_rover_that_stops_long_after_a_fault_was_not_stopped_by_it():
+    verdict = judged(driven((0.5, 60.0), (0.0, 20.0)), fault=replace(CUT, ended_s=10.2))
+    assert (verdict.moved_on_s, verdict.stood_s, verdict.went_on_s, verdict.wrong) == (None, None, None, ())
+
+
 def test_a_pause_of_a_driving_rover_is_no_stop():
     assert judged(driven((0.5, 10.5), (0.0, 0.5), (0.5, 1.2), (0.0, 8.0))).moved_on_s == pytest.approx(2.2, abs=2 * STEP_S)
 

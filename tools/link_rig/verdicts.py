@@ -64,7 +64,7 @@ class Verdict:
     """What is told of one mission; seconds of simulated time, None where it did not come to that.
 
     Attributes:
-        moved_on_s: from the fault's begin until it stood.
+        moved_on_s: from the fault's begin until it stood; None where it did not because of the fault.
         unheard_s: the longest time for which it moved while nothing was heard of who supervises it.
         stood_s: how long it then stood.
         went_on_s: from the fault's end until it moved again; negative: it moved before that.
@@ -118,10 +118,12 @@ def judge(
         silent_after_s: the limit of the base's dead man, simulated seconds.
         following: how the mission after it ended, where there was one: it has to be accomplished.
     """
-    stood = next((pause for pause in _pauses(poses) if pause[0] >= fault.begun_s and pause[1] - pause[0] > MARGIN_S), None)
+    limit_s = silent_after_s + MARGIN_S
+    stops = [pause for pause in _pauses(poses) if pause[0] >= fault.begun_s and pause[1] - pause[0] > MARGIN_S]
+    # One that comes later has nothing to do with the fault.
+    stood = next((pause for pause in stops if pause[0] <= fault.ended_s + limit_s), None)
     moved_on_s = None if stood is None else max(0.0, stood[0] - fault.begun_s)
     goes_on = stood is not None and math.isfinite(stood[1])
-    limit_s = silent_after_s + MARGIN_S
     lasted_s = fault.ended_s - fault.begun_s if fault.stops else 0.0
     unheard_s = _moved_unheard(poses, beats)
     wrong = []
