@@ -198,8 +198,8 @@ def test_nothing_that_is_needed_and_what_has_another_type(robot: Robot) -> None:
     assert (code, problems(found)) == (
         1,
         [
-            "bindings: /rover/cmd_vel: nobody in ROS 1 listens to it",
-            "bindings: /rover/odom: nobody in ROS 1 publishes it (data rover.odometry)",
+            "bindings: /rover/cmd_vel: no node in ROS 1 subscribes to it",
+            "bindings: /rover/odom: no node in ROS 1 publishes it (data rover.odometry)",
             f"bindings: {SILENT}",
         ],
     )

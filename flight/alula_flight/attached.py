@@ -133,7 +133,7 @@ class AttachedSupervisor:
                 self._note_abort()
                 mission.send_signal(signal.SIGINT)
             if told_s is not None and time.monotonic() - told_s > ABORT_TIMEOUT_S:
-                log.error("the mission did not end within %.0f s after it was told to", ABORT_TIMEOUT_S)
+                log.error("the mission did not end within %.0f s after it was asked to", ABORT_TIMEOUT_S)
                 return GIVEN_UP
         if mission.returncode < 0:
             death = Death("mission", describe_exit(mission.returncode), self._clock.now_s)

@@ -239,7 +239,7 @@ class Supervisor:
                 self._note_abort()
                 self._abort_mission(launch)
             if abort_since is not None and time.monotonic() - abort_since > ABORT_TIMEOUT_S:
-                log.error("the mission did not end within %.0f s after it was told to", ABORT_TIMEOUT_S)
+                log.error("the mission did not end within %.0f s after it was asked to", ABORT_TIMEOUT_S)
                 return GIVEN_UP
 
     @property

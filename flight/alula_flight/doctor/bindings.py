@@ -153,7 +153,7 @@ class _Look:
         hint = f"is it {listed(near)}?" if near else "start its node"
         return problem(
             BINDINGS,
-            f"{topic}: nobody in ROS 1 publishes it{f' (data {data})' if data else ''}",
+            f"{topic}: no node in ROS 1 publishes it{f' (data {data})' if data else ''}",
             f"{hint}, or correct the name in skillsets/bindings.yaml",
         )
 
@@ -177,7 +177,9 @@ class _Look:
         if not subscribers:
             if not _may_be_unheard(topic):
                 yield problem(
-                    BINDINGS, f"{topic}: nobody in ROS 1 listens to it", "start its node, or correct the name in skillsets/bindings.yaml"
+                    BINDINGS,
+                    f"{topic}: no node in ROS 1 subscribes to it",
+                    "start its node, or correct the name in skillsets/bindings.yaml",
                 )
             return
         yield from self._type(route, subscribers)
@@ -238,7 +240,7 @@ class _Look:
         node = self._base.services.get(name)
         if node is None or not foreign([node], bridges=False):
             near = [one for one in self._base.services if one.rpartition("/")[2] == name.rpartition("/")[2]]
-            yield problem(BINDINGS, f"{name}: nobody in ROS 1 serves it", f"is it {listed(near)}?" if near else "start its node")
+            yield problem(BINDINGS, f"{name}: no node in ROS 1 serves it", f"is it {listed(near)}?" if near else "start its node")
             return
         if node not in self._reached:
             return

@@ -78,8 +78,8 @@ def look_at_multicast(address: str) -> Finding:
     except OSError as error:
         return problem(ROS2, f"multicast by {interface}: {error.strerror or error}", remedy)
     if not heard:
-        return problem(ROS2, f"multicast by {interface} is sent, and not heard", remedy)
-    return ok(ROS2, f"multicast goes out by {interface} and is heard here; a switch or router may still drop it")
+        return problem(ROS2, f"multicast by {interface} is sent, and not received", remedy)
+    return ok(ROS2, f"multicast goes out by {interface} and is received here; a switch or router may still drop it")
 
 
 def multicast_flag(interface: str) -> bool:

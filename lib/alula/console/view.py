@@ -187,7 +187,7 @@ class SkillsetView:
         if not self.alive:
             return ("the managers have gone",)
         if not self._states:
-            return ("nothing was heard of the resources yet",)
+            return ("no states of the resources have been received yet",)
         fresh = {name: json.loads(r.value_json, object_hook=_named) for name, r in self._readings.items() if not r.stale}
         found = unmet(self.model, Situation(self._states, data=fresh), self.model.skill(skill))
         return tuple(one.reason + self._because(one.states) for one in found)

@@ -72,7 +72,7 @@ def test_missions_in_two_domains_are_told_apart(ros2_domain: int, tmp_path: Path
         with mission(claim.domain, tmp_path / "there"):
             assert "paused" in paused(there)
             monkeypatch.setattr(ros_link, "ANSWER_S", 0.2)
-            with pytest.raises(ActError, match="the mission was not told"):
+            with pytest.raises(ActError, match="the mission did not get the command"):
                 here.abort()
     finally:
         here.close()
@@ -129,7 +129,7 @@ def test_a_mission_that_hangs_is_told_so_and_closing_ends_calls_that_wait(ros2_d
     robot = RosLink().connect(Run(Path(), ros2_domain))
     try:
         monkeypatch.setattr(ros_link, "ANSWER_S", 5.0)
-        with pytest.raises(ActError, match="was told and has not answered for 5 s, it may still obey"):
+        with pytest.raises(ActError, match="got the command and has not answered for 5 s, it may still obey"):
             robot.abort()
         monkeypatch.setattr(ros_link, "ANSWER_S", 10 * WAIT_S)
         told: list[str] = []
@@ -138,7 +138,7 @@ def test_a_mission_that_hangs_is_told_so_and_closing_ends_calls_that_wait(ros2_d
         robot.close()
         waiting.join(WAIT_S)
         assert not waiting.is_alive()
-        assert "the mission was" in told[0]
+        assert "the mission got" in told[0]
     finally:
         robot.close()
         deaf.close()

@@ -83,5 +83,5 @@ class RosMission:
                 return future.result()
             client.remove_pending_request(future)
         if futures:
-            raise ActError(f"the mission was told and has not answered for {ANSWER_S:g} s, it may still obey; {LEFT}")
-        raise ActError(f"the mission was not told: it can't be found; {LEFT}")
+            raise ActError(f"the mission got the command and has not answered for {ANSWER_S:g} s, it may still obey; {LEFT}")
+        raise ActError(f"the mission did not get the command: it can't be found; {LEFT}")

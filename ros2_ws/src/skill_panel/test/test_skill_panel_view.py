@@ -64,7 +64,7 @@ def test_data_have_an_age_on_the_mission_clock(view):
 
 
 def test_why_not_follows_resources_and_data(view):
-    assert view.skill_rows()[0].unmet == ("nothing was heard of the resources yet",)
+    assert view.skill_rows()[0].unmet == ("no states of the resources have been received yet",)
     view.heard_states({"door": "SHUT"}, {})
     row = view.skill_rows()[0]
     assert (row.status, len(row.unmet)) == ("not ready", 2)

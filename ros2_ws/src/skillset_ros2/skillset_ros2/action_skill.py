@@ -173,7 +173,7 @@ class ActionSkill(FunctionSkill[Goal]):
             return "is gone"
         if call.handle is None or (call.cancelled and not call.cancel_answered):
             return f"does not answer for {self.answer_s:g} s" if waited_s > self.answer_s else ""
-        return f"tells nothing for {self.silence_s:g} s" if not call.cancelled and 0.0 < self.silence_s < waited_s else ""
+        return f"sends no feedback for {self.silence_s:g} s" if not call.cancelled and 0.0 < self.silence_s < waited_s else ""
 
     def give_up(self, call: Goal, why: str) -> None:
         """Leave a server that is lost; it may still hear that the goal is cancelled."""

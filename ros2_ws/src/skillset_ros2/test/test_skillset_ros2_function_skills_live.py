@@ -238,7 +238,7 @@ def test_a_server_that_is_absent_refuses_or_falls_silent_is_lost(spinning, rig):
     flying.accepts = False
     assert rig.ended(rig.start()) == (S.TERMINATED, "ABORTED", "fly refuses the goal")
     flying.accepts = True
-    assert rig.ended(rig.start()) == (S.TERMINATED, "ABORTED", "fly tells nothing for 1 s")
+    assert rig.ended(rig.start()) == (S.TERMINATED, "ABORTED", "fly sends no feedback for 1 s")
     until(lambda: flying.cancels == 1, "a goal of a silent server is cancelled")
     flying.goal().end(("canceled", ""))
     flying.leave()
