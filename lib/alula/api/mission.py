@@ -159,7 +159,7 @@ class Mission:
             groot: ``HOST:PORT`` where Groot2 and its like find the tree; empty: nowhere.
             monitor: noted in the run's folder only.
             limit_s: mission clock after which it is aborted; 0: after an hour.
-            listener: hears of a mission that leaves nothing behind what its record would have told.
+            listener: gets, of a mission that leaves nothing behind, what its record would have had.
 
         Raises:
             AlulaError: the mocks have no such fault, the folder is not empty, or the address can't be had.

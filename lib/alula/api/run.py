@@ -56,7 +56,7 @@ class Run:
 
     @cached_property
     def mission(self) -> Mapping[str, Any]:
-        """The mission's account: outcome, reason, parameters, inputs, and what its tree tells."""
+        """The mission's account: outcome, reason, parameters, inputs, and the output ports of its tree."""
         return run_log.account(self.folder, self.record if (self.folder / RECORD).is_file() else ())
 
     @property

@@ -70,7 +70,7 @@ class FaultRequest:
         return at_s, math.inf if self.end_s is None else origin_s + self.end_s
 
     def lasts(self, since_lift_off_s: float | None) -> bool:
-        """Tell whether it is there so many seconds after lift-off; None: before it."""
+        """Return whether it is there so many seconds after lift-off; None: before it."""
         if self.begin_s is None:
             return True
         return since_lift_off_s is not None and self.begin_s <= since_lift_off_s < (math.inf if self.end_s is None else self.end_s)

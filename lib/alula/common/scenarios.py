@@ -29,7 +29,7 @@ class Scenario:
         about: in a sentence.
         world: name or file of the robot's worlds, unless another is asked for; the mission's inputs come from it.
         skillsets: the skillsets whose managers are started.
-        mission: the file of its tree, from the robot's folder; empty: the robot only serves its skills, until the run is told to end.
+        mission: the file of its tree, from the robot's folder; empty: the robot only serves its skills, until the run is ended.
         launch: ``package/file`` for roslaunch.
         report: parts of the report, of those that the robot has.
         faults: what can fail besides what the robot's own options say, each with the ways in which it can.

@@ -49,7 +49,7 @@ class Diagnostic:
 
     @property
     def playable(self) -> bool:
-        """Tell whether `check --play` plays its counterexample."""
+        """Return whether `check --play` plays its counterexample."""
         return bool(self.counterexample.steps)
 
     def render(self) -> str:
@@ -98,7 +98,7 @@ def render(diagnostics: Iterable[Diagnostic]) -> str:
 
 
 def has_errors(diagnostics: Iterable[Diagnostic]) -> bool:
-    """Tell whether a finding is more than a warning."""
+    """Return whether a finding is more than a warning."""
     return any(diagnostic.severity is Severity.ERROR for diagnostic in diagnostics)
 
 

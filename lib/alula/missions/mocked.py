@@ -77,7 +77,7 @@ class MockedMission:
         latency_s: of each message between mission and managers.
         groot: where viewers find the tree, as `MissionDriver` has it; it raises, too, what that does.
         limit_s: mission clock after which it is aborted, as its record would grow for ever.
-        listener: hears of a mission that leaves nothing behind what its record would have told.
+        listener: gets, of a mission that leaves nothing behind, what its record would have had.
     """
 
     def __init__(

@@ -172,7 +172,7 @@ class Behaviour:
         )
 
     def about(self, skillset: str) -> bool:
-        """Tell whether anything is said of a skillset, ``beside`` aside."""
+        """Return whether anything is said of a skillset, ``beside`` aside."""
         said = [*self.rules, *self.data, *(place for event in self.timeline for place in event.states)]
         said += [place for fault in self.faults.values() for place in (*fault.states, *fault.ends)]
         return any(place[0] == skillset for place in said)

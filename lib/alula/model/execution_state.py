@@ -24,12 +24,12 @@ class ExecutionState(Enum):
 
     @property
     def terminal(self) -> bool:
-        """Tell whether it is an end: no state follows it."""
+        """Return whether it is an end: no state follows it."""
         return self._value_ not in _OPEN
 
     @property
     def active(self) -> bool:
-        """Tell whether the execution has started and not ended."""
+        """Return whether the execution has started and not ended."""
         return self._value_ in _ACTIVE
 
 

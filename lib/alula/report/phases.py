@@ -16,7 +16,7 @@ from alula.runtime.core.events import TransitionEvent
 class Phases:
     """Absolute seconds of mission clock. ``zero_s`` is the origin of all times of a report: the departure where it is known.
 
-    ``zero_from`` names what told it: a robot's own recordings, the resource, first event, first record or nothing.
+    ``zero_from`` names where it comes from: a robot's own recordings, the resource, first event, first record or nothing.
     """
 
     zero_s: float = 0.0

@@ -35,7 +35,7 @@ class Script(Protocol):
     """A script that was read, over a node's blackboard; raises TickError."""
 
     unknown: str
-    """Why its last answer as a condition was false, where that was because nobody knows."""
+    """Why its last answer as a condition was false, where that was because a value is not known."""
 
     def run(self) -> object:
         """Run it, and return its value."""
@@ -79,7 +79,7 @@ class Wiring:
 
     @property
     def is_subtree(self) -> bool:
-        """Tell whether it is the use of another tree."""
+        """Return whether it is the use of another tree."""
         return self.type.category is Category.SUBTREE
 
     @cached_property
@@ -95,7 +95,7 @@ class Wiring:
 
     @property
     def may_run(self) -> bool | None:
-        """Whether it may take several ticks, its children aside; None: nobody knows."""
+        """Whether it may take several ticks, its children aside; None: not known."""
         return self.type.may_run if self.is_whole else None
 
     @property
@@ -188,7 +188,7 @@ class Node(Behaviour):  # type: ignore[misc]  # py_trees is seen untyped
     ends: ClassVar[Ends] = ANY_END
     """The ends that it may have, where they hang neither on ports nor on children."""
     may_run: ClassVar[bool | None] = None
-    """Whether it may take several ticks, its children aside; None: nobody knows."""
+    """Whether it may take several ticks, its children aside; None: not known."""
     answers_by: ClassVar[str] = ""
     """The port with the condition of the file that a leaf answers by; empty where its answer is another's, or hangs on more."""
     runs_script: ClassVar[str] = ""
@@ -225,7 +225,7 @@ class Node(Behaviour):  # type: ignore[misc]  # py_trees is seen untyped
 
     @classmethod
     def is_described(cls) -> bool:
-        """Tell whether what is told of its ends is of this class: one that derives from it, answers otherwise and tells nothing does not.
+        """Return whether its ends are described by this class: not where a class derives from it, answers otherwise and describes nothing.
 
         `ticking`, `ends`, `may_end`, `never_ticked` belong to what answers: `execute`, `update`, `on_start`, `on_running`.
         """
@@ -233,12 +233,12 @@ class Node(Behaviour):  # type: ignore[misc]  # py_trees is seen untyped
 
     @classmethod
     def known_ticking(cls) -> Ticking:
-        """Return how it ticks its children: anything may come of a class that answers or halts otherwise than the one that tells it."""
+        """Return how it ticks its children: in any way, where the class answers or halts otherwise than the one that describes it."""
         return cls.ticking if cls._does_as(frozenset({"ticking"}), (*_ANSWERS, *_HALTS)) else ANY_TICKING
 
     @classmethod
     def _does_as(cls, tells: frozenset[str], names: Sequence[str]) -> bool:
-        """Tell whether methods are those of the class that tells something."""
+        """Return whether methods are those of the class that tells something."""
         teller = next(one for one in cls.__mro__ if not tells.isdisjoint(vars(one)))
         both = ((getattr(cls, name, None), getattr(teller, name, None)) for name in names)
         return teller is Node or all(mine is told or told in {None, Node.update} for mine, told in both)
@@ -310,7 +310,7 @@ class Node(Behaviour):  # type: ignore[misc]  # py_trees is seen untyped
 
     @property
     def watchers(self) -> list[Watcher]:
-        """Those who are told of each change in the tree."""
+        """Callbacks for each change in the tree."""
         return self._shared.watchers
 
     # --- py_trees ------------------------------------------------------------------------------------------------------
@@ -339,7 +339,7 @@ class Node(Behaviour):  # type: ignore[misc]  # py_trees is seen untyped
         return self._shared.clock()
 
     def given(self, port: str) -> bool:
-        """Tell whether a port has a text, of the file or by default."""
+        """Return whether a port has a text, of the file or by default."""
         return port in self.wiring.ports
 
     def get(self, port: str) -> object:

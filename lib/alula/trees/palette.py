@@ -129,7 +129,7 @@ class NodeType:
 
     @property
     def may_run(self) -> bool | None:
-        """Whether it may take several ticks, its children aside; None: nobody knows. A condition answers at once."""
+        """Whether it may take several ticks, its children aside; None: not known. A condition answers at once."""
         if self.category is Category.CONDITION:
             return False
         return self.described.may_run if self.described else self.runs

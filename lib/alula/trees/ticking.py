@@ -78,7 +78,7 @@ class Ticking:
     Attributes:
         order: in which order, and how often.
         goes_on: the end of a child after which the next one's turn comes, of an order that ticks one after the other.
-        place: the attribute that tells which children are passed: IN_TURN the index of the one whose turn it is, AT_ONCE a set of the
+        place: the attribute that says which children are passed: IN_TURN the index of the one whose turn it is, AT_ONCE a set of the
             indices of those that have ended. Empty: the search of all runs takes each for one that may be ticked again.
         after: SINGLE: what may follow an end of the child, where it is more than the same end of the node.
         begins: when the first child is ticked.
@@ -88,7 +88,7 @@ class Ticking:
         keeps_place: IN_TURN: whether it begins with the child at which it was left.
         takes_failure: SINGLE: whether the child's failure is meant to come, though the node fails with it.
         succeeds_after, fails_after: AT_ONCE: the ports that say how many children have to succeed, or to fail; -1: all. Where no port says
-            it, all have to succeed, and nobody knows how many failures are too many.
+            it, all have to succeed, and how many failures are too many is not known.
     """
 
     order: Order = Order.ANY
@@ -114,32 +114,32 @@ class Ticking:
 
     @property
     def repeats(self) -> bool:
-        """Tell whether an only child may be ticked again after it has ended."""
+        """Return whether an only child may be ticked again after it has ended."""
         return any(AGAIN in steps for steps in self.after.values())
 
     @property
     def tells_passed(self) -> bool:
-        """Tell whether it is known, by `place`, which children are not ticked again before the node ends."""
+        """Return whether it is known, by `place`, which children are not ticked again before the node ends."""
         if self.order is Order.SINGLE:
             return not self.repeats
         return self.order in {Order.IN_TURN, Order.AT_ONCE} and bool(self.place)
 
     @property
     def lists(self) -> bool:
-        """Tell whether it ticks its children from the first to the last, as far as they end with `goes_on`."""
+        """Return whether it ticks its children from the first to the last, as far as they end with `goes_on`."""
         return self.order in _LISTED - {Order.FROM_ANY}
 
     def goes_back(self, count: int) -> bool:
-        """Tell whether one of so many children may be ticked after another one that stands behind it."""
+        """Return whether one of so many children may be ticked after another one that stands behind it."""
         return count > 1 and self.order not in _ONE_WAY
 
     def begins_with_first(self) -> bool:
-        """Tell whether its first tick surely ticks the first child."""
+        """Return whether its first tick surely ticks the first child."""
         ordered = self.order in _LISTED | {Order.SINGLE, Order.AT_ONCE, Order.CHOSEN, Order.CHOSEN_EACH_TICK, Order.TRIED}
         return ordered and self.order is not Order.FROM_ANY and self.begins is Begin.AT_ONCE and not self.keeps_place
 
     def heeds_failure(self, place: int, count: int, given: Given) -> bool:
-        """Tell whether it may do something else about the failure of one of its children than to fail, too; of what is not known it may."""
+        """Return whether it may do something else about the failure of a child than to fail, too; of what is not known it may."""
         match self.order:
             case Order.SINGLE:
                 return self.takes_failure or self.follows(FAILURE) != {FAILURE}

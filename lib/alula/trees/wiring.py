@@ -79,7 +79,7 @@ class Scope:
 
 @dataclass
 class BoundScript:
-    """A script of a node; ``unknown`` is why its last answer as a condition was false, where that was because nobody knows."""
+    """A script of a node; ``unknown`` is why its last answer as a condition was false, where that was because a value is not known."""
 
     program: Program
     scope: Scope

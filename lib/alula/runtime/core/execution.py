@@ -53,7 +53,7 @@ class Execution:
 
     @property
     def done(self) -> bool:
-        """Tell whether the execution has ended."""
+        """Return whether the execution has ended."""
         return self.state.terminal
 
     def terminate(self, result: str, message: str = "", outputs: Mapping[str, object] | None = None) -> bool:

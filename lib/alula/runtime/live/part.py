@@ -38,12 +38,12 @@ class Clock(Protocol):
 
     @property
     def simulated(self) -> bool:
-        """Tell whether it is ``/clock``."""
+        """Return whether it is ``/clock``."""
         ...
 
     @property
     def stands_still(self) -> bool:
-        """Tell whether it has not moved for so long that nothing will move it any more."""
+        """Return whether it has not moved for so long that nothing will move it any more."""
         ...
 
 

@@ -38,7 +38,7 @@ class LocalWorld:
             (``after``), ``transition`` and ``publish``.
         start_s: mission clock at the beginning.
         latency_s: how long each message between clients and managers takes.
-        types: what the models' types are in ROS, so that lists are told from points.
+        types: what the models' types are in ROS, so that lists are not taken for points.
     """
 
     def __init__(
