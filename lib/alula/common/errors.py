@@ -7,4 +7,4 @@ from alula.common.public import public
 
 @public()
 class AlulaError(Exception):
-    """Something that was given to Alula can't be used, or did not work; the message says what, where, and what to do about it."""
+    """Base of Alula's errors: an input can't be used, or an operation has failed; the message says what, where, and the remedy."""

@@ -41,9 +41,9 @@ class FaultRequest:
 
     Attributes:
         what: the thing.
-        how: in which way; empty: the way that the thing knows first.
+        how: the way of failing; empty: the first one of the thing.
         begin_s: seconds of mission clock after lift-off; None: from the start of the run.
-        end_s: when it is well again, counted alike; None: never.
+        end_s: when it ends, counted alike; None: never.
     """
 
     what: str

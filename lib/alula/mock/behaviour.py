@@ -143,7 +143,7 @@ class Behaviour:
         )
 
     def named(self, name: Callable[[str], str]) -> Behaviour:
-        """Return it for skillsets and faults that are called otherwise: ``name`` makes their names of those here."""
+        """Return it with the names of skillsets and faults replaced by what ``name`` makes of them."""
 
         def states(said: Mapping[Place, str]) -> dict[Place, str]:
             return {(name(skillset), member): state for (skillset, member), state in said.items()}
@@ -172,13 +172,13 @@ class Behaviour:
         )
 
     def about(self, skillset: str) -> bool:
-        """Return whether anything is said of a skillset, ``beside`` aside."""
+        """Return whether it has rules for a skillset, ``beside`` aside."""
         said = [*self.rules, *self.data, *(place for event in self.timeline for place in event.states)]
         said += [place for fault in self.faults.values() for place in (*fault.states, *fault.ends)]
         return any(place[0] == skillset for place in said)
 
     def fault(self, request: FaultRequest) -> tuple[str, MockFault]:
-        """Return the fault that a request means, with its name: the one for the way of failing, else the one for the thing.
+        """Return the fault that a request asks for, and its name: ``thing:how`` where it is defined, else ``thing``.
 
         Raises:
             SkillRuntimeError: there is none.
@@ -190,7 +190,7 @@ class Behaviour:
         return name, faults[name]
 
     def of(self, skillsets: frozenset[str]) -> Behaviour:
-        """Return what concerns these skillsets alone, for a process that has no others."""
+        """Return the part about these skillsets, for a process that serves no others."""
 
         def inside(states: Mapping[Place, str], anchor: tuple[Place, str] | None) -> bool:
             return all(skillset in skillsets for skillset, _ in (*states, *(() if anchor is None else (anchor[0],))))

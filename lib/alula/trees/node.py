@@ -263,7 +263,7 @@ class Node(Behaviour):  # type: ignore[misc]  # py_trees is seen untyped
         raise NotImplementedError
 
     def halt(self) -> None:
-        """Stop what it does, and be idle; what has a memory of its tick forgets it here."""
+        """Stop what the node does, and be idle; a node that remembers anything of its ticks resets it here."""
         raise NotImplementedError
 
     def halt_node(self) -> None:
@@ -273,7 +273,7 @@ class Node(Behaviour):  # type: ignore[misc]  # py_trees is seen untyped
             self.after.on_halted.run()
 
     def become(self, status: Answer) -> None:
-        """Have another status, and tell those who watch."""
+        """Set the status, and call the watchers."""
         previous = self.status
         if status is not previous and isinstance(status, Status):
             self.status = status
@@ -466,7 +466,7 @@ class Action(Leaf):
         return self.on_start() if self.status is IDLE else self.status
 
     def halt(self) -> None:
-        """Have it interrupted while it runs; it is idle then, whatever that raises."""
+        """Interrupt it if it runs; it is idle afterwards, whatever ``on_halted`` raises."""
         try:
             if self.status is RUNNING:
                 self.on_halted()
@@ -474,11 +474,11 @@ class Action(Leaf):
             self.become(IDLE)
 
     def on_start(self) -> Answer:
-        """Begin; called in the first tick."""
+        """Begin, and return the status; called in the first tick."""
         raise NotImplementedError
 
     def on_running(self) -> Answer:
-        """Look; called in each further tick."""
+        """Go on, and return the status; called in each further tick."""
         raise NotImplementedError
 
     def on_halted(self) -> None:
@@ -492,19 +492,19 @@ class Control(Node):
     category = Category.CONTROL
 
     def halt(self) -> None:
-        """Halt what runs."""
+        """Halt the children that run."""
         self.reset_children()
         self.become(IDLE)
 
     def reset_children(self, first: int = 0) -> None:
-        """Halt those that run, and have all idle, from one on."""
+        """Halt the running children, and reset all to idle, from index ``first`` on."""
         for child in self.children[first:] if first else self.children:
             if child.status is RUNNING:
                 child.halt_node()
             child.become(IDLE)
 
     def reset_child(self, index: int) -> None:
-        """Halt one when it runs, and have it idle."""
+        """Halt a child if it runs, and reset it to idle."""
         child = self.children[index]
         if child.status is RUNNING:
             child.halt_node()
@@ -518,7 +518,7 @@ class Decorator(Control):
     category = Category.DECORATOR
 
     def execute(self) -> Answer:
-        """Tick it; a child that has ended is idle afterwards."""
+        """Tick the node; a child that has ended is idle afterwards."""
         answer = super().execute()
         child = self.child
         if child.status is SUCCESS or child.status is FAILURE:

@@ -94,7 +94,7 @@ class LocalWorld:
         return LocalClient(self._bus, name)
 
     def kill(self, name: str) -> None:
-        """End managers without a word, like ``kill -9``; their clients learn that they have gone.
+        """End managers at once, like ``kill -9``; their clients see them go.
 
         Raises:
             WorldError: they are not there.

@@ -106,7 +106,7 @@ class ActionSkill(FunctionSkill[Goal]):
         return False
 
     def on_emergency(self, execution: Execution) -> None:
-        """Wait no more for the end of a goal that was cancelled."""
+        """Stop waiting for the end of a goal that was cancelled."""
         goal = self.forget(execution)
         if goal is not None:
             self._cancel(goal)

@@ -26,7 +26,7 @@ class Heartbeat:
         self._timer = NodeClock(node).every(HEARTBEAT_S, self._beat)
 
     def close(self) -> None:
-        """Beat no more."""
+        """Stop the heartbeat."""
         self._node.destroy_timer(self._timer)
         self._node.destroy_publisher(self._publisher)
 

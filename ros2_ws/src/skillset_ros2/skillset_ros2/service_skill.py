@@ -81,7 +81,7 @@ class ServiceSkill(FunctionSkill[ServiceCall]):
         return False
 
     def on_emergency(self, execution: Execution) -> None:
-        """Wait no more."""
+        """Stop waiting for the answer."""
         self.forget(execution)
 
     def look(self, call: ServiceCall) -> str:

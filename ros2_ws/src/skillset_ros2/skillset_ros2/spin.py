@@ -72,7 +72,7 @@ def run_skillset(
     arguments: Sequence[str] | None = None,
     again: Sequence[str] = (),
 ) -> None:
-    """Serve a skillset until SIGINT or SIGTERM; then stop what runs, tell its callers, and return.
+    """Serve a skillset until SIGINT or SIGTERM; then stop what runs, report that to its callers, and return.
 
     ``arguments`` (default: the command line) are ``--processes single|separate``, ``--part NAME`` to serve a part only, and those of
     ROS: ``--ros-args -p use_sim_time:=true``. Exits with 2 when they are wrong. ``again``: what else the command line of a part needs.

@@ -22,7 +22,7 @@ REFUSED = 2
 def run_skillset(
     skillset: Skillset, interfaces: ModuleType, hooks_factory: HooksFactory, *, data_bindings: DataBindings | None = None
 ) -> None:
-    """Serve a skillset until SIGINT, SIGTERM or the node's end; then stop what runs, tell its callers, and return.
+    """Serve a skillset until SIGINT, SIGTERM or the node's end; then stop what runs, report that to its callers, and return.
 
     Exits with 2 when managers of the skillset are there already.
     The command line is rospy's: ``__ns:=/robot1 __name:=...`` and remappings.
