@@ -28,7 +28,7 @@ HEAD = """\
 
 For authors of programs, hooks, nodes or parts of a robot in Python. These names stay; what is to go warns for one minor
 version first ([CONTRIBUTING](../../CONTRIBUTING.md#the-public-api)). Every other module is private. What generated code
-offers is in [client](../how-to/client.md) and in [names](names.md).
+offers is in [client](../how-to/client.md) and in [the skillset interface](names.md).
 
 <!-- Written by `python -m api_page`, from the docstrings. -->
 """

@@ -1,6 +1,6 @@
 """The functional layer as objects: what the paper's Listing 4 calls ``dji_guidance``.
 
-Each class wraps topics and services of one part (docs/reference/names.md) on an rclpy node. Commands return at once, their
+Each class wraps topics and services of one part (docs/reference/drone.md) on an rclpy node. Commands return at once, their
 answer comes to a callback; reports are kept and passed on to listeners.
 """
 
