@@ -23,15 +23,16 @@ class ServiceCall(Call):
 class ServiceSkill(FunctionSkill[ServiceCall]):
     """A skill whose function is a service: the answer's ``success`` gives the result, its ``message`` the reason.
 
-    An interruption calls ``stop_server`` and is done when that has answered; without one it only waits no more, as the caller of a
+    An interruption calls ``stop_server`` and is done when that has answered; without one it only stops waiting, as the caller of a
     service can't take its call back.
     """
 
     service: ClassVar[Any]
     """The service's type."""
     stop_service: ClassVar[Any] = None
+    """The type of the service that stops what the call has started."""
     stop_server: ClassVar[str] = ""
-    """The service that stops what the call has started, and its type; "": there is none."""
+    """Its name, without a slash in front; "": there is none."""
     results: ClassVar[Mapping[Any, str]] = {}
     """The result for each value of ``success``."""
 
