@@ -28,14 +28,15 @@ from alula.missions.skillset import Client, Clock
 from alula.missions.world import World, asked_data, states_of
 from alula.model.model import Skillset
 from alula.trees.blackboard import Blackboard as TreeBoard
-from alula.trees.errors import FileError, TreeError
+from alula.trees.errors import TreeError
 from alula.trees.factory import build_tree
-from alula.trees.node import Node
+from alula.trees.node import Node, Shared, Wiring
 from alula.trees.palette import Category, Direction, NodeType, Palette, Port, node_type
 from alula.trees.reading import TreeFiles
 from alula.trees.source import TreeSource, source_of
 from alula.trees.structure import verify
 from alula.trees.tree import Tree
+from alula.trees.wiring import wire
 
 READY, STOP_HERE = "ready", "stop_here"
 DEGRADED, STOPPING = "degraded", "stopping"
@@ -76,6 +77,17 @@ class MissionFile:
         """The types of node that its trees may have."""
         return palette_of(self.files, self.skillsets, self.part)
 
+    @cached_property
+    def roots(self) -> tuple[Wiring, ...]:
+        """The tops of its trees as they will stand, on one blackboard: the main one, `stop_here`, and `ready`; raises InputError."""
+        self._verify()
+        shared, found = Shared(int), list[Wiring]()
+        board = TreeBoard(shared.clock)
+        for name in (self.files.main, *(one for one in (STOP_HERE, READY) if one in self.files.trees)):
+            after = sum(1 for root in found for _ in root.walk())
+            found.append(wire(self.files, self.palette, name, shared, enums=self.source.enums, blackboard=board, after=after))
+        return tuple(found)
+
     @property
     def nowhere_made(self) -> list[NodeType]:
         """The types of node that its trees use and that are only declared, by its files or by Nav2."""
@@ -93,12 +105,9 @@ class MissionFile:
 
     def plan(self, name: str, inputs: Inputs) -> MissionPlan:
         """Return its plan; raises InputError where the file, or an input, can't be used."""
-        try:
-            verify(self.files, self.palette)
-            if (problem := no_class(self.files, self.palette)) is not None:
-                raise FileError(problem)
-        except TreeError as error:
-            raise InputError(str(error)) from error
+        self._verify()
+        if (problem := no_class(self.files, self.palette)) is not None:
+            raise InputError(str(problem))
         parameters = {port.name: _number(port) for port in self.given if port.default is not None}
         own = self._inputs(inputs)
         self.part.check_inputs(own)
@@ -120,6 +129,12 @@ class MissionFile:
             return {port.name: board[0].get(port.name) if board else _number(port) for port in told}
 
         return MissionPlan(name, tuple(one.name for one in self.skillsets), make, parameters, own, facts)
+
+    def _verify(self) -> None:
+        try:
+            verify(self.files, self.palette)
+        except TreeError as error:
+            raise InputError(str(error)) from error
 
     def _inputs(self, inputs: Inputs) -> dict[str, object]:
         needed = [port.name for port in self.given if port.default is None]

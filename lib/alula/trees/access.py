@@ -14,7 +14,7 @@ from alula.trees.document import Attribute, Element
 from alula.trees.node import Node, Wiring, pointer
 from alula.trees.palette import Direction, NodeType, Port
 from alula.trees.reading import POSTCONDITIONS, PRECONDITIONS
-from alula.trees.script.syntax import Assignment, Call, Chain, Comparison, Conditional, Literal, Name, Prefix, children
+from alula.trees.script.syntax import Assignment, Call, Chain, Comparison, Conditional, Literal, Name, Prefix, children, walk
 from alula.trees.script.syntax import Node as Part
 from alula.trees.values import ANY
 from alula.trees.wiring import plain_inside
@@ -44,19 +44,25 @@ class Access:
     """Of a reading: it is read only to be written anew, as in `n += 1`."""
     value: Part | None = None
     """What a script writes."""
+    sure: bool = True
+    """Of a writing: it comes whenever the script runs, or the node ends."""
+    among: frozenset[str] | None = None
+    """Of a reading: it is only asked whether the entry is one of these texts; None: its value counts."""
 
 
 class Accesses:
     """All accesses to entries in a tree, in the order in which they may come first.
 
-    ``statements`` reads the script in an attribute; ``names`` stand in scripts for something else than an entry, such as enums and states.
+    ``statements`` reads the script in an attribute; ``names`` stand in scripts for something else than an entry, such as enums and states,
+    and so do dotted names. None: any name may be an entry's.
     """
 
-    def __init__(self, statements: Callable[[Attribute], Sequence[Part]], names: Collection[str] = ()) -> None:
+    def __init__(self, statements: Callable[[Attribute], Sequence[Part]], names: Collection[str] | None = ()) -> None:
         self._statements = statements
         self._names = names
         self._before: dict[Wiring, list[Access]] = {}
         self._after: dict[Wiring, list[Access]] = {}
+        self._scripts: dict[tuple[Wiring, str], list[Access]] = {}
 
     def of(self, wiring: Wiring) -> Iterator[Access]:
         """Yield those of a node and all below it."""
@@ -79,8 +85,22 @@ class Accesses:
     def after(self, wiring: Wiring) -> list[Access]:
         """Return those of its scripts after it has ended."""
         if wiring not in self._after:
-            self._after[wiring] = [one for attribute in scripts_after(wiring.element) for one in self._script(wiring, attribute)]
+            self._after[wiring] = [one for attribute in scripts_after(wiring.element) for one in self.in_script(wiring, attribute.name)]
         return self._after[wiring]
+
+    def in_script(self, wiring: Wiring, attribute: str) -> list[Access]:
+        """Return those of the script in an attribute of a node, none where it has none."""
+        key = (wiring, attribute)
+        if key not in self._scripts:
+            script = wiring.element.attributes.get(attribute)
+            self._scripts[key] = [] if script is None else list(self._in(wiring.blackboard, script))
+        return self._scripts[key]
+
+    def calls(self, wiring: Wiring, attribute: str) -> Iterator[Call]:
+        """Yield the calls in the script in an attribute of a node."""
+        script = wiring.element.attributes.get(attribute)
+        for statement in () if script is None else self._statements(script):
+            yield from (one for one in walk(statement) if isinstance(one, Call))
 
     def of_node(self, wiring: Wiring) -> Iterator[Access]:
         """Yield those of a node itself."""
@@ -89,39 +109,53 @@ class Accesses:
 
     def _first(self, wiring: Wiring) -> Iterator[Access]:
         for attribute in scripts_before(wiring.element):
-            yield from self._script(wiring, attribute)
+            yield from self.in_script(wiring, attribute.name)
         if wiring.is_subtree:
             yield from _constants(wiring)
             return
         yield from _read_by_ports(wiring)
         for attribute in scripts_within(wiring.element, wiring.type):
-            yield from self._script(wiring, attribute)
+            yield from self.in_script(wiring, attribute.name)
         yield from _written_by_ports(wiring)
 
-    def _script(self, wiring: Wiring, attribute: Attribute) -> Iterator[Access]:
-        for statement in self._statements(attribute):
-            yield from self._part(wiring.blackboard, attribute, statement)
+    def _in(self, board: Blackboard, script: Attribute) -> Iterator[Access]:
+        for statement in self._statements(script):
+            yield from self._part(board, script, statement, sure=True)
 
-    def _part(self, board: Blackboard, attribute: Attribute, part: Part, *, needed: bool = True) -> Iterator[Access]:
+    def _is_entry(self, name: str) -> bool:
+        return self._names is None or (name not in self._names and "." not in name)
+
+    def _part(
+        self,
+        board: Blackboard,
+        attribute: Attribute,
+        part: Part,
+        *,
+        needed: bool = True,
+        sure: bool = False,
+        among: frozenset[str] | None = None,
+    ) -> Iterator[Access]:
         match part:
             case Name():
-                if part.name not in self._names and "." not in part.name:
-                    yield Access(board.where(part.name), part.name, False, attribute, (part.offset, part.end), needed=needed)
+                if self._is_entry(part.name):
+                    place = (part.offset, part.end)
+                    yield Access(board.where(part.name), part.name, False, attribute, place, needed=needed, among=among)
             case Assignment(target=Name() as target):
                 key, place = board.where(target.name), (target.offset, target.end)
-                if not part.replaces and target.name not in self._names and "." not in target.name:
+                if not part.replaces and self._is_entry(target.name):
                     yield Access(key, target.name, False, attribute, place, in_passing=True)
                 yield from self._part(board, attribute, part.value)
-                yield Access(key, target.name, True, attribute, place, _written(part.value), value=part.value)
+                yield Access(key, target.name, True, attribute, place, _written(part.value), value=part.value, sure=sure)
             case Assignment(target=Conditional() as target):  # it is written where the condition says
                 yield from self._part(board, attribute, target.condition)
                 for branch in (target.then, target.otherwise):
                     yield from (one if one.write else replace(one, in_passing=True) for one in self._part(board, attribute, branch))
                 yield from self._part(board, attribute, part.value)
             case _:
+                texts = among or _among(part)
                 for child in children(part):
                     if not (isinstance(part, Call) and isinstance(child, Name)):
-                        yield from self._part(board, attribute, child, needed=not _may_be_state(part, child))
+                        yield from self._part(board, attribute, child, needed=not _may_be_state(part, child), among=texts)
 
 
 def _read_by_ports(wiring: Wiring) -> Iterator[Access]:
@@ -201,6 +235,19 @@ def _is_in_entry(attribute: Attribute) -> bool:
 
 def _present(element: Element, names: tuple[str, ...]) -> Iterator[Attribute]:
     return (element.attributes[name] for name in names if name in element.attributes)
+
+
+def _among(part: Part) -> frozenset[str] | None:
+    """Return the texts of a condition that asks only whether one entry is one of them; None where it is no such condition."""
+    match part:
+        case Comparison(operands=(Name(), Literal(value=str(text))), operators=("==" | "!=",)):
+            return frozenset({text})
+        case Chain(operators=operators, operands=operands) if set(operators) == {"||"}:
+            texts = [_among(one) for one in operands if isinstance(one, Comparison) and one.operators == ("==",)]
+            names = {one.operands[0].name for one in operands if isinstance(one, Comparison) and isinstance(one.operands[0], Name)}
+            known = [one for one in texts if one is not None]
+            return frozenset().union(*known) if len(known) == len(operands) and len(names) == 1 else None
+    return None
 
 
 def _may_be_state(part: Part, child: Part) -> bool:

@@ -78,3 +78,36 @@ def test_accesses_come_in_their_order_and_say_what_is_needed() -> None:
         *((k, *written), (k, *read), (m, *read), (k, False, False, False)),
         *((n, False, True, True), (n, *written)),
     ]
+
+
+def accesses(code: str) -> list[tuple[str, bool, bool, frozenset[str] | None]]:
+    files = read_text(f'<root BTCPP_format="4"><BehaviorTree ID="a"><Script code="{code}"/></BehaviorTree></root>')
+    root = wire(files, standard_palette(), "a", Shared(int))
+    found = Accesses(lambda one: statements_of(one.value), None).in_script(root, "code")
+    return [(one.name, one.write, one.sure, one.among) for one in found]
+
+
+@pytest.mark.parametrize(
+    ("code", "expected"),
+    [
+        ("a := b", [("b", False, True, None), ("a", True, True, None)]),
+        ("a += 1", [("a", False, True, None), ("a", True, True, None)]),
+        ("a == 'x' ? b := 'x' : c", [("a", False, True, frozenset("x")), ("b", True, False, None), ("c", False, True, None)]),
+        ("a == 'x' || a == 'y'", [("a", False, True, frozenset("xy"))] * 2),
+        ("a == 'x' || b == 'y'", [("a", False, True, frozenset("x")), ("b", False, True, frozenset("y"))]),
+        ("a == 'x' || a != 'y'", [("a", False, True, frozenset("x")), ("a", False, True, frozenset("y"))]),
+        ("a == 1 || x.y == a", [("a", False, True, None), ("x.y", False, True, None), ("a", False, True, None)]),
+        ("running(a)", []),
+    ],
+)
+def test_a_script_says_which_writing_is_sure_and_which_texts_are_told_apart(
+    code: str, expected: list[tuple[str, bool, bool, frozenset[str] | None]]
+) -> None:
+    assert accesses(code) == expected
+
+
+def test_calls_name_what_they_ask_for() -> None:
+    files = read_text('<root BTCPP_format="4"><BehaviorTree ID="a"><Script code="a := f(b.c) + g(\'d\', 1 + 2)"/></BehaviorTree></root>')
+    root = wire(files, standard_palette(), "a", Shared(int))
+    calls = Accesses(lambda one: statements_of(one.value)).calls(root, "code")
+    assert [(one.function, one.named) for one in calls] == [("f", ("b.c",)), ("g", ("d", ""))]

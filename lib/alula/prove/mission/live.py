@@ -17,9 +17,6 @@ from alula.prove.mission.reading import ANOTHER, OUTCOME
 from alula.trees.access import Key, named_entries, scripts_of, written_entries
 from alula.trees.node import Node
 from alula.trees.nodes.subtree import SubTree
-from alula.trees.script import statements_of
-from alula.trees.script.syntax import Assignment, Call, Chain, Comparison, Literal, Name, walk
-from alula.trees.script.syntax import Node as Part
 from alula.trees.status import FAILURE, SKIPPED, SUCCESS, Answer
 from alula.trees.ticking import AGAIN, Begin, Order, Ticking
 from alula.trees.tree import Tree
@@ -86,6 +83,7 @@ class Liveness:
         self._nodes = [node for tree in trees for node in tree.nodes]
         self._number = {id(node): number for number, node in enumerate(self._nodes)}
         self._unread = looking.read.unread
+        self._accesses = looking.read.accesses
         self._leaves: dict[str, list[int]] = {}
         self._leaf_of: dict[int, int] = {}
         for leaf, one in enumerate(one for one in self._nodes if isinstance(one, SkillNode)):
@@ -190,7 +188,7 @@ class Liveness:
 
     def _leaf(self, node: Node, ends: Ends, *, begins: bool = True) -> Reads:
         if node.runs_script:
-            return self._script(node, node.wiring.element.get(node.runs_script), ends.success)
+            return self._script(node, node.runs_script, ends.success)
         own = node.wiring.type.name in self._unread
         reads = NOTHING if own else self._ports(node) | self._asked(node, *node.wiring.type.scripts)
         written = self._written(node) if own else frozenset()
@@ -276,10 +274,9 @@ class Liveness:
 
     def _after(self, node: Node, ends: Ends) -> Ends:
         """Return what is live after a node, before its postconditions."""
-        element = node.wiring.element
-        always = [self._script(node, element.get("_post"), end) for end in (ends.success, ends.failure)]
-        success = self._script(node, element.get("_onSuccess"), always[0])
-        failure = self._script(node, element.get("_onFailure"), always[1])
+        always = [self._script(node, "_post", end) for end in (ends.success, ends.failure)]
+        success = self._script(node, "_onSuccess", always[0])
+        failure = self._script(node, "_onFailure", always[1])
         return Ends(success, failure, ends.skipped, ends.halted)
 
     def _kept_always(self, node: Node) -> Reads:
@@ -293,7 +290,7 @@ class Liveness:
             if one.wiring.type.name not in self._unread:
                 found |= self._ports(one)
             for attribute in scripts_of(one.wiring.element, one.wiring.type):
-                found |= self._script(one, attribute.value, NOTHING)
+                found |= self._script(one, attribute.name, NOTHING)
         return found
 
     def _ports(self, node: Node) -> Reads:
@@ -301,7 +298,7 @@ class Liveness:
         return frozenset((_place(node, name), None) for name in names)
 
     def _asked(self, node: Node, *attributes: str) -> Reads:
-        return NOTHING.union(*(self._script(node, node.wiring.element.get(one), NOTHING) for one in attributes))
+        return NOTHING.union(*(self._script(node, one, NOTHING) for one in attributes))
 
     def _written(self, node: Node) -> frozenset[Place]:
         """Return what a leaf writes whenever it returns."""
@@ -312,42 +309,19 @@ class Liveness:
         name = named_entries(node).get(OUTCOME_PORT)
         return (-1, "") if name is None else _place(node, name)
 
-    def _script(self, node: Node, text: str, after: Reads) -> Reads:
+    def _script(self, node: Node, attribute: str, after: Reads) -> Reads:
         """Return what is live before a script; what is no script reads nothing here (``Looking`` says that it may ask for anything)."""
-        for statement in reversed(statements_of(text)):
-            if isinstance(statement, Assignment) and isinstance(statement.target, Name) and statement.replaces:
-                after = _without(after, frozenset({_place(node, statement.target.name)})) | self._read_by(node, statement.value)
-            else:
-                after |= self._read_by(node, statement)
-        return after
+        for one in reversed(self._accesses.in_script(node.wiring, attribute)):
+            if not one.write:
+                after |= {(one.key, one.among)}
+            elif one.sure:
+                after = _without(after, frozenset({one.key}))
+        return after | self._executions(node, attribute)
 
-    def _read_by(self, node: Node, part: Part) -> Reads:
-        compared: dict[int, frozenset[str]] = {}
-        found: set[Read] = set()
-        for one in walk(part):  # from the top down
-            match one:
-                case Chain() | Comparison():
-                    names, texts = _one_of(one)
-                    compared |= {} if names is None else {id(name): texts for name in names if id(name) not in compared}
-                case Name():
-                    found.add((_place(node, one.name), compared.get(id(one))))
-                case Call():
-                    skills = (str(getattr(name, "name", getattr(name, "value", ""))) for name in one.arguments)
-                    found |= {(leaf_place(leaf), None) for skill in skills for leaf in self._leaves.get(skill, ())}
-        return frozenset(found)
-
-
-def _one_of(part: Part) -> tuple[list[Name] | None, frozenset[str]]:
-    """Return the names in a condition that asks whether one entry is one of some texts, and these; None where it is no such condition."""
-    match part:
-        case Comparison(operands=(Name() as name, Literal(value=str(text))), operators=("==" | "!=",)):
-            return [name], frozenset({text})
-        case Chain(operators=operators) if set(operators) == {"||"}:
-            parts = [_one_of(one) for one in part.operands if isinstance(one, Comparison) and one.operators == ("==",)]
-            names = [name for known, _ in parts for name in known or ()]
-            if len(names) == len(part.operands) and len({name.name for name in names}) == 1:
-                return names, frozenset().union(*(texts for _, texts in parts))
-    return None, frozenset()
+    def _executions(self, node: Node, attribute: str) -> Reads:
+        """Return the leaves whose executions a script asks for."""
+        names = (name for call in self._accesses.calls(node.wiring, attribute) for name in call.named)
+        return frozenset((leaf_place(leaf), None) for name in names for leaf in self._leaves.get(name, ()))
 
 
 def _at_least_once(count: str) -> bool:

@@ -17,12 +17,10 @@ from typing import TYPE_CHECKING
 
 from alula.model.model import Skillset
 from alula.prove.mission.oracle import Asked, Oracle, UndecidedError
-from alula.prove.mission.reading import type_of
 from alula.prove.mission.unknown import Distance, UnknownNumber, UnknownText
 from alula.trees.access import scripts_of
 from alula.trees.document import Attribute, Element
-from alula.trees.palette import Palette
-from alula.trees.reading import TreeFiles
+from alula.trees.node import Wiring
 from alula.trees.script import statements_of
 from alula.trees.script.compiler import EPSILON
 from alula.trees.script.syntax import Assignment, Call, Chain, Comparison, Conditional, Literal, Name, Node, Prefix, children
@@ -50,14 +48,13 @@ class Conditions:
     fresh: frozenset[str] = frozenset()
 
     @classmethod
-    def of(cls, files: TreeFiles, palette: Palette, skillsets: Iterable[Skillset]) -> Conditions:
-        """Read those of a mission; raises UndecidedError for what computes with data, or copies them."""
+    def of(cls, roots: Iterable[Wiring], skillsets: Iterable[Skillset]) -> Conditions:
+        """Read those of the trees of a mission; raises UndecidedError for what computes with data, or copies them."""
         types = {f"{one.name}.{data.name}": data.type for one in skillsets for data in one.data}
         asking = _Asking(types)
-        for tree in files.trees.values():
-            for element in tree.iterate():
-                for attribute in scripts_of(element, type_of(element, palette)):
-                    asking.script(element, attribute)
+        for wiring in (wiring for root in roots for wiring in root.walk()):
+            for attribute in scripts_of(wiring.element, wiring.type):
+                asking.script(wiring.element, attribute)
         return cls(asking.kinds, frozenset(asking.fresh))
 
 
@@ -90,8 +87,7 @@ class _Asking:
             case Comparison():
                 self._compared(node)
             case Call():
-                names = (str(getattr(one, "name", getattr(one, "value", ""))) for one in node.arguments)
-                self.fresh.update(name for name in names if name in self._types and node.function == FRESH)
+                self.fresh.update(name for name in node.named if name in self._types and node.function == FRESH)
             case Conditional():
                 self._look(node.condition, asked=True)
                 self._look(node.then, asked=asked)

@@ -192,9 +192,7 @@ def write(robot: Robot, node: Node) -> None:
     """Write values of which nothing is known to all outputs."""
     entries = written_entries(node)
     for port in outputs(node):
-        entry = entries[port.name]
-        type_ = robot.uses.type_of(node.wiring.type.name, port, entry)
-        node.put(port.name, any_value(robot.oracle, f"`{entry}`", type_))
+        node.put(port.name, any_value(robot.oracle, f"`{entries[port.name]}`", robot.uses.type_of(node, port)))
 
 
 def outputs(node: Node) -> list[Port]:

@@ -11,11 +11,8 @@ from alula.missions.mission_file import DEGRADED, STOPPING
 from alula.missions.world import FUNCTIONS
 from alula.prove.mission.oracle import Oracle
 from alula.prove.mission.unknown import Unknown, UnknownNumber, UnknownText
-from alula.trees.access import Key, scripts_of
-from alula.trees.document import Element
+from alula.trees.access import Accesses, Key, scripts_of
 from alula.trees.node import Wiring, pointer
-from alula.trees.palette import Category, NodeType, Palette
-from alula.trees.reading import type_name
 from alula.trees.script import names_in, statements_of
 from alula.trees.script.syntax import Assignment, Call, Chain, Comparison, Literal, Name, Node, walk
 
@@ -63,6 +60,7 @@ class Read:
     """Types of node that decide by nothing that is known."""
     free: frozenset[str] = frozenset()
     """Types of node that may decide by anything."""
+    accesses: Accesses = field(default_factory=lambda: Accesses(lambda script: statements_of(script.value), None))
 
     def sources(self, names: Iterable[Key]) -> frozenset[Key]:
         """Return entries, and all that what they have may come of."""
@@ -80,7 +78,13 @@ class Read:
         if wiring.type.name not in self.unread and not wiring.is_subtree:
             named |= {pointer(one.value, one.name) or one.value for one in wiring.port_attributes()}
         written = _keys(wiring, names.replaced)
-        return Asks(frozenset(one.names), _keys(wiring, named), written, frozenset(one.ends), one.asks_first, _skills_asked(statements))
+        return Asks(frozenset(one.names), _keys(wiring, named), written, frozenset(one.ends), one.asks_first, self._skills(wiring))
+
+    def _skills(self, wiring: Wiring) -> frozenset[str]:
+        """Return the skills whose executions a node asks for."""
+        scripts = scripts_of(wiring.element, wiring.type)
+        calls = (call for script in scripts for call in self.accesses.calls(wiring, script.name))
+        return frozenset(name for call in calls if FUNCTIONS[call.function].kind == "skill" for name in call.named)
 
     def value(self, name: Key, value: object) -> object:
         """Return what is kept of an entry's value."""
@@ -143,11 +147,6 @@ def what_is_read(
     return read
 
 
-def type_of(element: Element, palette: Palette) -> NodeType | None:
-    """Return a node's type; None for the use of a subtree, and for what no palette has."""
-    return None if element.tag == Category.SUBTREE.value else palette.get(type_name(element))
-
-
 def _statements(wiring: Wiring) -> list[Node]:
     """Return the statements of all scripts of a node."""
     return [one for attribute in scripts_of(wiring.element, wiring.type) for one in statements_of(attribute.value)]
@@ -179,9 +178,8 @@ def _assignment(read: Read, wiring: Wiring, node: Assignment) -> None:
 
 def _look(read: Read, wiring: Wiring, node: Node, constants: Mapping[str, float]) -> None:
     if isinstance(node, Call):
-        names = [one.value if isinstance(one, Literal) else one.name if isinstance(one, Name) else "" for one in node.arguments]
         read.asks_first |= node.function == "failed_first"
-        read.ends |= {str(one) for one in names} if node.function == "failed" else set()
+        read.ends |= set(node.named) if node.function == "failed" else set()
     if isinstance(node, Comparison):
         literals = [one.value for one in node.operands if isinstance(one, Literal)]
         literals += [constants[one.name] for one in node.operands if isinstance(one, Name) and one.name in constants]
@@ -198,10 +196,3 @@ def _ports(read: Read, wiring: Wiring, unread: frozenset[str]) -> None:
         keys = _keys(wiring, (key for one in wiring.port_attributes() if (key := pointer(one.value, one.name)) is not None))
         read.names |= keys
         read.whole |= keys
-
-
-def _skills_asked(statements: Iterable[Node]) -> frozenset[str]:
-    """Return the skills whose executions statements ask for."""
-    calls = [node for statement in statements for node in walk(statement) if isinstance(node, Call)]
-    arguments = [one for call in calls if FUNCTIONS[call.function].kind == "skill" for one in call.arguments]
-    return frozenset(str(one.value if isinstance(one, Literal) else getattr(one, "name", "")) for one in arguments)

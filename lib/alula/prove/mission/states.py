@@ -15,11 +15,9 @@ from typing import TYPE_CHECKING
 from alula.missions.world import states_of
 from alula.model.model import Skillset
 from alula.prove.mission.oracle import Oracle
-from alula.prove.mission.reading import type_of
 from alula.prove.mission.unknown import Distance
 from alula.trees.access import scripts_of, takes_script_from_entry
-from alula.trees.palette import Palette
-from alula.trees.reading import TreeFiles, type_name
+from alula.trees.node import Wiring
 from alula.trees.script import statements_of
 from alula.trees.script.syntax import Call, Comparison, Name, Node, children, walk
 
@@ -38,17 +36,15 @@ class Compared:
     states: Mapping[float, str] = field(default_factory=dict)
 
     @classmethod
-    def of(cls, files: TreeFiles, palette: Palette, skillsets: Iterable[Skillset]) -> Compared:
-        """Read those of a mission's files; none where a script comes from the blackboard, for then anything may be asked."""
+    def of(cls, roots: Iterable[Wiring], skillsets: Iterable[Skillset]) -> Compared:
+        """Read those of a mission's trees; none where a script comes from the blackboard, for then anything may be asked."""
         several = list(skillsets)
         states = {f"{one.name}.{resource.name}": frozenset(resource.states) for one in several for resource in one.resources}
-        elements = [element for tree in files.trees.values() for element in tree.iterate()]
-        types = [type_of(element, palette) for element in elements]
-        for element, type_ in zip(elements, types, strict=True):
-            if takes_script_from_entry(element, type_):
-                return cls()
-        texts = (one.value for element, type_ in zip(elements, types, strict=True) for one in scripts_of(element, type_))
-        named: Counter[str] = Counter(type_name(element) for element in elements)
+        nodes = [wiring for root in roots for wiring in root.walk()]
+        if any(takes_script_from_entry(one.element, one.type) for one in nodes):
+            return cls()
+        texts = (script.value for one in nodes for script in scripts_of(one.element, one.type))
+        named: Counter[str] = Counter(one.type.name for one in nodes)
         compared: Counter[str] = Counter()
         for program in (program for text in texts for program in statements_of(text)):
             named.update(one.name for one in _read(program))

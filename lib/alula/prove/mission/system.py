@@ -108,12 +108,12 @@ class System:
 
         Raises InputError where the file can't be used, UndecidedError where the search can't look at it.
         """
-        files, path, palette = file.files, file.source.path, file.palette
+        files, path = file.files, file.source.path
         named = _named(files)
         skillsets = [one for one in file.skillsets if one.name in named]
         oracle = Oracle()
         uses = uses_of(file)
-        robot = Robot(oracle, Conditions.of(files, palette, skillsets), Compared.of(files, palette, skillsets), uses)
+        robot = Robot(oracle, Conditions.of(file.roots, skillsets), Compared.of(file.roots, skillsets), uses)
         inputs = any_inputs(file, oracle, uses) if known is None else known
         own = own_nodes(robot, file.part, file.nowhere_made, why_any_order, known=known is not None)
         plan = file.with_models(skillsets, own.part).plan(path.stem, inputs)
@@ -128,7 +128,7 @@ class System:
         unread = [*own.unread, *(f"{one.name}.{skill.name}" for one in skillsets for skill in one.skills)]
         roots = [tree.root.wiring for tree in trees]
         if READY in files.trees:
-            roots.append(wire(files, palette, READY, Shared(robot.clock_ns), blackboard=filed.tree.blackboard))
+            roots.append(wire(files, file.palette, READY, Shared(robot.clock_ns), blackboard=filed.tree.blackboard))
         read = what_is_read(roots, unread, plan.parameters, oracle, own.free)
         body = Body(robot, director, board, trees, {one.name: one for one in skillsets}, read, few)
         ticker = Ticker(body, oracle)
@@ -360,7 +360,7 @@ def uses_of(file: MissionFile) -> Uses:
     declared = [one.name for one in file.nowhere_made]
     skills = (f"{one.name}.{skill.name}" for one in file.skillsets for skill in one.skills)
     numbers = [*file.source.enums, *states_of(file.skillsets), *(port.name for port in file.given if port.default is not None)]
-    return Uses.of(file.files, file.palette, declared, [*declared, *skills, *map(name_in_files, file.part.nodes)], numbers)
+    return Uses.of(file.roots, declared, [*declared, *skills, *map(name_in_files, file.part.nodes)], numbers)
 
 
 def any_inputs(file: MissionFile, oracle: Oracle, uses: Uses) -> Inputs:

@@ -11,12 +11,10 @@ from collections.abc import Collection, Iterable, Iterator, Mapping
 from dataclasses import dataclass, field
 
 from alula.common.graphs import reachable_from
-from alula.prove.mission.reading import type_of
-from alula.trees.access import scripts_of
-from alula.trees.document import Element
-from alula.trees.node import pointer
-from alula.trees.palette import Category, Palette, Port
-from alula.trees.reading import TreeFiles, is_port, type_name
+from alula.trees.access import Key, scripts_of
+from alula.trees.node import Node as TreeNode
+from alula.trees.node import Wiring, pointer
+from alula.trees.palette import Port
 from alula.trees.script import statements_of
 from alula.trees.script.syntax import Assignment, Chain, Comparison, Conditional, Literal, Name, Node, Prefix, children
 from alula.trees.values import ANY, BOOL, DOUBLE, NUMBERS, STRING, PortType
@@ -28,53 +26,100 @@ JOINS = frozenset({"+", ".."})
 
 @dataclass(frozen=True)
 class Uses:
-    """``types``: of entries, by how they are used; ``declared``: types of node that have no class."""
+    """``inputs``: types of the main tree's entries; ``ports``: of what nodes without a known class write, by their uids and the ports."""
 
-    types: Mapping[str, PortType] = field(default_factory=dict)
-    declared: frozenset[str] = frozenset()
+    inputs: Mapping[str, PortType] = field(default_factory=dict)
+    ports: Mapping[tuple[int, str], PortType | None] = field(default_factory=dict)
 
     @classmethod
-    def of(cls, files: TreeFiles, palette: Palette, declared: Collection[str], unread: Collection[str], numbers: Collection[str]) -> Uses:
-        """Read them of the trees of a mission.
+    def of(cls, roots: Iterable[Wiring], declared: Collection[str], unread: Collection[str], numbers: Collection[str]) -> Uses:
+        """Read them of the trees of a mission, which stand on one blackboard.
 
-        ``unread`` are types of node that decide by nothing that is known, ``numbers`` are names that scripts have for numbers.
+        ``declared`` are types of node that have no class, ``unread`` those that decide by nothing that is known, ``numbers`` are names that
+        scripts have for numbers.
         """
+        several = [wiring for root in roots for wiring in root.walk()]
         seen = _Seen(frozenset(numbers))
-        for element in (element for tree in files.trees.values() for element in tree.iterate()):
-            for attribute in scripts_of(element, type_of(element, palette)):
-                for statement in statements_of(attribute.value):
-                    seen.condition(statement)
-            seen.ports(element, palette, unread)
-        for model in files.models.values():
-            for port in model.ports.values() if model.category is Category.SUBTREE else ():
-                seen.same(port.name, pointer(port.default or "", port.name))
-        return cls(dict(seen.types()), frozenset(declared))
+        for wiring in several:
+            seen.at(wiring, unread)
+        types = dict(seen.types())
+        written = ((one, port, pointer(text, port)) for one in several if one.type.name in declared for port, text in one.ports.items())
+        ports = {(one.uid, port): types.get(one.blackboard.where(name)) for one, port, name in written if name is not None}
+        return cls({name: type_ for (board, name), type_ in types.items() if board.above is None}, ports)
 
-    def type_of(self, node: str, port: Port, entry: str) -> PortType | None:
-        """Return the type of what a type of node writes into an entry, None where nothing says any and each reader can read it."""
-        if port.type is not ANY or node not in self.declared:
-            return port.type
-        return self.types.get(entry.removeprefix("@"))
+    def type_of(self, node: TreeNode, port: Port) -> PortType | None:
+        """Return the type of what a node writes to a port, None where nothing says any and each reader can read it."""
+        return port.type if port.type is not ANY else self.ports.get((node.uid, port.name), ANY)
 
     def type_of_input(self, port: Port) -> PortType | None:
         """Return the type of an input of the mission; None as of ``type_of``."""
-        return port.type if port.type is not ANY else self.types.get(port.name)
+        return port.type if port.type is not ANY else self.inputs.get(port.name)
 
 
 class _Seen:
     """What is seen of entries: types that scripts and ports need, and pairs that have one value."""
 
     def __init__(self, numbers: frozenset[str]) -> None:
-        self._numbers = numbers
-        self._needed: dict[str, set[PortType]] = {}
-        self._read_as_text: set[str] = set()
+        self.numbers = numbers
+        self._needed: dict[Key, set[PortType]] = {}
+        self._read_as_text: set[Key] = set()
         """Entries that a port reads as text, which it can of numbers, too."""
-        self._pairs: set[tuple[str, str]] = set()
+        self._pairs: set[tuple[Key, Key]] = set()
 
-    def same(self, one: str, other: str | None) -> None:
-        """Note two names of one value, or one that is copied."""
-        if other is not None:
-            self._pairs |= {(one, other.removeprefix("@")), (other.removeprefix("@"), one)}
+    def at(self, wiring: Wiring, unread: Collection[str]) -> None:
+        """Look at what a node asks for; ``unread`` are types of node that decide by nothing that is known."""
+        for attribute in scripts_of(wiring.element, wiring.type):
+            for statement in statements_of(attribute.value):
+                _InScript(self, wiring).condition(statement)
+        if wiring.type.name not in unread and not wiring.is_subtree:
+            self._ports(wiring)
+
+    def same(self, one: Key, other: Key) -> None:
+        """Note two entries of one value, or one that is copied."""
+        self._pairs |= {(one, other), (other, one)}
+
+    def need(self, entry: Key, type_: PortType) -> None:
+        """Note of which type an entry has to be."""
+        self._needed.setdefault(entry, set()).add(type_)
+
+    def is_entry(self, name: str) -> bool:
+        """Tell whether a name in a script is an entry's."""
+        return "." not in name and name not in self.numbers
+
+    def _ports(self, wiring: Wiring) -> None:
+        known = wiring.type.ports
+        names = {port: pointer(text, port) for port, text in wiring.ports.items()}
+        keys = {port: wiring.blackboard.where(name) for port, name in names.items() if name is not None}
+        copies = list(keys.values()) if any(one.written_from for one in known.values()) else []
+        for key in copies:
+            self.same(copies[0], key)
+        for port, key in keys.items():
+            type_ = known[port].type if port in known else ANY
+            if type_ is STRING:
+                self._read_as_text.add(key)
+            elif type_ is not ANY:
+                self.need(key, type_)
+
+    def types(self) -> Iterator[tuple[Key, PortType]]:
+        """Yield entries with their types, where all that is seen of one agrees."""
+        alike: dict[Key, set[Key]] = {}
+        for one, other in self._pairs:
+            alike.setdefault(one, set()).add(other)
+        for entry in dict.fromkeys([*self._needed, *self._read_as_text, *alike]):
+            several = reachable_from([entry], lambda one: alike.get(one, ()))
+            needed = frozenset(type_ for one in several for type_ in self._needed.get(one, ()))
+            if not needed and not several.isdisjoint(self._read_as_text):
+                yield entry, STRING
+            elif needed:
+                yield from ((entry, type_) for type_ in _agreed(needed))
+
+
+class _InScript:
+    """Looks at a script of a node."""
+
+    def __init__(self, seen: _Seen, wiring: Wiring) -> None:
+        self._seen = seen
+        self._board = wiring.blackboard
 
     def condition(self, node: Node) -> None:
         """Look at a part of a script of which it is asked whether it is true."""
@@ -100,57 +145,30 @@ class _Seen:
             case Conditional(condition=condition):
                 self.condition(condition)
             case Assignment(target=Name(name=target), value=Name(name=source)):
-                self.same(target.removeprefix("@"), source)
+                self._seen.same(self._board.where(target), self._board.where(source))
         for child in children(node):
             self._value(child)
 
     def _together(self, operands: Iterable[Node], *, of_text: bool) -> None:
         """Look at operands that are of one type."""
         several = list(operands)
-        names = [one for one in several if isinstance(one, Name) and one.name not in self._numbers and "." not in one.name]
+        names = [one for one in several if isinstance(one, Name) and self._seen.is_entry(one.name)]
         texts = [one for one in several if isinstance(one, Literal) and isinstance(one.value, str)]
-        numbers = [one for one in several if (isinstance(one, Literal) and one not in texts) or getattr(one, "name", "") in self._numbers]
+        numbers = [one for one in several if one not in texts and (isinstance(one, Literal) or self._is_number(one))]
         for name in names:
             if texts and of_text:
                 self._need(name, STRING)
             if numbers or not of_text:
                 self._need(name, DOUBLE)
-            self.same(name.name.removeprefix("@"), names[0].name)
+            self._seen.same(self._board.where(name.name), self._board.where(names[0].name))
+
+    def _is_number(self, node: Node) -> bool:
+        """Tell whether it is a name that scripts have for a number."""
+        return isinstance(node, Name) and node.name in self._seen.numbers
 
     def _need(self, name: Name, type_: PortType) -> None:
-        if "." not in name.name and name.name not in self._numbers:
-            self._needed.setdefault(name.name.removeprefix("@"), set()).add(type_)
-
-    def ports(self, element: Element, palette: Palette, unread: Collection[str]) -> None:
-        """Look at what the ports of a node read."""
-        known = type_of(element, palette)
-        keys = {name: pointer(one.value, name) for name, one in element.attributes.items() if is_port(name)}
-        if known is None:
-            for name, key in keys.items():
-                self.same(name, key)
-        elif type_name(element) not in unread:
-            copies = [key for key in keys.values() if key is not None] if any(one.written_from for one in known.ports.values()) else []
-            for key in copies:
-                self.same(copies[0].removeprefix("@"), key)
-            for name, key in keys.items():
-                type_ = known.ports[name].type if name in known.ports else ANY
-                if key is not None and type_ is STRING:
-                    self._read_as_text.add(key.removeprefix("@"))
-                elif key is not None and type_ is not ANY:
-                    self._needed.setdefault(key.removeprefix("@"), set()).add(type_)
-
-    def types(self) -> Iterator[tuple[str, PortType]]:
-        """Yield entries with their types, where all that is seen of one agrees."""
-        alike: dict[str, set[str]] = {}
-        for one, other in self._pairs:
-            alike.setdefault(one, set()).add(other)
-        for name in sorted({*self._needed, *self._read_as_text, *alike}):
-            names = reachable_from([name], lambda one: alike.get(one, ()))
-            needed = frozenset(type_ for one in names for type_ in self._needed.get(one, ()))
-            if not needed and not names.isdisjoint(self._read_as_text):
-                yield name, STRING
-            elif needed:
-                yield from ((name, type_) for type_ in _agreed(needed))
+        if self._seen.is_entry(name.name):
+            self._seen.need(self._board.where(name.name), type_)
 
 
 def _agreed(types: Collection[PortType]) -> Iterator[PortType]:

@@ -34,6 +34,11 @@ class Call:
     offset: int
     end: int
 
+    @property
+    def named(self) -> tuple[str, ...]:
+        """What the arguments name, each as a name or as a text; empty for one that is neither."""
+        return tuple(one.name if isinstance(one, Name) else str(one.value) if isinstance(one, Literal) else "" for one in self.arguments)
+
 
 @dataclass(frozen=True, slots=True)
 class Prefix:

@@ -176,6 +176,21 @@ def test_scripts_compare_what_a_declared_node_writes_by_what_they_need(tmp_path:
         assert against(path).run is not None
 
 
+OF_ITS_OWN = """<BehaviorTree ID="opens">
+  <Sequence><Look what="{x}"/><ScriptCondition code="x == 'door'"/><r1.drive/></Sequence>
+</BehaviorTree>
+<BehaviorTree ID="counts"><Sequence><Look what="{x}"/><ScriptCondition code="x &gt; 3"/></Sequence></BehaviorTree>
+<BehaviorTree ID="apart"><Sequence><Look what="{x}"/><ScriptCondition code="!x"/></Sequence></BehaviorTree>
+<TreeNodesModel>"""
+
+
+def test_what_a_subtree_needs_of_an_entry_of_its_own_says_nothing_of_anothers_and_a_tree_that_is_not_used_nothing(tmp_path: Path) -> None:
+    path = mission(tmp_path, f'<Sequence {STILL}><ForceSuccess><SubTree ID="counts"/></ForceSuccess><SubTree ID="opens"/></Sequence>')
+    text = path.read_text().replace("<TreeNodesModel>", OF_ITS_OWN)
+    path.write_text(text.replace("<root ", '<root main_tree_to_execute="mission" '))
+    assert against(path).run is not None
+
+
 # --- held against flights ------------------------------------------------------------------------------------------------
 
 CASES = ('case_1="anna" case_2="2"', 'case_1="ben" case_2="{seen}"', 'case_1="1" case_2="3"', 'case_1="0" case_2="{who}"')
