@@ -287,7 +287,7 @@ def test_a_way_that_is_blocked_gets_another_chance(rover: Path, capsys: pytest.C
     assert one["around"]
     needed = "base.authority == MISSION &amp;&amp; base.link == UP &amp;&amp; base.pose_status == GOOD"
     written = " ".join(one["xml"].split())  # an element of more than a line's width is broken between its attributes
-    assert written == f'<RetryAfter name="follow the walls again" attempts="3" wait="1" if="{needed}"/>'
+    assert written == f'<RetryAfter name="three chances to follow the walls" attempts="3" wait="1" if="{needed}"/>'
     fates = found["fates"]
     assert isinstance(fates, list)
     assert [fate["after"]["survives"] for fate in fates if fate["after"]["faults"] == ["person"]] == [True]

@@ -148,8 +148,9 @@ def _insert(document: Document, branch: Branch) -> None:
         place = parent.content.index(element)
         parent.content[place + 1 : place + 1] = [*branch.comment_at(lead), lead, use]
     else:
+        otherwise = {Rank.GIVES_UP: "give up", Rank.LEAVES_OUT: "not"}.get(branch.rank, node_name(use))
         lead = _lead(parent, element) + STEP
-        outer = _wrap(parent, element, use, f"{node_name(element)}, or else")
+        outer = _wrap(parent, element, use, f"{node_name(element)}, or {otherwise}")
         place = outer.content.index(use) - 1
         outer.content[place:place] = branch.comment_at(lead)
     if branch.tree is not None:

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Collection, Mapping, Sequence
 from dataclasses import dataclass
 
 from alula.missions.skill_types import type_of
@@ -10,7 +10,7 @@ from alula.model.model import Parameter
 from alula.model.units import told_unit
 from alula.repair.branches import node
 from alula.repair.courses import Course, Courses, Here, Wanted
-from alula.repair.naming import plain
+from alula.repair.naming import Vocabulary, chances, plain, told_states
 from alula.repair.purposes import Purpose
 from alula.trees.document import Element
 from alula.trees.node import pointer
@@ -18,6 +18,8 @@ from alula.trees.palette import Direction, Palette
 from alula.trees.reading import TreeFiles, node_name, type_name
 from alula.trees.values import ANY
 
+WAITING = frozenset({"WaitFor", "Awaits", "Stays"})
+"""Nodes that may take more than a tick."""
 TOLD_WITHIN_S = "5"
 """How long the functional layer has to tell what a skill has brought about, seconds: drivers tell it a moment later."""
 
@@ -29,11 +31,13 @@ class Sources:
     Attributes:
         files: the mission's trees.
         palette: of its nodes.
+        words: what the author calls things.
         asks: whether an input that comes from nowhere becomes one of the tree's own, of its name.
     """
 
     files: TreeFiles
     palette: Palette
+    words: Vocabulary
     asks: bool = False
 
     def leaf(self, purpose: Purpose, known: Mapping[str, str], within: Element | None = None) -> Element | None:
@@ -41,7 +45,7 @@ class Sources:
         values = {one.name: known.get(one.name) or self._binding(within, purpose, one) for one in purpose.skill.inputs}
         if any(value is None and not one.default for one, value in zip(purpose.skill.inputs, values.values(), strict=True)):
             return None
-        made = node(purpose.name, name=plain(purpose.name))
+        made = node(purpose.name, name=self.words.leaf(purpose.name))
         for name, value in values.items():
             if value is not None:
                 made.set(name, value)
@@ -76,6 +80,35 @@ class Sources:
         return found[0] if found else None
 
 
+def opening(condition: str, name: str, code: str) -> Element:
+    """Return what a branch begins with: a script, which runs only where a condition is true, if there is one."""
+    if not condition:
+        return node("Script", name="degraded", code=code)
+    return node("ScriptCondition", name=name, code=condition, _onSuccess=code)
+
+
+def first_skills(element: Element, skills: Collection[str]) -> set[str]:
+    """Return which skills of a part of a tree may start in its first tick."""
+    return _first_of(element, skills)[0]
+
+
+def _first_of(element: Element, skills: Collection[str]) -> tuple[set[str], bool]:
+    """Return them, and whether the tick may go on behind the part."""
+    if type_name(element) in skills:
+        return {type_name(element)}, False
+    if element.tag in WAITING:
+        return set(), False
+    found: set[str] = set()
+    goes_on = True
+    for child in element.children:
+        first, child_goes_on = _first_of(child, skills)
+        found |= first
+        goes_on = goes_on and child_goes_on
+        if not goes_on and element.tag != "Parallel":
+            break
+    return found, goes_on
+
+
 @dataclass(frozen=True)
 class Composer:
     """Makes trees of courses.
@@ -105,9 +138,11 @@ class Composer:
             if made is None:
                 return []
             found.append(made)
-            told = " && ".join(f"{name} == {state}" for name, state in course.told_between(number, wanted))
+            several = course.told_between(number, wanted)
+            told = " && ".join(f"{name} == {state}" for name, state in several)
             if told:
-                found.append(node("Awaits", name=f"{plain(step.name)} is told", if_=told, within=TOLD_WITHIN_S))
+                name = self.sources.words.wait(told, told_states(several))
+                found.append(node("Awaits", name=name, if_=told, within=TOLD_WITHIN_S))
         return found
 
     def step(self, purpose: Purpose, here: Here, known: Mapping[str, str], instead: Element | None = None) -> Element | None:
@@ -118,23 +153,24 @@ class Composer:
             providers = self.courses.providers(here, role.name, purpose)
             watching = [one for one in (self.sources.leaf(each, {}) for each in providers) if one is not None]
             several = [[*one, watch] for one in several for watch in (watching if self.alternatives else watching[:1])]
-        ways = [_watched(one[0], one[1:]) for one in several]
+        ways = [self._watched(one[0], one[1:]) for one in several]
         if not ways:
             return None
-        made = ways[0] if len(ways) == 1 else node("Fallback", *ways, name=f"{plain(purpose.name)}, or else")
+        made = ways[0] if len(ways) == 1 else node("Fallback", *ways, name=", or ".join(map(node_name, ways)))
         if self.attempts == 1:
             return made
-        return node("RetryUntilSuccessful", made, name=f"{plain(purpose.name)} again", num_attempts=str(self.attempts))
+        name = chances(self.attempts, self.sources.words.leaf(purpose.name))
+        return node("RetryUntilSuccessful", made, name=name, num_attempts=str(self.attempts))
 
-
-def _watched(leaf: Element, watching: Sequence[Element]) -> Element:
-    """Return a node that runs while others do, once these make progress; it ends with the first of them that ends."""
-    if not watching:
-        return leaf
-    made = type(leaf)(leaf.tag, leaf.place, dict(leaf.attributes), list(leaf.content), empty=leaf.empty)  # may stand in several ways
-    name = node_name(leaf)
-    sees = " && ".join(f"progress({one.tag}) >= 1" for one in watching)
-    wait = node("WaitFor", name=f"{' and '.join(node_name(one) for one in watching)} at work", if_=sees)
-    inner = node("Sequence", wait, made, name=f"then {name}")
-    called = f"{name} with {' and '.join(node_name(one) for one in watching)}"
-    return node("Parallel", *watching, inner, name=called, success_count="1", failure_count="1")
+    def _watched(self, leaf: Element, watching: Sequence[Element]) -> Element:
+        """Return a node that runs while others do, once these make progress; it ends with the first of them that ends."""
+        if not watching:
+            return leaf
+        made = type(leaf)(leaf.tag, leaf.place, dict(leaf.attributes), list(leaf.content), empty=leaf.empty)  # may stand in several ways
+        name = node_name(leaf)
+        sees = " && ".join(f"progress({one.tag}) >= 1" for one in watching)
+        working = f"{' and '.join(plain(one.tag) for one in watching)} {'works' if len(watching) == 1 else 'work'}"
+        wait = node("WaitFor", name=self.sources.words.wait(sees, working), if_=sees)
+        inner = node("Sequence", wait, made, name=f"then {name}")
+        called = f"{' and '.join(node_name(one) for one in watching)} and {name}"
+        return node("Parallel", *watching, inner, name=called, success_count="1", failure_count="1")

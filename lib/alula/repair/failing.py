@@ -33,8 +33,14 @@ class Failing:
         return _DEGRADED.search(self.leaf.wiring.element.get("_onFailure")) is not None
 
     @property
+    def situation(self) -> str:
+        """Return it as a comment in the mission says it."""
+        by = f" (fault {self.fault})" if self.fault else ""
+        return f"When '{self.leaf.name}' fails{by}"
+
+    @property
     def words(self) -> str:
-        """Return it as comments say it."""
+        """Return it as answers say it."""
         by = f" by the fault {self.fault}" if self.fault else ""
         return f"{self.skill} ('{self.leaf.name}') fails{by}"
 

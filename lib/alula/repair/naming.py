@@ -1,25 +1,37 @@
-"""Names of what a branch is made of: an author's own, with the words of one skill put in the place of another's."""
+"""Names of what a branch is made of: what authors call it elsewhere, else words of the models, as an author would put them.
+
+- A part with other skills has its author's names, with the words of one skill put in the place of another's.
+- A skill, and a node that waits for something, is called what the author calls it elsewhere in the mission, or in the robot's others.
+- A state is told as ``the link is up``, for ``link == UP``.
+"""
 
 from __future__ import annotations
 
 import re
 from collections import Counter
 from collections.abc import Iterable, Mapping, Sequence
+from dataclasses import dataclass
+
+from alula.trees.document import Element
+from alula.trees.reading import node_name, type_name
 
 _WORD = re.compile(r"[A-Za-z]+")
+_TIMES = {1: "one chance", 2: "two chances", 3: "three chances"}
+_OFTEN = {1: "once", 2: "twice", 3: "three times"}
 
 
 class Renaming:
     """Puts the words of a skill's name into the places of those of another one, spelled as the file's author spells them.
 
-    ``zed_depthmap`` to ``lidar_depthmap`` makes *LiDAR sees* of *ZED sees*, and ``lidar_navigation`` of ``zed_navigation``.
+    ``zed_depthmap`` to ``lidar_depthmap`` makes *LiDAR sees* of *ZED sees*, and ``lidar_navigation`` of ``zed_navigation``. Where more than
+    one word is another one, as in ``follow_corridor`` and ``drive_to``, nobody knows which stands for which: names stay as they are.
     """
 
     def __init__(self, old: str, new: str, texts: Iterable[str]) -> None:
         was, now = old.split("_"), new.split("_")
         gone = [one for one in was if one not in now]
         come = [one for one in now if one not in was]
-        self._words: Mapping[str, str] = dict(zip(gone, come, strict=False)) | dict.fromkeys(gone[len(come) :], "")
+        self._words: Mapping[str, str] = {gone[0]: come[0] if come else ""} if len(gone) == 1 and len(come) <= 1 else {}
         self._spelled = {word: _spelled(word, texts) for word in come}
 
     def name(self, text: str) -> str:
@@ -44,6 +56,49 @@ def _spelled(word: str, texts: Iterable[str]) -> str:
 def plain(skill: str) -> str:
     """Return a skill's name as words."""
     return skill.rpartition(".")[2].replace("_", " ")
+
+
+@dataclass(frozen=True)
+class Vocabulary:
+    """What authors call things, by the nodes of their trees; where several names are there, the first one counts.
+
+    Attributes:
+        nodes: those of the mission, then those of the robot's other missions.
+    """
+
+    nodes: Sequence[Element]
+
+    def leaf(self, skill: str) -> str:
+        """Return what a skill is called where it runs, else its name as words."""
+        return next((node_name(one) for one in self.nodes if type_name(one) == skill and one.get("name")), plain(skill))
+
+    def wait(self, condition: str, otherwise: str) -> str:
+        """Return what a node is called that waits for a condition, or asks for it, else another name."""
+        asking = (one for one in self.nodes if condition in {one.get("if"), one.get("code")} and not one.children)
+        return next((node_name(one) for one in asking if one.get("name")), otherwise)
+
+
+def told_state(resource: str, state: str) -> str:
+    """Return a state as a person tells it: ``the pose is good`` for ``base.pose_status``, GOOD."""
+    words = resource.rpartition(".")[2].removesuffix("_status").removesuffix("_state").replace("_", " ")
+    return f"the {words} is {state if state == 'OK' else state.lower().replace('_', ' ')}"
+
+
+def told_states(several: Iterable[tuple[str, str]]) -> str:
+    """Return several states, each a resource and its state, of which each is true."""
+    return " and ".join(told_state(resource, state) for resource, state in several)
+
+
+def chances(attempts: int, skill: str = "") -> str:
+    """Return what a node is called that gives another one so many chances; ``skill``: what that is called, where it is a skill."""
+    times = _TIMES.get(attempts, f"{attempts} chances")
+    return f"{times} to {skill}" if skill else times
+
+
+def often_when(attempts: int, results: Iterable[str]) -> str:
+    """Return what a node is called that runs another one so often at most, as long as it ends with one of these results."""
+    ends = " or ".join(one.lower().replace("_", " ") for one in results)
+    return f"{_OFTEN.get(attempts, f'{attempts} times')} when {ends}"
 
 
 def another(name: str, taken: Iterable[str]) -> str:

@@ -21,7 +21,7 @@ from alula.repair.composing import Sources
 from alula.repair.courses import Courses, States
 from alula.repair.failing import Failing
 from alula.repair.fates import MOST_FAULTS
-from alula.repair.naming import another, plain
+from alula.repair.naming import another, chances, often_when, plain
 from alula.repair.purposes import Purpose, Purposes, asked_of_others
 from alula.repair.remedies import AGAIN_S, Remedies
 from alula.repair.standing_in import StandIns
@@ -46,7 +46,7 @@ class Patterns:
         self._purposes = Purposes(subject.skillsets, subject.brought, subject.robot.robots)
         self._using = frozenset(using)
         self._trees = subject.files.trees
-        sources = Sources(subject.files, palette_of(subject.files, subject.skillsets, subject.part))
+        sources = Sources(subject.files, palette_of(subject.files, subject.skillsets, subject.part), subject.vocabulary())
         self._stand_ins = StandIns(subject, self._purposes, sources, self._using)
         self._remedies = Remedies(subject, self._purposes, sources, Courses(self._purposes, self._using), most_faults + 1)
 
@@ -97,23 +97,26 @@ class Patterns:
         """Yield the node in a RetryAfter, with one chance more than faults may come; there are no more in one that is there."""
         if failing.states or place.wiring.element.tag in RETRIES:
             return
-        element, attempts = place.wiring.element, str(self._most_faults + 1)
-        name = f"{node_name(element)} again"
-        condition = self._worth_it(place, failing)
+        element, attempts = place.wiring.element, self._most_faults + 1
+        condition, name = self._worth_it(place, failing, attempts)
         if condition:
-            again = node("RetryAfter", name=name, attempts=attempts, wait=AGAIN_S, if_=condition)
+            again = node("RetryAfter", name=name, attempts=str(attempts), wait=AGAIN_S, if_=condition)
         else:
-            again = node("RetryUntilSuccessful", name=name, num_attempts=attempts)
-        yield Branch(again, None, element.place, (f"When {failing.words}: it gets another chance.",), around=True)
+            again = node("RetryUntilSuccessful", name=name, num_attempts=str(attempts))
+        yield Branch(again, None, element.place, (f"{failing.situation}: it gets another chance.",), around=True)
 
-    def _worth_it(self, place: Node, failing: Failing) -> str:
-        """Return when another chance is worth it: it has ended as the fault ends it, or what it needs is there; empty: always."""
+    def _worth_it(self, place: Node, failing: Failing, attempts: int) -> tuple[str, str]:
+        """Return when another chance is worth it, and what these are called.
+
+        It is where it has ended as the fault ends it, or what it needs is there; empty: always.
+        """
         entry = pointer(failing.leaf.wiring.element.get(OUTCOME_PORT), OUTCOME_PORT)
         if entry and place is failing.leaf:
-            return " || ".join(f"{entry} == '{one}'" for one in failing.results)
+            return " || ".join(f"{entry} == '{one}'" for one in failing.results), often_when(attempts, failing.results)
         purpose = self._purposes.known[failing.skill]
         needed = asked_of_others(purpose)
-        return " && ".join(f"{purpose.skillset.name}.{resource.name} == {state}" for resource, state in needed)
+        condition = " && ".join(f"{purpose.skillset.name}.{resource.name} == {state}" for resource, state in needed)
+        return condition, chances(attempts, node_name(place.wiring.element) if place is failing.leaf else "")
 
     # --- what is there -----------------------------------------------------------------------------------------------
 
@@ -122,7 +125,7 @@ class Patterns:
         for name in self._trees:
             if name not in used and name not in BEYOND and name != self._subject.files.main:
                 use = node("SubTree", ID=name, name=plain(name), _autoremap="true")
-                yield Branch(use, None, place.wiring.element.place, (f"When {failing.words}.",))
+                yield Branch(use, None, place.wiring.element.place, (f"{failing.situation}.",))
 
     def _coming_to_rest(self, place: Node, failing: Failing) -> Iterator[Branch]:
         """Yield the end at rest, as a good one where the author calls the mission degraded once this has failed; and giving up."""
@@ -130,15 +133,15 @@ class Patterns:
             return
         stop = node("SubTree", ID=STOP_HERE, name=plain(STOP_HERE), _autoremap="true")
         if failing.degrades:
-            asked = f"!failed_first({failing.skill})"
+            failed = node("ScriptCondition", name=f"{failing.leaf.name} failed", code=f"failed_first({failing.skill})")
             stopping = node("Script", name="stopping", code="@stopping := true")
-            top = node("Sequence", stopping, stop, name=f"rest without {plain(failing.skill)}", _failureIf=asked)
-            why = (f"When {failing.words}: the mission is degraded, and comes to rest.",)
+            top = node("Sequence", failed, stopping, stop, name=f"rest without {plain(failing.skill)}")
+            why = (f"{failing.situation}: the mission is degraded, and comes to rest.",)
             yield self._subtree(f"rest_without_{failing.skill.rpartition('.')[2]}", top, place, why, Rank.ENDS_WELL)
         stopping = node("Script", name="stopping", code="@stopping := true")
         give_up = node("Sequence", node("NoteReason", name="note why"), stopping, stop, name="give up")
         top = node("ForceFailure", give_up, name="the mission fails")
-        why = (f"When {failing.words}, and nothing else is left to be done: the mission comes to rest and is given up.",)
+        why = (f"{failing.situation}, and nothing else is left to be done: the mission comes to rest and is given up.",)
         yield self._subtree("give_up", top, place, why, Rank.GIVES_UP, "given up")
 
     def _subtree(self, tree: str, top: Element, place: Node, why: tuple[str, ...], rank: Rank, name: str = "") -> Branch:

@@ -26,7 +26,7 @@ from alula.repair.courses import Course, Courses, Here, States, Wanted, initial_
 from alula.repair.errors import RepairError
 from alula.repair.fates import MOST_FAULTS, Fate
 from alula.repair.judging import Judge
-from alula.repair.naming import plain
+from alula.repair.naming import plain, told_state
 from alula.repair.purposes import Purpose, Purposes, asked_of_others
 from alula.repair.repairing import Question, Search, Tell, condition_of
 from alula.repair.subject import Subject, with_property
@@ -115,7 +115,8 @@ class Planner:
         if self._wanted is not None:
             _check_names("--goal", aim.goal, self._wanted[1], self._subject.skillsets)
         self._courses = Courses(self._purposes, aim.using)
-        sources = Sources(self._subject.files, palette_of(self._subject.files, self._subject.skillsets, self._subject.part), asks=True)
+        palette = palette_of(self._subject.files, self._subject.skillsets, self._subject.part)
+        sources = Sources(self._subject.files, palette, self._subject.vocabulary(), asks=True)
         self._composer = Composer(sources, self._courses)
 
     def stop(self) -> None:
@@ -247,7 +248,8 @@ class Planner:
                     if course.heres[0].states[name] == state:
                         asked.setdefault((name, state), one.name)
         for (name, state), skill in asked.items():
-            yield node("Needs", name=f"{name} is {state}", if_=f"{name} == {state}", otherwise=f"'{skill} needs {name} == {state}'")
+            otherwise = f"'{plain(skill)} needs {name} to be {state}' .. reason('{name}')"
+            yield node("Needs", name=told_state(name, state), if_=f"{name} == {state}", otherwise=otherwise)
 
     # --- its faults ---------------------------------------------------------------------------------------------------
 

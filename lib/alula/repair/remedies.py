@@ -7,10 +7,10 @@ from itertools import islice
 
 from alula.model.expressions import And
 from alula.repair.branches import HOLE, Branch, Rank, node
-from alula.repair.composing import Composer, Sources
+from alula.repair.composing import Composer, Sources, first_skills, opening
 from alula.repair.courses import Course, Courses, Here, States, initial_states
 from alula.repair.failing import Failing
-from alula.repair.naming import another, plain
+from alula.repair.naming import another, chances, plain, told_state
 from alula.repair.purposes import Purpose, Purposes, asked_of_others
 from alula.repair.subject import Subject
 from alula.trees.document import Element
@@ -107,7 +107,7 @@ class Remedies:
         if instead:
             (first, *_), name = instead, node_name(place.wiring.element)
             role = " and ".join(sorted(first.roles & roles))
-            why = f"When {failing.words}: {first.name} comes later, and is for {role}, too."
+            why = f"{failing.situation}: {first.name} comes later, and is for {role}, too."
             script = node("Script", name=f"not done: {name}", code="@degraded := true")
             yield Branch(script, None, place.wiring.element.place, (why,), rank=Rank.LEAVES_OUT)
 
@@ -140,39 +140,43 @@ class Remedies:
         element = place.wiring.element
         words = [plain(one.name) for one in course.steps]
         tree = another("_and_".join("_".join(one.split()) for one in words), self._subject.files.trees)
-        degraded = node("Script", name="degraded", code="@degraded := true")
-        top = node("Sequence", degraded, *steps, name=f"{' and '.join(words)}, degraded")
-        guard = self._missing(course)
-        if guard:
-            top.set("_failureIf", guard)
+        begin = opening(*self._guard(course.steps[0], steps[0]), "@degraded := true")
+        top = node("Sequence", begin, *steps, name=" and ".join(words))
         use = node("SubTree", ID=tree, name=" and ".join(words), _autoremap="true")
         name = f"{node_name(element)}, or {words[-1]} first"
         fallback = node("Fallback", node(HOLE, name=node_name(element)), node("ForceFailure", use, name="then again"), name=name)
         last = course.steps[-1]
-        needed = " && ".join(f"{last.skillset.name}.{resource.name} == {state}" for resource, state in asked_of_others(last))
-        again = f"{node_name(element)} again"
+        needed = _needed(last)
+        again = chances(self._attempts, node_name(element) if place is failing.leaf else "")
         if needed:
             retry = node("RetryAfter", fallback, name=again, attempts=str(self._attempts), wait=AGAIN_S, if_=needed)
         else:
             retry = node("RetryUntilSuccessful", fallback, name=again, num_attempts=str(self._attempts))
-        names = ", then ".join(one.name for one in course.steps)
-        why = (f"When {failing.words}: {names} bring about what it needs, and it gets another chance.", *_told(course.steps))
+        names = ", then ".join(one.skill.name for one in course.steps)
+        brings = "brings" if len(course.steps) == 1 else "bring"
+        why = (f"{failing.situation}: {names} {brings} about what it needs, and it gets another chance.", *_told(course.steps))
         return Branch(retry, top, element.place, why, around=True)
 
-    def _missing(self, course: Course) -> str:
-        """Return when a course can't begin: what its first skill needs of the functional layer is not there."""
-        first = course.steps[0]
-        return " || ".join(f"{first.skillset.name}.{resource.name} != {state}" for resource, state in asked_of_others(first))
+    def _guard(self, purpose: Purpose, step: Element) -> tuple[str, str]:
+        """Return when a course is begun, and what that is called; one whose first skill is started at once is refused by itself."""
+        if first_skills(step, self._purposes.known) == {purpose.name}:
+            return "", ""
+        return _needed(purpose), f"can {self._sources.words.leaf(purpose.name)}"
 
     def _end(self, place: Node, failing: Failing, purpose: Purpose, step: Element, name: str, code: str, rank: Rank) -> Branch:
         """Return a step as a branch that is for the failed one alone: where what shows the fault is not there, it fails."""
-        shown = " && ".join(f"{at} != {state}" for at, state in failing.states)
-        top = node("Sequence", node("Script", name="degraded", code=code), step, name=f"{name}, degraded", _failureIf=shown)
+        shown = " || ".join(f"{at} == {state}" for at, state in failing.states)
+        told = " or ".join(told_state(at, state) for at, state in failing.states)
+        top = node("Sequence", opening(shown, told, code), step, name=name)
         tree = another("_".join(name.split()), self._subject.files.trees)
         ends = "" if rank is Rank.GOES_ON else "the mission ends, degraded, at the place that it calls safe: "
-        why = (f"When {failing.words}: {ends}{purpose.name} does it.", *_told([purpose]))
+        why = (f"{failing.situation}: {ends}{purpose.skill.name} does it.", *_told([purpose]))
         return Branch(node("SubTree", ID=tree, name=name, _autoremap="true"), top, place.wiring.element.place, why, rank=rank)
 
 
+def _needed(purpose: Purpose) -> str:
+    return " && ".join(f"{purpose.skillset.name}.{resource.name} == {state}" for resource, state in asked_of_others(purpose))
+
+
 def _told(steps: list[Purpose] | tuple[Purpose, ...]) -> list[str]:
-    return [f"{one.name} needs {' and '.join(role.name for role in one.skill.needs)} meanwhile." for one in steps if one.skill.needs]
+    return [f"{one.skill.name} needs {' and '.join(role.name for role in one.skill.needs)} meanwhile." for one in steps if one.skill.needs]

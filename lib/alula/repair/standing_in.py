@@ -2,16 +2,17 @@
 
 from __future__ import annotations
 
-from collections.abc import Collection, Iterator, Mapping, Sequence
+from collections.abc import Collection, Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from itertools import islice, product
 
 from alula.model.conditions import NO_DATA, judge
+from alula.model.model import Resource
 from alula.prove.mission.accepted import DESCRIPTION
 from alula.repair.branches import Branch, clone, node, parent_of
-from alula.repair.composing import Sources
+from alula.repair.composing import Sources, first_skills, opening
 from alula.repair.failing import Failing
-from alula.repair.naming import Renaming, another, assigned, plain
+from alula.repair.naming import Renaming, another, assigned, told_state
 from alula.repair.purposes import Purpose, Purposes, asked_of_others, broken_by
 from alula.repair.subject import Subject, texts_of
 from alula.trees.document import Element
@@ -74,46 +75,41 @@ class StandIns:
     def _as_branch(self, made: _Made, at: Node, instead: Mapping[str, Purpose], failing: Failing) -> Branch:
         place = at.wiring.element
         renaming = Renaming(failing.skill.rpartition(".")[2], instead[failing.skill].skill.name, self._texts)
-        guard = self._guard(made.top, failing)
-        degraded = node("Script", name="degraded", code="@degraded := true")
-        name = renaming.name(node_name(place))
-        top = node("Sequence", degraded, made.top, name=name if name != node_name(made.top) else f"{name}, degraded")
-        if guard:
-            top.set("_failureIf", guard)
-        tree_name = renaming.identifier(place.get("ID")) if place.tag == "SubTree" else "_".join(name.lower().split())
+        name, old = renaming.name(node_name(place)), node_name(place)
+        if name == old:
+            name = f"{self._sources.words.leaf(instead[failing.skill].name)} instead"
+        elif name == node_name(made.top):
+            name = f"{name} instead"
+        top = node("Sequence", opening(*self._guard(made.top, instead), "@degraded := true"), made.top, name=name)
+        tree_name = renaming.identifier(place.get("ID"))
+        if not tree_name or tree_name in self._trees:
+            tree_name = "_".join(name.lower().split())
         tree_name = another("".join(sign for sign in tree_name if sign.isalnum() or sign == "_"), self._trees)
         use = node("SubTree", ID=tree_name, name=name, _autoremap="true")
-        why = (f"When {failing.words}, {made.why[0]}", *made.why[1:])
+        why = (f"{failing.situation}: {made.why[0]}", *made.why[1:])
         return Branch(use, top, place.place, why)
 
-    def _guard(self, top: Element, failing: Failing) -> str:
-        """Return when the branch is not for it: what its skills need and only the functional layer gives is not there, or was lost."""
-        terms: dict[str, None] = {}
+    def _guard(self, top: Element, instead: Mapping[str, Purpose]) -> tuple[str, str]:
+        """Return when the branch is begun, and what that is called: what ends its skills is not so, and only others could change it.
+
+        A branch of which one skill alone is started first asks nothing for that one, which is refused by itself.
+        """
+        first = first_skills(top, self._purposes.known)
+        asked: dict[str, None] = {}
+        skill = ""
         for one in top.iterate():
             purpose = self._purposes.known.get(type_name(one))
-            for resource, state in asked_of_others(purpose) if purpose else ():
-                watching = self._watching(purpose, resource.name) if purpose else []
-                if watching:
-                    terms[f"{purpose.skillset.name}.{resource.name} != {state}"] = None  # type: ignore[union-attr]  # it has one
-                    terms |= {f"failed('{name}')": None for name in watching if self._was_there(name, failing)}
-        return " || ".join(terms)
-
-    @staticmethod
-    def _watching(purpose: Purpose, resource: str) -> list[str]:
-        """Return the invariants of a skill that a state of a resource breaks."""
-        states = purpose.skillset.resource(resource).states
-        return [
-            one.name
-            for one in purpose.skill.invariants
-            if any(judge(one.condition, {resource: state}, NO_DATA) is False for state in states)
-        ]
-
-    def _was_there(self, invariant: str, failing: Failing) -> bool:
-        """Tell whether a leaf beside the failing one can end by an invariant: then something else failed, which is not answered here."""
-        place = failing.leaf.parent
-        leaves = [one for one in (place.iterate() if place is not None else ()) if type_name(one.wiring.element) in self._purposes.known]
-        names = {type_name(one.wiring.element) for one in leaves} - {failing.skill}
-        return any(invariant == one.name for name in names for one in self._purposes.known[name].skill.invariants)
+            if purpose is None or first == {purpose.name}:
+                continue
+            terms = [
+                f"{purpose.skillset.name}.{resource.name} == {state}"
+                for resource, state in asked_of_others(purpose)
+                if _ends_it(purpose, resource)
+            ]
+            asked |= dict.fromkeys(terms)
+            if terms and (not skill or purpose in instead.values()):
+                skill = node_name(one)
+        return " && ".join(asked), f"can {skill}"
 
 
 def _run_beside(place: Node) -> Iterator[str]:
@@ -139,21 +135,24 @@ class _Making:
         self._sources = sources
         self._purposes = purposes
         self._texts = texts
+        self._parallels: list[tuple[Element, Element]] = []
 
     def made(
         self, original: Element, instead: Mapping[str, Purpose], held: Mapping[str, list[Purpose] | None], *, bringing: bool
     ) -> _Made | None:
         top = node("Top", clone(original))
+        self._parallels = []
         leaves: list[Element] = []
-        why: list[str] = []
         for name, purpose in instead.items():
             renaming = Renaming(name.rpartition(".")[2], purpose.skill.name, self._texts)
             for one in [one for one in top.iterate() if type_name(one) == name]:
                 one.tag = purpose.name
+                if renaming.name(node_name(one)) == node_name(one):
+                    one.set("name", self._sources.words.leaf(purpose.name))
                 leaves.append(one)
-            why.append(f"{purpose.name} stands for {name}{_as_it_needs(purpose)}.")
             for one in list(top.iterate()):
                 _rename(one, renaming, name, purpose.name)
+        why = [f"{_and(f'{purpose.skill.name} in the place of {_short(name)}' for name, purpose in instead.items())}."]
         for name, purpose in instead.items():
             for holder in held[name] or ():
                 for leaf in [one for one in leaves if one.tag == purpose.name]:
@@ -162,12 +161,16 @@ class _Making:
                         return None
                     leaves += added
                 (resource,) = holder.holds
-                why.append(f"{holder.name} holds {resource} meanwhile, as {name} did.")
                 brought = self._purposes.bringers(holder)[:1] if bringing else []
-                why += [f"{one.name} comes before it: what is held is brought about first." for one in brought]
+                after = "".join(f", after {one.skill.name}" for one in brought)
+                why.append(f"{holder.skill.name} holds {resource} meanwhile{after}.")
         names = assigned([(one.tag, node_name(one)) for one in leaves], self._subject.names_asked())
         for number, name in names.items():
             leaves[number].set("name", name)
+        for parallel, leaf in self._parallels:
+            holding, within = parallel.children
+            parallel.set("name", f"{node_name(holding)} and {node_name(leaf)}")
+            within.set("name", f"then {node_name(leaf)}")
         return _Made(top.children[0], tuple(why))
 
     def _hold(self, top: Element, leaf: Element, holder: Purpose, *, bringing: bool) -> list[Element] | None:
@@ -193,14 +196,23 @@ class _Making:
         place = sequence.content.index(child)
         before = sequence.content[place - 1] if place else ""
         asked = f"running({holder.name})"
+        (resource, state), *_ = holder.holds.items()
+        name = self._sources.words.wait(asked, told_state(resource, state))
         if isinstance(before, Element) and before.tag == "WaitFor":
             sequence.content.remove(before)
-            asked, place = f"{asked} && {before.get('if')}", place - 1
-        wait = node("WaitFor", name=f"{plain(holder.name)} runs", if_=asked)
-        within = node("Sequence", wait, child, name=f"{node_name(child)}, held")
-        parallel = node("Parallel", held, within, name=f"{node_name(leaf)} with {plain(holder.name)}", success_count="1", failure_count="1")
+            asked, name, place = f"{asked} && {before.get('if')}", f"{name} and {node_name(before)}", place - 1
+        wait = node("WaitFor", name=name, if_=asked)
+        within = node("Sequence", wait, child, name="then")
+        parallel = node("Parallel", held, within, name="meanwhile", success_count="1", failure_count="1")
         sequence.content[place : place + 1] = [*first, parallel]
+        self._parallels.append((parallel, leaf))
         return new
+
+
+def _ends_it(purpose: Purpose, resource: Resource) -> bool:
+    """Tell whether a skill has an invariant that a state of a resource breaks."""
+    asked = (judge(one.condition, {resource.name: state}, NO_DATA) for one in purpose.skill.invariants for state in resource.states)
+    return any(one is False for one in asked)
 
 
 def _is_broken(purpose: Purpose, at: str, state: str) -> bool:
@@ -208,9 +220,12 @@ def _is_broken(purpose: Purpose, at: str, state: str) -> bool:
     return purpose.skillset.name == skillset and broken_by(purpose.skill, resource, state) is not None
 
 
-def _as_it_needs(purpose: Purpose) -> str:
-    needs = [f"{purpose.skillset.name}.{resource.name} == {state}" for resource, state in asked_of_others(purpose)]
-    return f": it needs {', '.join(needs)}" if needs else ""
+def _short(skill: str) -> str:
+    return skill.rpartition(".")[2]
+
+
+def _and(several: Iterable[str]) -> str:
+    return " and ".join(several)
 
 
 def _rename(element: Element, renaming: Renaming, old: str, new: str) -> None:

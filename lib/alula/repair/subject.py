@@ -7,12 +7,13 @@ import re
 import shutil
 import tempfile
 from collections.abc import Collection, Iterator, Mapping, Sequence
-from contextlib import contextmanager
+from contextlib import contextmanager, suppress
 from dataclasses import dataclass
 from pathlib import Path
 
 from alula.check.findings import findings_of
 from alula.check.robot import Warn, models_of, part_of
+from alula.common.errors import AlulaError
 from alula.common.robots import RobotFolder, find_robot
 from alula.common.scenarios import Scenario
 from alula.language.errors import Diagnostic
@@ -28,6 +29,7 @@ from alula.records.causes.effects import FaultEffects
 from alula.records.causes.fault_file import effects_of
 from alula.records.models import members
 from alula.repair.errors import RepairError
+from alula.repair.naming import Vocabulary
 from alula.trees.document import Document, Element, parse_document, read_source
 from alula.trees.library import Library
 from alula.trees.reading import TreeFiles, node_name
@@ -114,6 +116,15 @@ class Subject:
             changed.write_bytes(text.encode())
             yield changed
 
+    def vocabulary(self) -> Vocabulary:
+        """Return what the author calls things: in this mission, then in the robot's others that can be read."""
+        own = {Path(one.path).resolve() for one in self.files.documents} | {self.flown_as.resolve()}
+        nodes = list(_nodes(self.files))
+        for path, scenario in by_mission().items():
+            with suppress(AlulaError, OSError):
+                nodes += _nodes(flown(path, scenario).read()) if path not in own else ()
+        return Vocabulary(nodes)
+
     # --- properties --------------------------------------------------------------------------------------------------
 
     def names_asked(self) -> dict[str, None]:
@@ -133,6 +144,10 @@ def _at_rest(robot: RobotFolder, skillsets: Sequence[Skillset]) -> list[AtRest]:
     names = {resource: of.name for of in skillsets for resource in of.resource_index}
     found = [(f"{names[one[0]]}.{one[0]}", one[1]) for one in said if one is not None and one[0] in names]
     return [found] if found else []
+
+
+def _nodes(files: TreeFiles) -> Iterator[Element]:
+    return (one for tree in files.trees.values() for one in tree.iterate())
 
 
 def _flown_as(path: Path, root: Element) -> tuple[Path, Scenario | None]:

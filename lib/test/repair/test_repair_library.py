@@ -45,7 +45,7 @@ def test_trees_of_a_library_are_there(name: str, tmp_path: Path, monkeypatch: py
     answer = Search(Subject.read(path, print), Question("grease"), Deadline.after(600.0), print).run()
     assert answer.repair is not None
     before = '      <SubTree ID="take" name="take it"/>\n'
-    after = f"""      <RetryUntilSuccessful name="take it again" num_attempts="3">
+    after = f"""      <RetryUntilSuccessful name="three chances" num_attempts="3">
   {before}      </RetryUntilSuccessful>
 """
     assert answer.repair.text == FILES["missions/carry.xml"].replace(before, after)

@@ -172,7 +172,7 @@ def test_what_a_skill_needs_is_brought_about_before_it_has_another_chance(tmp_pa
     assert again == ["3"]
     xml = answer.repair.branch.as_xml()
     assert skills_in(xml) == ["eyes.scan", "base.dock", "power.charge"]
-    assert '<Awaits name="dock is told" if="power.charger == ON" within="5"/>' in xml
+    assert '<Awaits name="the charger is on" if="power.charger == ON" within="5"/>' in xml
     runs = fly(subject, answer.repair.text, "battery")
     assert any("power.charge" in run for run in runs)
 
@@ -205,8 +205,8 @@ def test_a_state_is_planned_from_another_one(tmp_path: Path, monkeypatch: pytest
     plan = planned(aim, tmp_path, monkeypatch).plan
     assert plan is not None
     assert plan.steps == ("base.turn", "base.dock")
-    assert '<Awaits name="turn is told" if="base.pose == GOOD" within="5"/>' in plan.text
-    assert re.findall(r'<Needs name="(.*?)"', plan.text) == ["eyes.laser is OK"]  # what no skill of it brings about
+    assert '<Awaits name="the pose is good" if="base.pose == GOOD" within="5"/>' in plan.text
+    assert re.findall(r'<Needs name="(.*?)"', plan.text) == ["the laser is OK"]  # what no skill of it brings about
 
 
 def test_what_no_skill_leads_to_is_impossible(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
