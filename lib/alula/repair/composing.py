@@ -10,7 +10,7 @@ from alula.model.model import Parameter
 from alula.model.units import told_unit
 from alula.repair.branches import node
 from alula.repair.courses import Course, Courses, Here, Wanted
-from alula.repair.naming import Vocabulary, chances, plain, told_states
+from alula.repair.naming import Vocabulary, chances, told_states
 from alula.repair.purposes import Purpose
 from alula.trees.document import Element
 from alula.trees.node import pointer
@@ -153,7 +153,8 @@ class Composer:
             providers = self.courses.providers(here, role.name, purpose)
             watching = [one for one in (self.sources.leaf(each, {}) for each in providers) if one is not None]
             several = [[*one, watch] for one in several for watch in (watching if self.alternatives else watching[:1])]
-        ways = [self._watched(one[0], one[1:]) for one in several]
+        filled = " and ".join(role.name.replace("_", " ") for role in purpose.skill.needs)
+        ways = [self._watched(one[0], one[1:], filled) for one in several]
         if not ways:
             return None
         made = ways[0] if len(ways) == 1 else node("Fallback", *ways, name=", or ".join(map(node_name, ways)))
@@ -162,15 +163,14 @@ class Composer:
         name = chances(self.attempts, self.sources.words.leaf(purpose.name))
         return node("RetryUntilSuccessful", made, name=name, num_attempts=str(self.attempts))
 
-    def _watched(self, leaf: Element, watching: Sequence[Element]) -> Element:
-        """Return a node that runs while others do, once these make progress; it ends with the first of them that ends."""
+    def _watched(self, leaf: Element, watching: Sequence[Element], filled: str) -> Element:
+        """Return a node that runs while others fill its roles, once these make progress; it ends with the first of them that ends."""
         if not watching:
             return leaf
         made = type(leaf)(leaf.tag, leaf.place, dict(leaf.attributes), list(leaf.content), empty=leaf.empty)  # may stand in several ways
         name = node_name(leaf)
         sees = " && ".join(f"progress({one.tag}) >= 1" for one in watching)
-        working = f"{' and '.join(plain(one.tag) for one in watching)} {'works' if len(watching) == 1 else 'work'}"
-        wait = node("WaitFor", name=self.sources.words.wait(sees, working), if_=sees)
-        inner = node("Sequence", wait, made, name=f"then {name}")
+        wait = node("WaitFor", name=self.sources.words.wait(sees, f"there is {filled}"), if_=sees)
+        inner = node("Sequence", wait, made, name=f"with {filled}")
         called = f"{' and '.join(node_name(one) for one in watching)} and {name}"
         return node("Parallel", *watching, inner, name=called, success_count="1", failure_count="1")

@@ -170,7 +170,9 @@ class Remedies:
         top = node("Sequence", opening(shown, told, code), step, name=name)
         tree = another("_".join(name.split()), self._subject.files.trees)
         ends = "" if rank is Rank.GOES_ON else "the mission ends, degraded, at the place that it calls safe: "
-        why = (f"{failing.situation}: {ends}{purpose.skill.name} does it.", *_told([purpose]))
+        roles = " and ".join(role.name for role in purpose.skill.needs)
+        needs = f", which needs {roles} meanwhile" if roles else ""
+        why = (f"{failing.situation}: {ends}{purpose.skill.name}{needs}.",)
         return Branch(node("SubTree", ID=tree, name=name, _autoremap="true"), top, place.wiring.element.place, why, rank=rank)
 
 
@@ -178,5 +180,5 @@ def _needed(purpose: Purpose) -> str:
     return " && ".join(f"{purpose.skillset.name}.{resource.name} == {state}" for resource, state in asked_of_others(purpose))
 
 
-def _told(steps: list[Purpose] | tuple[Purpose, ...]) -> list[str]:
+def _told(steps: tuple[Purpose, ...]) -> list[str]:
     return [f"{one.skill.name} needs {' and '.join(role.name for role in one.skill.needs)} meanwhile." for one in steps if one.skill.needs]
