@@ -43,6 +43,7 @@ TYPED = [
     "tools/prove_bench",
     "tools/growing_bench",
     "tools/repair_bench",
+    "tools/planners_table",
     "tools/link_rig",
     "tools/groot_bench",
     "tools/finding_pages",
