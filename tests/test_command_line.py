@@ -273,6 +273,7 @@ def test_a_wrong_option_is_one_line_before_anything_is_set_up(name: str, tmp_pat
 
 
 def test_the_nearest_option_and_choice_are_named() -> None:
+    assert alula("skills", "--domain", "300").stderr.startswith("alula skills: --domain: 300 does not lie between 0 and 232; ")
     assert alula("check", "--jsno").stderr == "alula check: there is no option --jsno; did you mean `--json`?\n"
     assert alula("replay", "x", "--from", "sensor").stderr == "alula replay: --from: there is no sensor; did you mean `sensors`?\n"
 

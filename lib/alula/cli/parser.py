@@ -51,13 +51,11 @@ class Parser(argparse.ArgumentParser):
 
     def _check_value(self, action: argparse.Action, value: Any) -> None:
         if action.choices is not None and value not in action.choices:
-            hint = nearest(str(value), map(str, action.choices)) or f"there is {_range(action.choices)}"
+            if isinstance(action.choices, range):
+                raise argparse.ArgumentError(action, f"{value} does not lie between {action.choices[0]} and {action.choices[-1]}")
+            known = [str(one) for one in action.choices]
+            hint = nearest(str(value), known) or f"there is {', '.join(known)}"
             raise argparse.ArgumentError(action, f"there is no {value}; {hint}")
-
-
-def _range(choices: Any) -> str:
-    every = list(choices)
-    return f"{every[0]} to {every[-1]}" if isinstance(choices, range) else ", ".join(map(str, every))
 
 
 def json_option(parser: argparse.ArgumentParser, what: str) -> None:

@@ -168,7 +168,7 @@ def main(arguments: Sequence[str] | None = None) -> int:
         cast = make_cast(robot, options.skillset)
         return run(cast, [shipped] if shipped.exists() else [], robot.skillsets, options, words)
     except (LanguageError, RobotError, SkillRuntimeError) as error:
-        sys.stderr.write(f"{error}\n")
+        sys.stderr.write(f"alula mock: {error}\n")
         return CANNOT_START
 
 
@@ -182,7 +182,7 @@ def main_of(skillset: Skillset, bindings: DataBindings, arguments: Sequence[str]
     try:
         return run(Cast({skillset: bindings}), [], [skillset], options, words)
     except SkillRuntimeError as error:
-        sys.stderr.write(f"{error}\n")
+        sys.stderr.write(f"{skillset.name}_managers.mock: {error}\n")
         return CANNOT_START
 
 

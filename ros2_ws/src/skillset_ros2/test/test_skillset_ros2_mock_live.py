@@ -240,6 +240,7 @@ def test_two_robots_with_a_skillset_of_one_name_share_a_domain_and_nothing_else(
 def test_wrong_requests_are_one_clear_line_and_exit_code_2(arguments, complaint):
     done = subprocess.run([sys.executable, "-m", "skillset_ros2.mock", *arguments], capture_output=True, text=True, timeout=60, check=False)
     assert done.returncode == 2
+    assert done.stderr.startswith("alula mock: ")
     assert complaint in done.stderr
     assert "Traceback" not in done.stderr
 
