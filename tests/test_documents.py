@@ -13,6 +13,7 @@ from typing import Any
 import pytest
 
 from alula_testing.waits import until
+from manual_site.sizes import lines, size_of, sizes
 
 ALULA_ROOT = Path(__file__).resolve().parents[1]
 ROOMS = sorted(path.name for path in ALULA_ROOT.iterdir() if path.is_dir() and path.name[0] != "." and path.name != "runs")
@@ -64,6 +65,8 @@ SIZES = {
     "docs/reference/performance.md": 22_500,
     "docs/reference/robots.md": 10_500,
     "docs/reference/mocks.md": 7_600,
+    "docs/reference/bridge.md": 10_300,
+    "docs/concepts": 8_400,
 }
 """How many bytes a page may have: of a task, which is read whole, and of a reference that was made shorter."""
 
@@ -80,6 +83,17 @@ def test_a_page_says_for_whom_it_is(name: str) -> None:
 def test_a_page_is_no_longer_than_it_may_be(name: str) -> None:
     limit = next(size for place, size in SIZES.items() if name.startswith(place))
     assert (ALULA_ROOT / name).stat().st_size <= limit
+
+
+def test_the_pages_are_counted_apart_from_what_programs_write() -> None:
+    page = size_of("a.md", "# A\n\nFor ü.\n\n<!-- Below this line: written by `x`. -->\n\nmore\n")
+    assert (page.by_hand, page.generated) == (14, 48)
+    by_name = {size.name: size for size in sizes()}
+    assert by_name["README.md"].generated == 0
+    assert by_name["docs/reference/commands.md"].generated > 10 * by_name["docs/reference/commands.md"].by_hand
+    *_, manual, experiments = lines(list(by_name.values()))
+    assert manual.endswith("the manual")
+    assert experiments.split()[1:] == ["0", "experiments"]
 
 
 @pytest.fixture(scope="module")

@@ -17,8 +17,7 @@ _WIDTH = 12
 _HEAD = """# Commands
 
 For everybody who uses Alula: what `./alula` of a checkout can do. `alula` of a pip installation is the same command
-line, and says of what needs ROS that it does. `setup/in_ros2 python -m alula.cli.help docs/reference` writes this page
-from the table that the commands read their words with.
+line, and says of what needs ROS that it does.
 
 The robot is the folder with `robot.yaml` from the current one upwards, or `--robot DIR`, anywhere on the command line.
 Commands set up first if needed. Results go to standard output, everything else to standard error. Exit codes: 0, done,
@@ -28,6 +27,8 @@ asked: one line on standard error says why, with the nearest word that is known.
 `eval "$(./alula completion bash)"` in `~/.bashrc` completes commands, options, scenarios, faults, skills with their
 inputs, resources and states of the robot. In `~/.zshrc` it is `eval "$(./alula completion zsh)"` behind `compinit`, in
 fish's `config.fish` `./alula completion fish | source`.
+
+<!-- Below this line: written by `python -m alula.cli.help docs/reference`, from the table of commands. -->
 """
 _FOOT = """Commands set up first if needed. Results go to standard output, everything else to standard error.
 'alula COMMAND --help' lists what a command takes; with a robot's run that is also what the robot adds.
