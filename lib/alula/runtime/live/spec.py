@@ -37,7 +37,7 @@ class RunSpec:
         seat: a number that no other run under way has, for ports that follow from it; 0 until it is claimed.
         namespace: what its names in ROS 2 begin with, as ``/rover``; empty: nothing.
         console: the operator's page is served beside it.
-        monitor: every event is held against the models.
+        monitor: every event is checked against the models.
         limit_s: mission clock after which the run is ended; 0: no limit.
         commanded: simulated time waits for the heartbeats of who calls the robot's skills from outside, as a fleet does.
         members: of a fleet, the words of ``alula run`` for the run of each robot, by its name; empty: its robots are served elsewhere.
