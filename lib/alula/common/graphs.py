@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections import deque
-from collections.abc import Callable, Hashable, Iterable, Iterator, Mapping
+from collections.abc import Callable, Collection, Hashable, Iterable, Iterator
 from typing import Generic, TypeVar
 
 Vertex = TypeVar("Vertex", bound=Hashable)
@@ -37,17 +37,39 @@ class ShortestWays(Generic[Vertex, Step]):
     def __init__(self, starts: Iterable[Vertex], following: Callable[[Vertex], Iterable[tuple[Step, Vertex]]]) -> None:
         self._following = following
         self._origins: dict[Vertex, tuple[Vertex, Step] | None] = dict.fromkeys(starts)
+        self._todo = deque(self._origins)
 
     def __iter__(self) -> Iterator[Vertex]:
-        todo = deque(self._origins)
-        yield from tuple(todo)
-        while todo:
-            vertex = todo.popleft()
+        yield from tuple(self._origins)
+        for vertex, step, after in self.steps():
+            if after not in self._origins:
+                self.add(vertex, step, after)
+                yield after
+
+    def steps(self) -> Iterator[tuple[Vertex, Step, Vertex]]:
+        """Search on, and yield each step from each vertex, with where it begins and ends, before its end counts as found by it."""
+        while self._todo:
+            vertex = self._todo[0]
             for step, after in self._following(vertex):
-                if after not in self._origins:
-                    self._origins[after] = (vertex, step)
-                    todo.append(after)
-                    yield after
+                yield vertex, step, after
+                self.add(vertex, step, after)
+            self._todo.popleft()
+
+    def add(self, vertex: Vertex, step: Step, after: Vertex) -> None:
+        """Count the end of a step as found, unless it is: the search goes on from there."""
+        if after not in self._origins:
+            self._origins[after] = (vertex, step)
+            self._todo.append(after)
+
+    @property
+    def found(self) -> Collection[Vertex]:
+        """All that was found, in its order."""
+        return self._origins.keys()
+
+    @property
+    def open(self) -> Collection[Vertex]:
+        """What was found, and not all that follows it."""
+        return self._todo
 
     def step_to(self, vertex: Vertex) -> Step | None:
         """Return the step by which a vertex was found, None for a start."""
@@ -56,16 +78,11 @@ class ShortestWays(Generic[Vertex, Step]):
 
     def to(self, vertex: Vertex) -> list[Step]:
         """Return the steps of a shortest way from a start to a vertex that was found."""
-        return steps_to(self._origins, vertex)
-
-
-def steps_to(origins: Mapping[Vertex, tuple[Vertex, Step] | None], vertex: Vertex) -> list[Step]:
-    """Return the steps to a vertex where it is known of each from where, and by which step, it was found; None: there it began."""
-    steps: list[Step] = []
-    while (origin := origins[vertex]) is not None:
-        vertex, step = origin
-        steps.append(step)
-    return steps[::-1]
+        steps: list[Step] = []
+        while (origin := self._origins[vertex]) is not None:
+            vertex, step = origin
+            steps.append(step)
+        return steps[::-1]
 
 
 def components(vertices: Iterable[Vertex], following: Callable[[Vertex], Iterable[Vertex]]) -> Iterator[list[Vertex]]:

@@ -13,12 +13,11 @@ mission can do anything. So situations without such states are looked at first: 
 
 from __future__ import annotations
 
-from collections import deque
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from typing import NamedTuple
 
-from alula.common.graphs import reachable_from, steps_to
+from alula.common.graphs import ShortestWays, reachable_from
 from alula.model.expressions import Expression
 from alula.model.model import ResultKind, Skillset
 from alula.odds.mission import MissionSteps, Place
@@ -126,100 +125,91 @@ def fate_of(
     def following(here: Here) -> list[tuple[Step[Place], Here]]:
         return [] if steps.outcome(here.place) is not None else _following(steps, here, faults, ends, strikes)
 
-    graph = _Graph([Here(place) for place in steps.initial()])
-    if not graph.explore(following, lambda here, step: steps.comes_later(here.place, step.name), deadline, most):
+    graph = _Graph([Here(place) for place in steps.initial()], following, deadline)
+    if not graph.explore(lambda here, step: steps.comes_later(here.place, step.name), most):
         return None
     lost_before = graph.first_without_way(is_good)
     later = graph.put_off
-    if later and not graph.explore(following, lambda _here, _step: False, deadline, most):
+    if later and not graph.explore(lambda _here, _step: False, most):
         return None
     lost = graph.first_without_way(is_good) if later else lost_before
-    ended = [one for one in graph.before if steps.outcome(one.place) is not None]
+    ended = [one for one in graph.ways.found if steps.outcome(one.place) is not None]
     at_rest = all(any(steps.resource(one.place, name) == state for name, state in safe) for one in ended for safe in rest)
     safe = at_rest and graph.first_without_way(lambda here: steps.outcome(here.place) is not None) is None
-    last = [steps.outcome(one.place) for one in graph.before if one.come == len(faults) and one in graph.ends]
+    last = [steps.outcome(one.place) for one in graph.ways.found if one.come == len(faults) and one in graph.ends]
     outcomes = frozenset("none" if one is None else one.value for one in last)
     run, states = ((), {}) if lost is None else (graph.run_to(lost), steps.resources(lost.place))
     assuming = tuple(later) if safe and lost is not None and lost_before is None else ()
-    return Fate(tuple(faults), outcomes, lost is None, safe, run, states, len(graph.before), assuming)
+    return Fate(tuple(faults), outcomes, lost is None, safe, run, states, len(graph.ways.found), assuming)
 
 
 class _Graph:
     """The situations that a mission can come into, looked at breadth first; some steps may be put off.
 
     Attributes:
-        before: all that were found, each with the step by which it was.
+        ways: to all that were found.
         ends: those that nothing follows.
         put_off: the names of the steps that `explore` has put off.
     """
 
-    def __init__(self, first: Sequence[Here]) -> None:
-        self.before: dict[Here, tuple[Here, Step[Place]] | None] = dict.fromkeys(first)
+    def __init__(self, first: Sequence[Here], following: Callable[[Here], list[tuple[Step[Place], Here]]], deadline: Deadline) -> None:
+        self.ways = ShortestWays(first, self._next)
         self.ends: set[Here] = set()
-        self.put_off: list[str] = []
+        self._following = following
+        self._deadline = deadline
+        self._is_put_off: Callable[[Here, Step[Place]], bool] = lambda _here, _step: False
         self._leading: dict[Here, list[Here]] = {}
-        self._todo = deque(first)
         self._later: list[tuple[Here, Step[Place], Here]] = []
 
-    def explore(
-        self,
-        following: Callable[[Here], list[tuple[Step[Place], Here]]],
-        is_put_off: Callable[[Here, Step[Place]], bool],
-        deadline: Deadline,
-        most: int | None,
-    ) -> bool:
-        """Go on with what was put off, then with all but what is put off now; False: there are more situations than ``most``."""
-        several, self._later = self._later, []
-        for here, step, there in several:
-            self._add(here, step, there)
-        while self._todo:
-            here = self._todo.popleft()
-            deadline.check()
-            if most is not None and len(self.before) > most:
-                return False
-            found = following(here)
-            if not found:
-                self.ends.add(here)
-            for step, there in found:
-                if is_put_off(here, step):
-                    self._later.append((here, step, there))
-                else:
-                    self._add(here, step, there)
-        self.put_off = sorted({step.name for _, step, _ in self._later})
-        return True
+    @property
+    def put_off(self) -> list[str]:
+        """The names of the steps that the last `explore` has put off."""
+        return sorted({step.name for _, step, _ in self._later})
 
-    def _add(self, here: Here, step: Step[Place], there: Here) -> None:
-        self._leading.setdefault(there, []).append(here)
-        if there not in self.before:
-            self.before[there] = (here, step)
-            self._todo.append(there)
+    def explore(self, is_put_off: Callable[[Here, Step[Place]], bool], most: int | None) -> bool:
+        """Go on with what was put off, then with all but what is put off now; False: there are more situations than ``most``."""
+        several, self._later, self._is_put_off = self._later, [], is_put_off
+        for here, step, there in several:
+            self._leading.setdefault(there, []).append(here)
+            self.ways.add(here, step, there)
+        for here, _, there in self.ways.steps():
+            self._leading.setdefault(there, []).append(here)
+            if most is not None and len(self.ways.found) > most:
+                return False
+        return most is None or len(self.ways.found) <= most
+
+    def _next(self, here: Here) -> Iterator[tuple[Step[Place], Here]]:
+        self._deadline.check()
+        found = self._following(here)
+        if not found:
+            self.ends.add(here)
+        for step, there in found:
+            if self._is_put_off(here, step):
+                self._later.append((here, step, there))
+            else:
+                yield step, there
 
     def first_without_way(self, is_good: Callable[[Here], bool]) -> Here | None:
         """Return the first situation, of those that were found, from which none of these is reached; None: there is none."""
-        hopeful = reachable_from(filter(is_good, self.before), lambda one: self._leading.get(one, ()))
-        return next((one for one in self.before if one not in hopeful), None)
+        hopeful = reachable_from(filter(is_good, self.ways.found), lambda one: self._leading.get(one, ()))
+        return next((one for one in self.ways.found if one not in hopeful), None)
 
     def run_to(self, here: Here) -> tuple[str, ...]:
         """Return what happens until a situation."""
-        lines = [_told(step) for step in steps_to(self.before, here)]
+        lines = [_told(step) for step in self.ways.to(here)]
         return tuple(line for line in lines if line)
 
 
 def needs(steps: MissionSteps, skillsets: Sequence[Skillset], skill: str, deadline: Deadline) -> bool:
     """Tell whether every run in which nothing fails, and the mission is accomplished, starts a skill; raises OutOfTimeError."""
     ends = _Ends.of(skillsets)
-    todo = deque(Here(place) for place in steps.initial())
-    seen = set(todo)
-    while todo:
-        here = todo.popleft()
+
+    def following(here: Here) -> Iterator[tuple[Step[Place], Here]]:
         deadline.check()
-        if steps.outcome(here.place) in GOOD:
-            return False
-        for step, there in _following(steps, here, (), ends, 0, also_failing=True):
-            if skill not in step.uses and there not in seen:
-                seen.add(there)
-                todo.append(there)
-    return True
+        return (one for one in _following(steps, here, (), ends, 0, also_failing=True) if skill not in one[0].uses)
+
+    without = ShortestWays((Here(place) for place in steps.initial()), following)
+    return not any(steps.outcome(here.place) in GOOD for here in without)
 
 
 def _following(

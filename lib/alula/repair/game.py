@@ -10,10 +10,10 @@ those happen. What all others do changes nothing of that.
 
 from __future__ import annotations
 
-from collections import deque
 from collections.abc import Collection, Iterator
 from dataclasses import dataclass, replace
 
+from alula.common.graphs import ShortestWays
 from alula.model.expressions import TRUE, And, ResourceIs, SkillRuns
 from alula.model.model import Property, PropertyKind, Skill, Skillset
 from alula.prove.limits import Deadline
@@ -50,21 +50,20 @@ def played(skillset: Skillset, skill: str, states: Collection[tuple[str, str]], 
     leaves = {number: one.name for number, one in enumerate(mattering.skills)}
     steps = ManagersSteps(mattering, leaves, HELPFUL, _as_it_is)
     number = next(leaf for leaf, name in leaves.items() if name == skill)
-    first: Here = (steps.initial(), False)
-    seen, todo, refused = {first}, deque([first]), dict[str, None]()
-    while todo:
-        here = todo.popleft()
+
+    def following(here: Here) -> Iterator[tuple[Event | None, Here]]:
         deadline.check()
-        for event, there in _moves(steps, here, leaves, states):
-            if there[1] and event is not None and event.leaf == number:
-                if event.kind is Kind.START and any(one.leaf == number and one.phase == RUNNING for one in there[0].executions):
-                    return Game(won=True, refused=(), situations=len(seen))
-                if event.kind is Kind.REFUSE:
-                    refused[event.result] = None
-            if there not in seen:
-                seen.add(there)
-                todo.append(there)
-    return Game(won=False, refused=tuple(refused), situations=len(seen))
+        return _moves(steps, here, leaves, states)
+
+    first: Here = (steps.initial(), False)
+    ways, refused = ShortestWays([first], following), dict[str, None]()
+    for _, event, (managers, come) in ways.steps():
+        if come and event is not None and event.leaf == number:
+            if event.kind is Kind.START and any(one.leaf == number and one.phase == RUNNING for one in managers.executions):
+                return Game(won=True, refused=(), situations=len(ways.found))
+            if event.kind is Kind.REFUSE:
+                refused[event.result] = None
+    return Game(won=False, refused=tuple(refused), situations=len(ways.found))
 
 
 def _mattering(skillset: Skillset, skill: str, states: Collection[tuple[str, str]]) -> Skillset:

@@ -45,6 +45,32 @@ def test_each_vertex_is_found_by_a_shortest_way_and_the_nearest_first(graph: dic
         ring = {after for vertex in ring for after in graph.get(vertex, ())} & left
 
 
+@given(GRAPHS, st.sets(st.integers(0, 9)), st.integers(0, 40))
+def test_each_step_comes_once_and_before_its_end_is_found_by_it(graph: dict[int, list[int]], starts: set[int], most: int) -> None:
+    ways = ShortestWays(starts, lambda one: [((one, after), after) for after in graph.get(one, ())])
+    taken: list[tuple[int, int]] = []
+    for vertex, step, after in ways.steps():
+        assert step == (vertex, after)
+        assert set(ways.found) == starts | {one for _, one in taken}
+        taken.append(step)
+        if len(taken) == most:
+            break
+    whole = [(vertex, after) for vertex in ways.found if vertex not in ways.open for after in graph.get(vertex, ())]
+    assert taken[: len(whole)] == whole
+    if len(taken) != most:
+        assert (set(ways.found), list(ways.open)) == (reachable_from(starts, lambda one: graph.get(one, ())), [])
+
+
+@given(GRAPHS, st.sets(st.integers(0, 9), min_size=1), st.integers(0, 9))
+def test_a_search_goes_on_from_what_is_added(graph: dict[int, list[int]], starts: set[int], added: int) -> None:
+    ways = ShortestWays(starts, lambda one: [((one, after), after) for after in graph.get(one, ())])
+    found = list(ways)
+    ways.add(found[0], (found[0], added), added)
+    again = {vertex for vertex, _, _ in ways.steps()}
+    assert again.isdisjoint(found)
+    assert set(ways.found) == reachable_from([*starts, added], lambda one: graph.get(one, ()))
+
+
 @given(GRAPHS, st.lists(st.integers(0, 9)))
 def test_what_reaches_each_other_is_a_component_and_comes_after_what_it_leads_to(graph: dict[int, list[int]], starts: list[int]) -> None:
     reached = {vertex: reachable_from([vertex], lambda one: graph.get(one, ())) for vertex in range(10)}

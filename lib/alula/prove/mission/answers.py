@@ -6,8 +6,10 @@ asks for next; its outcomes are all ways in which the mission can end from there
 
 from __future__ import annotations
 
+from collections.abc import Iterator
 from dataclasses import dataclass, field
 
+from alula.common.graphs import reachable_from
 from alula.prove.mission.regions import Region, Regions, Sets, Ticked
 from alula.prove.mission.state import State
 from alula.prove.mission.ticking import ABORT, Outcome
@@ -131,17 +133,18 @@ class Answers:
         """Return what the next ticks that ask for anything ask for; an empty set where the mission ends without."""
         if region not in self._asking:
             found: set[frozenset[int]] = set()
-            seen, todo = {region}, [region]
-            while todo:
-                at = self._regions.regions[todo.pop()]
+
+            def following(number: int) -> Iterator[int]:
+                at = self._regions.regions[number]
                 if self._system.ticker.memories[at.memory].end is not None:
                     found.add(frozenset())
                 for target, ticked in _ticks(at):
                     if ticked.outcome.started:
                         found.add(frozenset(ticked.outcome.started))
-                    elif target not in seen:
-                        seen.add(target)
-                        todo.append(target)
+                    else:
+                        yield target
+
+            reachable_from([region], following)
             self._asking[region] = frozenset(found)
         return self._asking[region]
 
@@ -167,16 +170,13 @@ class Answers:
         for number, region in enumerate(regions):
             for target, _ in _ticks(region):
                 before[target].append(number)
+        ending: dict[str, list[int]] = {}
         for number, region in enumerate(regions):
-            end = self._system.ticker.memories[region.memory].end
-            if end is None:
-                continue
-            todo = [number]
-            while todo:
-                one = todo.pop()
-                if end.value not in found[one]:
-                    found[one].add(end.value)
-                    todo += before[one]
+            if (end := self._system.ticker.memories[region.memory].end) is not None:
+                ending.setdefault(end.value, []).append(number)
+        for value, several in ending.items():
+            for number in reachable_from(several, before.__getitem__):
+                found[number].add(value)
         return [frozenset(one) for one in found]
 
 

@@ -8,12 +8,11 @@ the case at each of its ends. Otherwise the situations are looked at one after a
 
 from __future__ import annotations
 
-from collections import deque
 from collections.abc import Iterator
 from dataclasses import dataclass
 from itertools import product
 
-from alula.common.graphs import ShortestWays, reachable_from, steps_to
+from alula.common.graphs import ShortestWays, reachable_from
 from alula.language.errors import Severity
 from alula.model.expressions import Constant, Expression, Not, ResourceIs, SkillRuns, atoms
 from alula.model.model import Property, PropertyKind
@@ -127,36 +126,28 @@ class _Search:
         self._faults = faults
         self._begins = Constant(value=True) if one.kind is PropertyKind.EVENTUALLY else one.condition
         self._goal = _goal(one)
-        self._before: dict[Awaiting, tuple[Awaiting, Event] | None] = {}
         self._calm_before: dict[Awaiting, list[tuple[Event, Awaiting]]] = {}
         self._calm_after: dict[Awaiting, list[tuple[Event, Awaiting]]] = {}
-        self._open: set[Awaiting] = set()
-        self._late: Awaiting | None = None
+        state = system.initial()
+        self._ways = ShortestWays([(state, self._awaits(state, 0, None))], self._following)
+        self._late: tuple[list[Event], State] | None = None
+        """A run after which it comes too late."""
 
     def explore(self, deadline: Deadline) -> None:
         """Look at all of them; raises OutOfTimeError."""
         calm = calm_of(self._system, terminating=self._one.fair)
-        state = self._system.initial()
-        first = (state, self._awaits(state, 0, None))
-        self._before[first] = None
-        todo = deque([first])
-        self._open.add(first)
-        while todo and self._late is None:
+        for here, event, there in self._ways.steps():
             deadline.check()
-            here = todo.popleft()
-            for event, after in self._steps(here):
-                there = (after, self._awaits(after, here[1], event))
-                if here[1] and calm(event):
-                    self._calm_before.setdefault(there, []).append((event, here))
-                    self._calm_after.setdefault(here, []).append((event, there))
-                if there not in self._before:
-                    self._before[there] = (here, event)
-                    self._open.add(there)
-                    todo.append(there)
-                if there[1] < 0:
-                    self._late = there
-                    break
-            self._open.discard(here)
+            if here[1] and calm(event):
+                self._calm_before.setdefault(there, []).append((event, here))
+                self._calm_after.setdefault(here, []).append((event, there))
+            if there[1] < 0:
+                self._late = ([*self._ways.to(here), event], there[0])
+                return
+
+    def _following(self, here: Awaiting) -> Iterator[tuple[Event, Awaiting]]:
+        for event, after in self._steps(here):
+            yield event, (after, self._awaits(after, here[1], event))
 
     def _steps(self, here: Awaiting) -> Iterator[tuple[Event, State]]:
         state, awaits = here
@@ -180,7 +171,7 @@ class _Search:
     def against(self) -> tuple[list[Event], State] | None:
         """Return a run after which it never comes, or comes too late."""
         if self._one.within:
-            return None if self._late is None else (steps_to(self._before, self._late), self._late[0])
+            return self._late
         several = all_values(self._system.ticker.about_data)
         return next((self._at_rest(one, values) for values in several for one in self._never(values)), None)
 
@@ -188,8 +179,9 @@ class _Search:
         """Yield where it never comes while data have these values."""
         before = {there: [here for event, here in ways if agree(values, event.choices)] for there, ways in self._calm_before.items()}
         # What was not looked at any further may lead anywhere.
-        good = reachable_from({one for one in self._before if not one[1]} | self._open, lambda one: before.get(one, ()))
-        yield from (one for one in self._before if one not in good)
+        reached = (one for one in self._ways.found if not one[1])
+        good = reachable_from([*reached, *self._ways.open], lambda one: before.get(one, ()))
+        yield from (one for one in self._ways.found if one not in good)
 
     def _at_rest(self, found: Awaiting, values: Values) -> tuple[list[Event], State]:
         """Return a run that goes on until nothing calm happens any more, where that is possible: one sees best there what is waited for."""
@@ -199,4 +191,4 @@ class _Search:
 
         ways = ShortestWays([found], following)
         rest = next((here for here in ways if not following(here)), found)
-        return steps_to(self._before, found) + ways.to(rest), rest[0]
+        return self._ways.to(found) + ways.to(rest), rest[0]

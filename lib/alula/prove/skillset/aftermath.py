@@ -10,6 +10,7 @@ from collections.abc import Iterable
 from dataclasses import dataclass
 from typing import Any
 
+from alula.common.graphs import reachable_from
 from alula.model.expressions import ResourceIs, atoms
 from alula.model.model import Skill
 from alula.prove.skillset.bound import Bound
@@ -56,11 +57,7 @@ class Aftermath:
     def step(self, update: Update) -> Step:
         """Return an update with what may follow."""
         direct = [skill for skill in self._watching(update) if self._breaks(update, skill)]
-        whole, todo = set(direct), list(direct)
-        while todo:
-            fresh = [skill for skill in self.following(todo.pop()) if skill not in whole]
-            whole |= set(fresh)
-            todo += fresh
+        whole = reachable_from(direct, self.following)
         groups = tuple(self._group(skills, direct) for skills in self._entangled([s for s in self._concerns if s in whole]))
         sets = set(update.values).union(*(group.sets for group in groups))
         about = sets | set(self.bdd.support(update.guard))
