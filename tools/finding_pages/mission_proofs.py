@@ -14,6 +14,7 @@ from alula.common.files import write_text
 from alula.language.codes import RUN_CODES
 from alula.language.errors import Diagnostic
 from alula.language.models import ModelFile, check_texts
+from alula.missions.mission_file import MissionFile
 from alula.missions.part import NO_PART
 from alula.prove.mission.prover import prove_mission
 from finding_pages.examples import RUNS, Example, examples
@@ -79,7 +80,7 @@ def found_in(text: str) -> list[Diagnostic]:
     with tempfile.TemporaryDirectory() as folder:
         path = Path(folder) / "example.xml"
         path.write_text(whole(text), encoding="utf-8")
-        return prove_mission(path, robot.skillsets, NO_PART).findings
+        return prove_mission(MissionFile.read(path, robot.skillsets, NO_PART)).findings
 
 
 def _section(code: str, meaning: str, example: Example) -> Iterator[str]:

@@ -9,6 +9,7 @@ from itertools import islice
 from pathlib import Path
 from typing import Protocol
 
+from alula.missions.mission_file import MissionFile
 from alula.missions.part import MissionPart
 from alula.model.model import Skillset
 from alula.prove.mission.play import Played, play
@@ -145,7 +146,7 @@ def flown(run: MissionRun, of: System, path: Path, by: System, skillsets: Sequen
         return None
     numbers = [here.get(key, -1) for key in keys]
     moved = replace(run, events=tuple(_moved(event, numbers) for event in run.events), skillsets=tuple(skillsets))
-    played = play(path, moved, part)
+    played = play(MissionFile.read(path, moved.skillsets, part), moved)
     return None if played.left else played
 
 

@@ -13,6 +13,7 @@ from alula.check.findings import findings_of
 from alula.language.check.findings import check
 from alula.language.errors import Diagnostic
 from alula.language.messages import NO_MESSAGES, Messages
+from alula.missions.mission_file import MissionFile
 from alula.missions.part import MissionPart
 from alula.missions.plan import InputError
 from alula.model.model import Skillset
@@ -203,7 +204,7 @@ class Judge:
         flown: list[tuple[Diagnostic, bool | None]] = []
         for one in new:
             run = one.run if isinstance(one, MissionFinding) else None
-            flown.append((one, None if run is None else not play(looked.path, run, looked.part).left))
+            flown.append((one, None if run is None else not play(MissionFile.read(looked.path, run.skillsets, looked.part), run).left))
             if flown[-1][1]:
                 break
         shown, how = next((known for known in flown if known[1]), next((known for known in flown if known[1] is not None), flown[0]))
@@ -240,7 +241,7 @@ class Judge:
 
     def _look(self, path: Path, skillsets: tuple[Skillset, ...], part: MissionPart, why_any_order: str = "") -> Looked:
         deadline = Deadline.after(GIVEN_S)
-        system = System.read(path, skillsets, part, LOOKED_AT, why_any_order=why_any_order)
+        system = System.of(MissionFile.read(path, skillsets, part), LOOKED_AT, why_any_order=why_any_order)
         regions = Regions(system, deadline)
         regions.explore()
         return Looked(path, system.skillsets, part, regions, Answers(regions), self._shown.of(regions, path))

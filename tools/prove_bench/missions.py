@@ -19,6 +19,7 @@ from pathlib import Path
 
 from alula.check.robot import models_of, part_of
 from alula.common.robots import find_robot
+from alula.missions.mission_file import MissionFile
 from alula.missions.part import NO_PART, MissionPart
 from alula.model.expressions import ResourceIs
 from alula.model.model import (
@@ -162,7 +163,7 @@ def _warn(line: str) -> None:
 def _looked_at(path: Path, models: Sequence[Skillset], part: MissionPart, timeout_s: float) -> Row:
     begin, worked = time.monotonic(), time.process_time()
     deadline = Deadline.after(timeout_s)
-    regions = Regions(System.read(path, models, part, LOOKED_AT), deadline)
+    regions = Regions(System.of(MissionFile.read(path, models, part), LOOKED_AT), deadline)
     with contextlib.suppress(OutOfTimeError):
         regions.explore()
     found = findings(regions, Answers(regions))

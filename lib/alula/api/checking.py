@@ -28,12 +28,11 @@ from alula.model.span import Span
 from alula.trees.document import read_source
 from alula.trees.errors import FileError
 from alula.trees.library import ENDINGS, Library
-from alula.trees.library import ignore as ignore_problem
-from alula.trees.palette import NodeType, name_in_files
-from alula.trees.reading import read_models
+from alula.trees.palette import name_in_files
 from alula.trees.source import TreeSource
 
 if TYPE_CHECKING:
+    from alula.missions.mission_file import MissionFile
     from alula.missions.part import MissionPart
 
 Tell = Callable[[str], None]
@@ -192,12 +191,16 @@ class CheckedMission(ModelFile):
     """A mission with its findings.
 
     Attributes:
-        source: where it is read from, for whoever proves or plays it.
+        source: where it is read from.
         named: it was asked for itself, and not found in a folder.
+        mission: what was read, for whoever proves or plays it; None where it can't be read.
+        own: it is a mission of the robot around, and no tree of another program.
     """
 
     source: TreeSource = field(kw_only=True)
     named: bool = field(kw_only=True)
+    mission: MissionFile | None = None
+    own: bool = False
 
 
 def _checked_missions(
@@ -212,15 +215,14 @@ def _checked_missions(
     robot = _robot(tell)
     if len(paths) > 1:
         library.add(map(Path, paths))
-    types = _declared(palettes)
     files: dict[Path, CheckedMission] = {}
     for path in map(Path, paths):
         mine = main if path.resolve() in {Path(one.place.path).resolve() for one in library.trees.get(main, ())} or len(paths) == 1 else ""
-        source = TreeSource(path, robot.library(path, library), mine, enums, types)
+        source = TreeSource(path, robot.library(path, library), mine, enums)
         files[path.resolve()] = CheckedMission(str(path), source=source, named=True)
     beside = library if len(paths) > 1 else None
     for file in files.values():
-        for finding in _checked(file.source, robot, palettes, beside, tell):
+        for finding in _checked(file, robot, palettes, beside, tell):
             its = files.get(Path(finding.span.file).resolve(), file)  # one file's tree is checked in another, too, that uses it
             if finding not in its.findings:
                 its.findings.append(finding)
@@ -229,34 +231,22 @@ def _checked_missions(
     return list(files.values())
 
 
-def _declared(palettes: Sequence[Path]) -> list[NodeType]:
-    """Return the types of node of palettes; one that can't be read is told where a mission is checked with it."""
-    try:
-        return [one for palette in palettes for one in read_models(palette)]
-    except FileError:
-        return []
-
-
 def prove_missions(files: Sequence[CheckedMission], timeout_s: float, tell: Tell = ignore) -> None:
     """Look at all runs of the missions that are free of errors and use skills, and add what is found."""
     sound = [file for file in files if not has_errors(file.findings)]
     if not sound:
         return
     # Late: the search brings its solvers along, and models are checked without it.
-    from alula.missions.part import NO_PART
     from alula.prove.mission.prover import prove_mission
     from alula.records.causes.fault_file import states_of_faults
 
-    robot = _robot(ignore)  # what is to be told of it was told when they were checked
-    skillsets, part = robot.skillsets, robot.part or NO_PART
-    faults = states_of_faults(skillsets, tell) if skillsets else {}
+    faults: Mapping[str, frozenset[str]] = {}
     for file in sound:
-        source = file.source
-        own = robot.has(source.path, read_source(source.path))
-        if (own and not skillsets) or not (own or _is_known(file)) or source.read(ignore_problem, whole=False).is_part:
+        mission = file.mission
+        if mission is None or mission.files.is_part or not (mission.skillsets if file.own else _is_known(file, mission)):
             continue  # what can't be looked at, or a part of other missions, which are looked at
-        report = partial(_tell_runs, tell, file.path)
-        proved = prove_mission(source, skillsets if own else (), part if own else NO_PART, faults=faults, timeout_s=timeout_s, tell=report)
+        faults = faults or (states_of_faults(mission.skillsets, tell) if mission.skillsets else {})
+        proved = prove_mission(mission, faults=faults, timeout_s=timeout_s, tell=partial(_tell_runs, tell, file.path))
         file.findings += [*proved.findings, *map(_accepted, proved.accepted)]
 
 
@@ -264,10 +254,9 @@ _UNKNOWN = frozenset({"ALU601", "ALU607"})
 """What a tree of another program lacks: nodes that nobody declares, entries that the program writes."""
 
 
-def _is_known(file: CheckedMission) -> bool:
+def _is_known(file: CheckedMission, mission: MissionFile) -> bool:
     """Tell whether the runs of a tree of another program are looked at: it is named, has a main tree, and lacks no node and no entry."""
-    files = file.source.read(ignore_problem, whole=False)
-    return file.named and bool(files.main) and not any(one.code in _UNKNOWN for one in file.findings)
+    return file.named and bool(mission.files.main) and not any(one.code in _UNKNOWN for one in file.findings)
 
 
 def _accepted(finding: Diagnostic) -> Diagnostic:
@@ -324,22 +313,22 @@ def _flown(tell: Tell) -> dict[Path, Scenario]:
         return {}
 
 
-def _checked(mission: TreeSource, robot: _Robot, palettes: Sequence[Path], beside: Library | None, tell: Tell) -> list[Diagnostic]:
-    from alula.check.findings import findings_of  # late: models are checked without it
+def _checked(file: CheckedMission, robot: _Robot, palettes: Sequence[Path], beside: Library | None, tell: Tell) -> list[Diagnostic]:
+    """Read a mission, and return what is wrong with it."""
+    from alula.check.findings import read_and_check  # late: models are checked without it
     from alula.missions.part import NO_PART
 
-    path, library, enums = str(mission.path), mission.library, mission.enums
     try:
-        source = read_source(mission.path)
-        own = robot if robot.has(mission.path, source) else _Robot()
-        others = own.root is None
-        part = own.part or NO_PART
-        known = (own.skillsets, palettes, part, own.messages)
-        found = findings_of(path, source, *known, library, mission.main, of_others=others, enums=enums, checked=beside)
+        text = read_source(file.source.path)
+        file.own = robot.has(file.source.path, text)
+        own = robot if file.own else _Robot()
+        known = (own.skillsets, palettes, own.part or NO_PART, own.messages)
+        mission, found = read_and_check(file.source, text, *known, of_others=not file.own, checked=beside)
+        file.mission = mission and mission.declaring()
     except FileError as error:
-        found = [Diagnostic("ALU001", error.problem.message, Span(path, 0, 0, 0))]
+        found = [Diagnostic("ALU001", error.problem.message, Span(file.path, 0, 0, 0))]
     for finding in found:
         if finding.code.startswith("ALU0") and finding.severity is Severity.ERROR:
             cure = f"; {finding.hint}" if finding.hint else ""
-            tell(f"{finding.span if finding.span.line else path}: {finding.message}{cure}")
+            tell(f"{finding.span if finding.span.line else file.path}: {finding.message}{cure}")
     return found

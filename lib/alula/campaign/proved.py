@@ -8,6 +8,7 @@ from fnmatch import fnmatchcase
 
 from alula.common.robots import RobotError, find_robot
 from alula.common.scenarios import Scenario
+from alula.missions.mission_file import MissionFile
 from alula.missions.part import NO_PART
 from alula.missions.plan import InputError
 from alula.missions.scenario import flown
@@ -87,9 +88,9 @@ def proved(
     try:
         robot = find_robot()
         source = flown(robot.root / scenario.mission, scenario)
-        part = robot.part("missions") or NO_PART
+        mission = MissionFile.read(source, models, robot.part("missions") or NO_PART)
         regions, unproved = look_at(
-            lambda why: System.read(source, models, part, LOOKED_AT, why_any_order=why),
+            lambda why: System.of(mission, LOOKED_AT, why_any_order=why),
             lambda system: _explored(Regions(system, deadline), time_s),
         )
     except (UndecidedError, InputError, RobotError) as error:

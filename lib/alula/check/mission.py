@@ -3,9 +3,8 @@
 from __future__ import annotations
 
 from collections import Counter
-from collections.abc import Collection, Sequence
+from collections.abc import Sequence
 from dataclasses import replace
-from pathlib import Path
 
 from alula.check.checking import Beside, check
 from alula.check.defaults import wrong_defaults
@@ -14,54 +13,43 @@ from alula.check.outcomes import OutcomeRules
 from alula.check.rules import SkillRules
 from alula.check.skills import Skills
 from alula.language.messages import NO_MESSAGES, Messages
-from alula.missions.mission_file import READY, STOP_HERE
-from alula.missions.palette import no_class, palette_of
-from alula.missions.part import NO_PART, MissionPart
-from alula.model.model import Skillset
+from alula.missions.mission_file import READY, STOP_HERE, MissionFile
+from alula.missions.palette import no_class
 from alula.trees.errors import FileError, Problem
 from alula.trees.library import Library
-from alula.trees.palette import Palette
-from alula.trees.reading import TreeFiles, read_models, read_text
 
 BESIDE = Beside(before=(READY,), later=(STOP_HERE,))
 
 
 def check_mission(
-    path: Path,
-    source: str | bytes,
-    skillsets: Sequence[Skillset],
-    palettes: Sequence[Path] = (),
-    part: MissionPart = NO_PART,
+    mission: MissionFile,
+    told: Sequence[Problem] = (),
     messages: Messages = NO_MESSAGES,
-    library: Library | None = None,
-    main: str = "",
     *,
+    foreign: bool = False,
     of_others: bool = False,
-    enums: Collection[str] = (),
     checked: Library | None = None,
 ) -> list[Problem]:
     """Return what is wrong with a mission, each thing once.
 
-    ``source`` is what its file has, or will have, ``part`` what the robot adds, ``messages`` what is known of the fields of its data,
-    ``library`` the files whose trees it may use, ``main`` its main tree instead of what it says itself. A tree ``of_others`` is loaded by a
-    program that chooses the main tree, fills the blackboard, and has nodes that no file declares. ``enums`` are names that scripts may use.
-    With it all files of the library ``checked`` are checked, each by itself.
+    ``told`` is what was found when it was read, ``messages`` what is known of the fields of its data. One with ``foreign`` nodes runs
+    somewhere else. A tree ``of_others`` is loaded by a program that chooses the main tree, fills the blackboard, and has nodes that no
+    file declares. With it all files of the library ``checked`` are checked, each by itself.
 
     Raises:
-        FileError: the file, one that it includes, or a palette can't be read or is no XML of trees.
+        FileError: the tree can't be put together.
     """
-    found: list[Problem] = []
-    files = read_text(source, str(path), found.append, main=main, library=library, whole=not of_others)
-    skills = Skills(skillsets, messages)
+    files, known = mission.files, mission.palette
+    skills = Skills(mission.skillsets, messages)
     rules = SkillRules(skills)
-    known = palette_for(files, skillsets, palettes, part)
     own = (rules.units, rules.results, rules.resources, NameRules(skills).names, OutcomeRules(skills).asked)
-    foreign = bool(palettes) or of_others
-    found += check(files, known, {*enums, *skills.states}, own, beside=BESIDE, foreign=foreign, of_others=of_others, checked=checked)
+    foreign = foreign or of_others
+    names = {*mission.source.enums, *skills.states}
+    found = [*told, *check(files, known, names, own, beside=BESIDE, foreign=foreign, of_others=of_others, checked=checked)]
     found += wrong_defaults(files, foreign=foreign)
     if of_others:
         found = _told_once([replace(one, warning=one.warning or one.code == "ALU607") for one in found])
-    if not palettes and not of_others and (problem := no_class(files, known)) is not None:
+    if not foreign and (problem := no_class(files, known)) is not None:
         found.append(replace(problem, warning=True))
     endless = [problem for problem in found if problem.code.startswith("ALU0")]
     if endless:
@@ -87,8 +75,3 @@ def _told_once(problems: Sequence[Problem]) -> list[Problem]:
         if count:
             told.append(replace(one, message=f"{one.message}, {_ONCE[one.code].format(count - 1)}") if count > 1 else one)
     return told
-
-
-def palette_for(files: TreeFiles, skillsets: Sequence[Skillset], palettes: Sequence[Path], part: MissionPart) -> Palette:
-    """Return the types that a mission may have: its own models, those of palettes, Nav2's, and all that the robot has; raises FileError."""
-    return palette_of(files, skillsets, part, more=[one for palette in palettes for one in read_models(palette)])

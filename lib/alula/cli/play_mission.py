@@ -8,19 +8,15 @@ from collections.abc import Mapping
 from pathlib import Path
 
 from alula.api.checking import CheckedMission, checked_files, prove_missions
-from alula.check.robot import part_of
 from alula.cli.run_request import run_folder
 from alula.cli.saying import warner
 from alula.common.files import json_line
-from alula.common.robots import RobotError, find_robot
 from alula.common.run_log import note_mocked
 from alula.language.errors import has_errors
 from alula.missions.director import Outcome
-from alula.missions.part import NO_PART
 from alula.prove.mission.run import MissionFinding
 from alula.report.page.writing import write_report
 from alula.runtime.live.spec import RequestError
-from alula.trees.source import TreeSource
 
 COMMAND = "alula check"
 
@@ -48,22 +44,19 @@ def play_mission(options: argparse.Namespace, enums: Mapping[str, float]) -> int
     try:
         folder = run_folder(options.out, Path(file.path).stem)
         folder.mkdir(parents=True, exist_ok=True)
-        return _flown(file.source, finding, folder, as_json=options.json)
+        return _flown(file, finding, folder, as_json=options.json)
     except (RequestError, OSError) as error:
         return _refused(str(error))
 
 
-def _flown(source: TreeSource, finding: MissionFinding, folder: Path, *, as_json: bool) -> int:
+def _flown(file: CheckedMission, finding: MissionFinding, folder: Path, *, as_json: bool) -> int:
     from alula.prove.mission.play import play  # with what it brings along
 
     assert finding.run is not None  # noqa: S101 - the caller has seen to it
-    try:
-        part = part_of(find_robot(), warner(COMMAND))
-    except RobotError:
-        part = NO_PART
-    played = play(source, finding.run, part, folder)
+    assert file.mission is not None  # noqa: S101 - it was proved
+    played = play(file.mission, finding.run, folder)
     note_mocked(folder, played.simulated_s, 0.0, (), [played.left] if played.left else [])
-    write_report(folder, title=f"{source.path.name}: {finding.code}, played")
+    write_report(folder, title=f"{file.source.path.name}: {finding.code}, played")
     title = f"{finding.span}: {finding.code}: {finding.message}"
     if as_json:
         told = {

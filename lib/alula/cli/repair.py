@@ -17,7 +17,6 @@ from alula.common.errors import AlulaError
 from alula.common.files import check_place, json_line, write_text
 from alula.common.garbage import collect_seldom
 from alula.missions.drawing import draw
-from alula.missions.palette import palette_of
 from alula.odds.errors import OddsError
 from alula.odds.odds import Odds, odds_of
 from alula.odds.robot import graph_of
@@ -75,10 +74,10 @@ def run(given: argparse.Namespace) -> int:
 
 def _drawn(subject: Subject, branch: Branch, changed: Path) -> str:
     """Return a drawing of the mission with the branch."""
-    files = subject.tree(changed).read()
-    tree = scripted_tree(files, palette_of(files, subject.skillsets, subject.part), Answers({}), StepClock())
+    mission = subject.changed(changed)
+    tree = scripted_tree(mission.files, mission.palette, Answers({}), StepClock())
     view = view_of(tree.root)
-    return draw(view, f"{subject.path.name}: {files.main}, with '{branch.name}'", added(view, branch))
+    return draw(view, f"{subject.path.name}: {mission.files.main}, with '{branch.name}'", added(view, branch))
 
 
 def _odds(path: Path, before: Path, changed: Path) -> tuple[Odds, Odds] | None:

@@ -11,7 +11,6 @@ import sys
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from pathlib import Path
 
-from alula.check.mission import palette_for
 from alula.check.robot import models_of, part_of
 from alula.cli.options.models import TICKS
 from alula.cli.saying import warner
@@ -20,6 +19,7 @@ from alula.cli.tree_page import TreePage
 from alula.common.files import write_text
 from alula.common.robots import RobotError, find_robot
 from alula.missions.drawing import draw, drawn_as_text
+from alula.missions.palette import palette_of
 from alula.missions.part import NO_PART
 from alula.trees.answers import Answers, AnswersError, StepClock, read_answers, scripted_tree, ticks
 from alula.trees.document import read_document
@@ -28,7 +28,7 @@ from alula.trees.errors import TreeError, did_you_mean
 from alula.trees.format3 import DECLARED, OLD, convert
 from alula.trees.library import Library
 from alula.trees.palette import Palette
-from alula.trees.reading import TreeFiles, read_files
+from alula.trees.reading import TreeFiles, read_files, read_models
 from alula.trees.structure import missing_trees
 from alula.trees.tree import Tree
 from alula.trees.view import view_of
@@ -156,11 +156,12 @@ def mains(places: Sequence[Path], main: str, packages: Mapping[str, Path], wrong
 
 def palette(files: TreeFiles, more: Sequence[Path]) -> Palette:
     """Return the types of node that there are: a mission's of the robot around, of the file, of palettes; raises TreeError."""
+    types = [one for place in more for one in read_models(place)]
     try:
         robot = find_robot()
     except RobotError:
-        return palette_for(files, (), more, NO_PART)  # a tree of others needs none
-    return palette_for(files, models_of(robot, warner(COMMAND)), more, part_of(robot, warner(COMMAND)))
+        return palette_of(files, (), NO_PART, more=types)  # a tree of others needs none
+    return palette_of(files, models_of(robot, warner(COMMAND)), part_of(robot, warner(COMMAND)), more=types)
 
 
 if __name__ == "__main__":

@@ -28,7 +28,7 @@ from alula.missions.skillset import Client, Clock
 from alula.missions.world import World, asked_data, states_of
 from alula.model.model import Skillset
 from alula.trees.blackboard import Blackboard as TreeBoard
-from alula.trees.errors import TreeError
+from alula.trees.errors import Report, TreeError, refuse
 from alula.trees.factory import build_tree
 from alula.trees.node import Node, Shared, Wiring
 from alula.trees.palette import Category, Direction, NodeType, Palette, Port, node_type
@@ -48,7 +48,7 @@ def ignore(_tree: Tree) -> None:
 
 @dataclass(frozen=True)
 class MissionFile:
-    """A mission's file, read once, with the models and the nodes of the robot that it is for: run, search and odds begin with it.
+    """A mission's file, read once, with the models and the nodes of the robot that it is for: run, check and search begin with it.
 
     Attributes:
         source: where it was read from.
@@ -63,19 +63,33 @@ class MissionFile:
     part: MissionPart
 
     @classmethod
-    def read(cls, mission: Path | TreeSource, skillsets: Sequence[Skillset], part: MissionPart) -> MissionFile:
-        """Read it; raises FileError."""
+    def read(
+        cls,
+        mission: Path | TreeSource,
+        skillsets: Sequence[Skillset],
+        part: MissionPart,
+        report: Report = refuse,
+        *,
+        whole: bool = True,
+        text: str | bytes | None = None,
+    ) -> MissionFile:
+        """Read it; raises FileError. ``text`` is what the file will have, and the others as of `read_files`."""
         source = source_of(mission)
-        return cls(source, source.read(), tuple(skillsets), part)
+        return cls(source, source.read(report, whole=whole, text=text), tuple(skillsets), part)
 
     def with_models(self, skillsets: Sequence[Skillset], part: MissionPart | None = None) -> MissionFile:
         """Return it for other models, and for another part of the robot."""
         return replace(self, skillsets=tuple(skillsets), part=part or self.part)
 
+    def declaring(self) -> MissionFile:
+        """Return it as if its own file declared what its source says of types of node: so it is proved and played."""
+        files = replace(self.files, models={**{one.name: one for one in self.source.types}, **self.files.models})
+        return replace(self, source=replace(self.source, types=()), files=files)
+
     @cached_property
     def palette(self) -> Palette:
         """The types of node that its trees may have."""
-        return palette_of(self.files, self.skillsets, self.part)
+        return palette_of(self.files, self.skillsets, self.part, more=self.source.types)
 
     @cached_property
     def roots(self) -> tuple[Wiring, ...]:
@@ -91,7 +105,8 @@ class MissionFile:
     @property
     def nowhere_made(self) -> list[NodeType]:
         """The types of node that its trees use and that are only declared, by its files or by Nav2."""
-        return [known for name in without_class(self.files, self.palette) if (known := self.palette.get(name)) is not None]
+        names = without_class(self.files, self.palette)
+        return [known for name in names if (known := self.palette.get(name)) is not None]
 
     @property
     def model(self) -> NodeType:

@@ -7,6 +7,7 @@ from pathlib import Path
 
 from alula.check.robot import Warn, models_of, part_of
 from alula.common.robots import FAULTS, RobotFolder, find_robot
+from alula.missions.mission_file import MissionFile
 from alula.missions.scenario import by_mission, flown, inputs_of
 from alula.mock import Behaviour
 from alula.mock.behaviour import Place
@@ -62,10 +63,11 @@ def mission_of(
     inputs = None if scenario is None else inputs_of(scenario, world)
     file = changed or path
     source = file if scenario is None else flown(file, scenario)
+    mission = MissionFile.read(source, models, part)
     known = figures if others is None else others
 
     def read(why_any_order: str) -> System:
-        return System.read(source, models, part, failures, few=COUNTED, known=inputs, why_any_order=why_any_order)
+        return System.of(mission, failures, few=COUNTED, known=inputs, why_any_order=why_any_order)
 
     return read, lambda system: MissionSteps(system, effects, brought, departure, known, at_first), known
 

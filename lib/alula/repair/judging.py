@@ -90,14 +90,12 @@ class Judge:
         self._deadline.check()
         subject = self._subject
         given = f"{self._deadline.left_s():.3g} s"
-        return prove_within(
-            self._deadline, subject.tree(path), subject.skillsets, subject.part, faults=subject.shown, given=given, also=also
-        )
+        return prove_within(self._deadline, subject.changed(path), faults=subject.shown, given=given, also=also)
 
     def skills(self, text: str) -> list[str]:
         """Return the skills of the leaves of a text of the mission's file, by the leaves' numbers."""
         with self._subject.copy(text) as path:
-            leaves = System.read(self._subject.tree(path), self._subject.skillsets, self._subject.part).leaves
+            leaves = System.of(self._subject.changed(path)).leaves
         return [f"{one.skillset}.{one.model.name}" for one in leaves]
 
     def fate(self, text: str, faults: Sequence[str]) -> Fate:

@@ -14,7 +14,6 @@ from collections.abc import Iterator, Sequence
 from dataclasses import replace
 
 from alula.missions.mission_file import READY, STOP_HERE
-from alula.missions.palette import palette_of
 from alula.missions.skill_types import OUTCOME_PORT
 from alula.repair.branches import FALLBACKS, Branch, Rank, node
 from alula.repair.composing import Sources
@@ -46,7 +45,7 @@ class Patterns:
         self._purposes = Purposes(subject.skillsets, subject.brought, subject.robot.robots)
         self._using = frozenset(using)
         self._trees = subject.files.trees
-        sources = Sources(subject.files, palette_of(subject.files, subject.skillsets, subject.part), subject.vocabulary())
+        sources = Sources(subject.files, subject.mission.palette, subject.vocabulary())
         self._stand_ins = StandIns(subject, self._purposes, sources, self._using)
         self._remedies = Remedies(subject, self._purposes, sources, Courses(self._purposes, self._using), most_faults + 1)
 

@@ -16,7 +16,6 @@ from itertools import islice
 from pathlib import Path
 
 from alula.language.errors import Severity
-from alula.missions.palette import palette_of
 from alula.model.expressions import And, Expression, ResourceIs, atoms
 from alula.model.model import Skillset
 from alula.prove.limits import Deadline, OutOfTimeError
@@ -115,8 +114,7 @@ class Planner:
         if self._wanted is not None:
             _check_names("--goal", aim.goal, self._wanted[1], self._subject.skillsets)
         self._courses = Courses(self._purposes, aim.using)
-        palette = palette_of(self._subject.files, self._subject.skillsets, self._subject.part)
-        sources = Sources(self._subject.files, palette, self._subject.vocabulary(), asks=True)
+        sources = Sources(self._subject.files, self._subject.mission.palette, self._subject.vocabulary(), asks=True)
         self._composer = Composer(sources, self._courses)
 
     def stop(self) -> None:
@@ -342,7 +340,8 @@ def _begun_in(subject: Subject, states: States) -> Subject:
         return replace(of, resources=several)
 
     skillsets = tuple(map(begun, subject.skillsets))
-    return replace(subject, skillsets=skillsets, at_first=frozenset(one for one in subject.at_first if one[0] not in states))
+    at_first = frozenset(one for one in subject.at_first if one[0] not in states)
+    return replace(subject, mission=subject.mission.with_models(skillsets), at_first=at_first)
 
 
 def _ports(top: Element) -> list[str]:

@@ -175,7 +175,7 @@ class Search:
         if errors:
             raise RepairError(f"the mission has errors, which come first: {errors[0].render()}")
         self._can_be_asked()
-        system = System.read(self._subject.tree(self._subject.path), self._subject.skillsets, self._subject.part)
+        system = System.of(self._subject.mission)
         finding = self._finding(before)
         failing = self._failing(system, finding)
         fault = (self._question.fault,) if self._question.fault else ()

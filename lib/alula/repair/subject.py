@@ -18,6 +18,7 @@ from alula.common.robots import RobotFolder, find_robot
 from alula.common.scenarios import Scenario
 from alula.language.errors import Diagnostic
 from alula.language.messages import Messages, messages_of
+from alula.missions.mission_file import MissionFile
 from alula.missions.part import MissionPart
 from alula.missions.scenario import by_mission, flown
 from alula.model.model import Skillset
@@ -31,7 +32,6 @@ from alula.records.models import members
 from alula.repair.errors import RepairError
 from alula.repair.naming import Vocabulary
 from alula.trees.document import Document, Element, parse_document, read_source
-from alula.trees.library import Library
 from alula.trees.reading import TreeFiles, node_name
 from alula.trees.source import TreeSource
 
@@ -47,7 +47,7 @@ class Subject:
 
     Attributes:
         flown_as: the mission's file that a scenario has inputs for: this one, else one with a main tree of the same name; else this one.
-        library: that of this scenario.
+        mission: what was read, with the library of this scenario.
         faults: what each fault of the robot brings about.
         brought: by a skill, the states that its success brings about in the functional layer.
         at_first: the states that come by themselves after power-up.
@@ -56,11 +56,8 @@ class Subject:
     path: Path
     flown_as: Path
     source: bytes
-    library: Library
-    files: TreeFiles
+    mission: MissionFile
     robot: RobotFolder
-    skillsets: tuple[Skillset, ...]
-    part: MissionPart
     messages: Messages
     faults: Mapping[str, FaultEffects]
     brought: Brought
@@ -77,12 +74,27 @@ class Subject:
         source = read_source(path)
         flown_as, scenario = _flown_as(path, parse_document(source, str(path)).root)
         tree = TreeSource(path) if scenario is None else flown(path, scenario)
-        part, messages = part_of(robot, tell), messages_of(robot)
-        return cls(path, flown_as, source, tree.library, tree.read(), robot, models, part, messages, faults, *brought_about(robot, models))
+        mission, messages = MissionFile.read(tree, models, part_of(robot, tell)), messages_of(robot)
+        return cls(path, flown_as, source, mission, robot, messages, faults, *brought_about(robot, models))
 
-    def tree(self, path: Path) -> TreeSource:
-        """Return where the mission, or a copy of it with changes, is read from."""
-        return TreeSource(path, self.library)
+    @property
+    def files(self) -> TreeFiles:
+        """The mission's trees."""
+        return self.mission.files
+
+    @property
+    def skillsets(self) -> tuple[Skillset, ...]:
+        """The robot's models."""
+        return self.mission.skillsets
+
+    @property
+    def part(self) -> MissionPart:
+        """What the robot adds to missions."""
+        return self.mission.part
+
+    def changed(self, path: Path) -> MissionFile:
+        """Read a copy of the mission with changes; raises FileError."""
+        return MissionFile.read(TreeSource(path, self.mission.source.library), self.skillsets, self.part)
 
     @property
     def shown(self) -> Mapping[str, frozenset[str]]:
@@ -100,7 +112,7 @@ class Subject:
 
     def findings(self, text: str) -> list[Diagnostic]:
         """Return what `check` finds in another text of the file without looking at its runs."""
-        return findings_of(str(self.path), text.encode(), self.skillsets, (), self.part, self.messages, self.library)
+        return findings_of(str(self.path), text.encode(), self.skillsets, (), self.part, self.messages, self.mission.source.library)
 
     @contextmanager
     def copy(self, text: str) -> Iterator[Path]:

@@ -9,7 +9,7 @@ from pathlib import Path
 from alula.trees.errors import Report, refuse
 from alula.trees.library import Library
 from alula.trees.palette import NodeType
-from alula.trees.reading import TreeFiles, read_files
+from alula.trees.reading import TreeFiles, read_files, read_text
 
 
 @dataclass(frozen=True)
@@ -30,11 +30,11 @@ class TreeSource:
     enums: Mapping[str, float] = field(default_factory=dict)
     types: Sequence[NodeType] = ()
 
-    def read(self, report: Report = refuse, *, whole: bool = True) -> TreeFiles:
-        """Read it, as `read_files` does; what other files declare of nodes is there as if it stood in its own."""
-        files = read_files(self.path, report, main=self.main, library=self.library, whole=whole)
-        files.models = {**{one.name: one for one in self.types}, **files.models}
-        return files
+    def read(self, report: Report = refuse, *, whole: bool = True, text: str | bytes | None = None) -> TreeFiles:
+        """Read it, as `read_files` does; ``text`` is what its file will have."""
+        if text is not None:
+            return read_text(text, str(self.path), report, main=self.main, library=self.library, whole=whole)
+        return read_files(self.path, report, main=self.main, library=self.library, whole=whole)
 
 
 def source_of(mission: Path | TreeSource) -> TreeSource:

@@ -11,10 +11,10 @@ from adopt_folders import DOOR, MAIN, folder_of, made, mains_of, tree
 
 from alula import Mission, Outcome, Severity, check_files
 from alula.adopt.robot import robot_from_trees
-from alula.check.mission import palette_for
 from alula.cli import check, generate, new, odds, palette, run
 from alula.generate.scaffold.skeleton import write
 from alula.language.load import load_robot
+from alula.missions.palette import palette_of
 from alula.missions.part import NO_PART
 from alula.model.model import ResultKind
 from alula.trees.answers import Answers, Step, StepClock, scripted_tree, ticks
@@ -87,7 +87,7 @@ def test_the_mission_ticks_as_the_tree_does(tmp_path):
     before = mains_of(tmp_path / "trees")[0]
     after = read_files(robot / "missions/deliver.xml")
     entries = yaml.safe_load((robot / "worlds/deliver.yaml").read_text())
-    known = palette_for(after, [skillset_of(robot)], (), NO_PART)
+    known = palette_of(after, [skillset_of(robot)], NO_PART)
 
     def told(files, types, decorator, seed):
         answers = Answers({"*": [Step(None)]}, entries=entries, stand_ins={decorator: "pass-through"}, seed=seed)

@@ -8,7 +8,7 @@ from alula.api.checking import checked_files, prove_files
 from alula.check.findings import findings_of
 from alula.language.errors import Severity
 from alula.language.models import ModelFile, check_texts
-from alula.missions.mission_file import plan_of_file
+from alula.missions.mission_file import MissionFile, plan_of_file
 from alula.missions.part import NO_PART, MissionPart
 from alula.missions.plan import InputError
 from alula.prove.mission.prover import prove_mission
@@ -112,7 +112,7 @@ def test_proofs_take_it_for_a_node_that_may_do_anything(robot, tmp_path):
     path = tmp_path / "m.xml"
     body = '<Fallback><Sequence><Grip force="1"/><ScriptCondition code="held == 1"/></Sequence><drone.hover duration="2"/></Fallback>'
     path.write_text(FILE.format(body, GRIP))
-    proved = prove_mission(path, robot, NO_PART, timeout_s=60)
+    proved = prove_mission(MissionFile.read(path, robot, NO_PART), timeout_s=60)
     codes = [one.code for one in (*proved.findings, *proved.accepted)]
     assert "ALU711" not in codes
     assert not [one for one in proved.findings if "never ticked" in one.message]
@@ -156,5 +156,5 @@ def test_the_time_of_a_search_bounds_a_tick_of_many_leaves_that_may_answer_anyth
     text = f'<root BTCPP_format="4" main_tree_to_execute="Main">{body}{models}</root>'
     path = tmp_path / "tree.xml"
     path.write_text(text)
-    proved = prove_mission(path, (), NO_PART, timeout_s=1.0)
+    proved = prove_mission(MissionFile.read(path, (), NO_PART), timeout_s=1.0)
     assert "ALU710" in {one.code for one in proved.findings}

@@ -12,6 +12,7 @@ from alula.cli.run import main as run
 from alula.common.robots import load_robot_folder, meaning
 from alula.common.scenarios import ScenarioError, load_scenario
 from alula.language.load import load_skillset
+from alula.missions.mission_file import MissionFile
 from alula.missions.part import NO_PART
 from alula.odds.robot import graph_of
 from alula.prove.mission.system import System
@@ -134,5 +135,5 @@ def test_a_library_of_one_mission_is_none_of_others(robot):
 
 def test_the_search_reads_a_file_without_anything_else(robot):
     (robot / "missions/outing.xml").write_text(OUTING.format(' library="../trees"'))
-    system = System.read(robot / "missions/outing.xml", [load_skillset(robot / "skillsets/door.skill")], part=NO_PART)
+    system = System.of(MissionFile.read(robot / "missions/outing.xml", [load_skillset(robot / "skillsets/door.skill")], NO_PART))
     assert [leaf.name for leaf in system.leaves] == ["open it"]

@@ -14,7 +14,7 @@ TEXT = """<root BTCPP_format="4"><BehaviorTree ID="M">
 def test_a_check_knows_enumerators():
     (told,) = findings_of("m.xml", TEXT.encode(), (), of_others=True)
     assert "`LEADER` is read, and nothing before writes it" in told.message
-    assert findings_of("m.xml", TEXT.encode(), (), of_others=True, enums=["LEADER"]) == []
+    assert findings_of("m.xml", TEXT.encode(), (), of_others=True, enums={"LEADER": 0}) == []
 
 
 def test_a_tick_knows_enumerators(tmp_path, capsys):

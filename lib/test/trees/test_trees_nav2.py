@@ -6,7 +6,7 @@ import pytest
 
 pytest.importorskip("py_trees")
 
-from alula.api.checking import checked_files, prove_files
+from alula.api.checking import check_files, checked_files, prove_files
 from alula.check.findings import findings_of
 from alula.cli.options.models import NAV2_RELEASES
 from alula.cli.palette import main
@@ -272,3 +272,13 @@ def test_a_palette_of_a_release_refuses_what_it_has_not(tmp_path, capsys):
     for words in ([], ["--nav2", "humble", "trees"], ["--nav2", "humble", "--guess"]):
         assert main(words) == 2
         assert "takes a FOLDER of a robot's models or of trees, or --nav2 RELEASE by itself" in capsys.readouterr().err
+
+
+def test_a_node_of_nav2_that_a_palette_declares_is_proved_as_one_without_a_class(tmp_path, monkeypatch):
+    (tmp_path / "palette.xml").write_text(
+        '<root BTCPP_format="4"><TreeNodesModel><Action ID="Spin"><input_port name="spin_dist"/></Action></TreeNodesModel></root>'
+    )
+    (tmp_path / "m.xml").write_text('<root BTCPP_format="4"><BehaviorTree ID="a"><Spin spin_dist="1.57"/></BehaviorTree></root>')
+    monkeypatch.chdir(tmp_path)
+    found = check_files("m.xml", palettes=["palette.xml"])
+    assert [(one.code, one.message.split(":")[0]) for one in found] == [("ALU715", "'Spin' may answer and write anything")]

@@ -37,7 +37,6 @@ from alula.runtime.client import Client
 from alula.runtime.core.execution import Execution
 from alula.runtime.handle import SkillHandle
 from alula.runtime.local import LocalManagers, LocalWorld
-from alula.trees.source import TreeSource
 
 FLIPPED = {"<": ">", "<=": ">=", ">": "<", ">=": "<=", "==": "=="}
 STEP_S = 0.01
@@ -60,9 +59,9 @@ class Played:
     facts: Mapping[str, object]
 
 
-def play(mission: Path | TreeSource, run: MissionRun, part: MissionPart, out: Path | None = None) -> Played:
-    """Fly a run of a mission's file; with ``out`` the mission is recorded there, as one over mocks."""
-    player = _Player(mission, run, part, out)
+def play(mission: MissionFile, run: MissionRun, out: Path | None = None) -> Played:
+    """Fly a run of a mission; with ``out`` the mission is recorded there, as one over mocks."""
+    player = _Player(mission, run, out)
     left = ""
     try:
         for number, event in enumerate(run.events, 1):
@@ -120,7 +119,7 @@ class _Told(MissionClient):
 
 
 class _Player:
-    def __init__(self, mission: Path | TreeSource, run: MissionRun, part: MissionPart, out: Path | None) -> None:
+    def __init__(self, mission: MissionFile, run: MissionRun, out: Path | None) -> None:
         self._run = run
         self._held: dict[str, Callable[[], None]] = {}
         self._running: dict[str, Execution] = {}
@@ -136,10 +135,10 @@ class _Player:
         self._data = {one.skillset.name: one.data for one in playables}
         self._served = {one.skillset.name: one.skillset for one in playables}
         self.world = LocalWorld(self._served.values(), self._functions)
-        file = MissionFile.read(mission, run.skillsets, part)
+        file = mission.with_models(run.skillsets)
         uses = uses_of(file)
-        own = own_nodes(Robot(self._oracle, uses=uses), part, file.nowhere_made, run.why_any_order)
-        nodes = MissionPart(own.part.nodes, memory=part.memory)
+        own = own_nodes(Robot(self._oracle, uses=uses), file.part, file.nowhere_made, run.why_any_order)
+        nodes = MissionPart(own.part.nodes, memory=file.part.memory)
         plan = file.with_models(run.skillsets, nodes).plan(file.source.path.stem, any_inputs(file, self._oracle, uses))
         plan = replace(plan, inputs={})
         self._facts = plan.facts

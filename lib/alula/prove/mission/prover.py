@@ -9,9 +9,7 @@ from pathlib import Path
 
 from alula.language.errors import Diagnostic, Severity
 from alula.missions.mission_file import MissionFile
-from alula.missions.part import MissionPart
 from alula.missions.plan import InputError
-from alula.model.model import Skillset
 from alula.model.span import Span
 from alula.prove.limits import Deadline, OutOfTimeError
 from alula.prove.mission.accepted import acceptances, divided
@@ -26,7 +24,6 @@ from alula.prove.mission.regions import Regions
 from alula.prove.mission.system import System, look_at
 from alula.prove.mission.waits import Waits
 from alula.prove.mission.wanted import wanted
-from alula.trees.source import TreeSource
 
 LOOKED_AT = Failures(hooks=False, aborts=False)
 """What the models say can fail, and functions that refuse inputs."""
@@ -55,9 +52,7 @@ class Proved:
 
 
 def prove_mission(
-    mission: Path | TreeSource,
-    models: Sequence[Skillset],
-    part: MissionPart,
+    mission: MissionFile,
     *,
     faults: Faults = NO_FAULTS,
     timeout_s: float = 30.0,
@@ -69,7 +64,7 @@ def prove_mission(
     ``faults`` says in which states faults show, for properties that name them. ``tell`` hears now and then how far a long search is.
     Ctrl-C ends the search as the end of the time does: what was found by then is returned.
     """
-    search = _Search(mission, models, part, faults)
+    search = _Search(mission, faults)
     seen = search.within(Deadline.after(timeout_s, tell), f"{timeout_s:.3g} s")
     share_s = timeout_s * SHARE
     return search.also(seen, Deadline.after(share_s, tell), f"{share_s:.3g} s").proved()
@@ -77,9 +72,7 @@ def prove_mission(
 
 def prove_within(
     deadline: Deadline,
-    mission: Path | TreeSource,
-    models: Sequence[Skillset],
-    part: MissionPart,
+    mission: MissionFile,
     *,
     faults: Faults = NO_FAULTS,
     given: str,
@@ -89,7 +82,7 @@ def prove_within(
 
     ``also`` has runs looked at, too, in which hooks raise, processes die or people interfere, as ``prove_mission`` does.
     """
-    search = _Search(mission, models, part, faults)
+    search = _Search(mission, faults)
     seen = search.within(deadline, given)
     return (search.also(seen, deadline, given) if also else seen).proved()
 
@@ -117,10 +110,9 @@ class _Seen:
 class _Search:
     """Looks at the runs of one mission."""
 
-    def __init__(self, mission: Path | TreeSource, models: Sequence[Skillset], part: MissionPart, faults: Faults) -> None:
-        file = MissionFile.read(mission, models, part)
-        self._file = file.with_models(with_asked_resources(file, faults))
-        self._path = file.source.path
+    def __init__(self, mission: MissionFile, faults: Faults) -> None:
+        self._file = mission.with_models(with_asked_resources(mission, faults))
+        self._path = mission.source.path
         self._faults = faults
 
     def _read(self, why: str) -> System:
@@ -152,7 +144,7 @@ class _Search:
         return _Seen(self._path, regions, tuple(found), tuple(answers.rows), bounds)
 
     def _regions(self, deadline: Deadline) -> tuple[Regions, bool]:
-        """Return what was looked at within a time, and whether a property needs some of that; raises as ``System.read``."""
+        """Return what was looked at within a time, and whether a property needs some of that; raises as ``System.of``."""
 
         def look(system: System) -> tuple[Regions, bool]:
             properties, _ = wanted(system.nodes, system.skillsets, self._faults)

@@ -1,6 +1,7 @@
 """The transition system of a mission: its tree, the managers of its skillsets, and what can fail.
 
-    system = System.read(Path("missions/mapping.xml"), models, part)       # models: the robot's skillsets, part: its MissionPart
+    file = MissionFile.read(Path("missions/mapping.xml"), models, part)    # models: the robot's skillsets, part: its MissionPart
+    system = System.of(file)
     state = system.initial()                                               # power-up; the mission waits for what it needs
     for event, after in system.steps(state):                               # every step, also those that only an unlucky robot takes
         ...
@@ -19,13 +20,11 @@ from __future__ import annotations
 
 import copy
 from collections.abc import Callable, Iterator, Mapping, Sequence
-from pathlib import Path
 from typing import TypeVar
 
 from alula.common.graphs import reachable_from
 from alula.missions.director import Director, Outcome
 from alula.missions.mission_file import READY, STOP_HERE, MissionFile, MissionTrees
-from alula.missions.part import MissionPart
 from alula.missions.plan import InputError, Inputs
 from alula.missions.skill_types import OUTCOME_PORT
 from alula.missions.world import states_of
@@ -50,7 +49,6 @@ from alula.prove.mission.uses import Uses
 from alula.trees.node import Node, Shared, pointer
 from alula.trees.palette import name_in_files
 from alula.trees.reading import TreeFiles, type_name
-from alula.trees.source import TreeSource
 from alula.trees.wiring import wire
 
 T = TypeVar("T")
@@ -77,20 +75,6 @@ class System:
         self._numbers: dict[Managers, int] = {}
         self._moves: dict[tuple[int, int], tuple[tuple[Event, int], ...]] = {}
         self._startable: dict[tuple[int, int], frozenset[str]] = {}
-
-    @classmethod
-    def read(
-        cls,
-        mission: Path | TreeSource,
-        models: Sequence[Skillset],
-        part: MissionPart,
-        failures: Failures = Failures(),  # noqa: B008 - a value
-        few: int = FEW,
-        known: Inputs | None = None,
-        why_any_order: str = "",
-    ) -> System:
-        """Read a mission's file; arguments and errors as of `of`, and FileError."""
-        return cls.of(MissionFile.read(mission, models, part), failures, few, known, why_any_order)
 
     @classmethod
     def of(
@@ -341,7 +325,7 @@ class _Starting:
 
 
 def look_at(read: Callable[[str], System], look: Callable[[System], T]) -> T:
-    """Return what ``look`` finds in a mission's system, which ``read`` gives: ``lambda why: System.read(..., why_any_order=why)``.
+    """Return what ``look`` finds in a mission's system, which ``read`` gives: ``lambda why: System.of(..., why_any_order=why)``.
 
     Where a class of the robot's own that was run needs what the search does not know, the system is read again, with all such classes
     taken as ones that may do anything. Raises UndecidedError where anything else needs it.

@@ -65,6 +65,6 @@ def test_a_mission_is_proved_beside_forty_resources_that_nothing_asks_for(tmp_pa
     with_them, without = (
         parse_skillset(f"skillset s {{{free} skill go {{ result {{ success DONE failure LOST }} }} }}") for free in (FREE, "")
     )
-    proved = [prove_mission(path, [model], NO_PART, timeout_s=1e6) for model in (with_them, without)]
+    proved = [prove_mission(MissionFile.read(path, [model], NO_PART), timeout_s=1e6) for model in (with_them, without)]
     assert all(one.complete for one in proved)
     assert [[one.code for one in each.findings] for each in proved] == [["ALU702"], ["ALU702"]]

@@ -13,6 +13,7 @@ from test_prove_mission_runs import robots
 
 from alula.check.mission import check_mission
 from alula.language.models import ModelFile, check_texts
+from alula.missions.mission_file import MissionFile
 from alula.missions.part import MissionPart
 from alula.prove.limits import Deadline
 from alula.prove.mission.regions import Regions
@@ -100,13 +101,13 @@ class Restless(Either):
 
 
 def checked(inside: str, node: type[Node]) -> list[tuple[str, str]]:
-    found = check_mission(Path("mission.xml"), whole(inside), MODELS, part=MissionPart((node,)))
+    found = check_mission(MissionFile.read(Path("mission.xml"), MODELS, MissionPart((node,)), text=whole(inside)))
     return [(one.code, one.message) for one in found]
 
 
 def memories(folder: Path, tag: str, *nodes: type[Node]) -> int:
     asks = f'<{tag}><ScriptCondition code="a == \'DONE\' &amp;&amp; false"/><Sleep msec="100"/></{tag}>'
-    system = System.read(written(folder, f"{ONCE}{asks}"), robots(), MissionPart(nodes), QUIET)
+    system = System.of(MissionFile.read(written(folder, f"{ONCE}{asks}"), robots(), MissionPart(nodes)), QUIET)
     regions = Regions(system, Deadline.after(1e6))
     regions.explore()
     return len(system.ticker.memories)

@@ -13,6 +13,7 @@ from test_prove_mission_runs import ROOT, everything, robots, shown
 
 from alula.check.robot import models_of, part_of
 from alula.common.robots import find_robot
+from alula.missions.mission_file import MissionFile
 from alula.missions.part import NO_PART
 from alula.prove.limits import Deadline
 from alula.prove.mission.ahead import Looking
@@ -123,7 +124,7 @@ def test_what_a_child_writes_that_may_not_be_ticked_is_remembered(
 
 
 def memories(folder: Path, inside: str) -> int:
-    regions = Regions(System.read(written(folder, inside), robots(), NO_PART, QUIET), Deadline.after(1e6))
+    regions = Regions(System.of(MissionFile.read(written(folder, inside), robots(), NO_PART), QUIET), Deadline.after(1e6))
     regions.explore()
     return len(regions.system.ticker.memories)
 
@@ -153,6 +154,6 @@ def test_what_was_halted_costs_a_sum_and_no_product(tmp_path: Path) -> None:
 def test_all_runs_of_a_mission_of_two_robots_are_looked_at() -> None:
     path = ROOT / "examples" / "two_robots" / "missions" / "meet.xml"
     robot = find_robot(path.parent)
-    proved = prove_mission(path, models_of(robot, print), part_of(robot, print), timeout_s=1e6)
+    proved = prove_mission(MissionFile.read(path, models_of(robot, print), part_of(robot, print)), timeout_s=1e6)
     assert proved.complete
     assert not proved.findings

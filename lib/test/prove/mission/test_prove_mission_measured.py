@@ -18,6 +18,7 @@ from alula.common.record import read_record
 from alula.language.models import ModelFile, check_texts
 from alula.missions.blackboard import Blackboard
 from alula.missions.director import Outcome
+from alula.missions.mission_file import MissionFile
 from alula.missions.part import NO_PART
 from alula.missions.pending import PendingInterrupts
 from alula.missions.world import World
@@ -54,7 +55,7 @@ def skillsets() -> tuple[Skillset, ...]:
 def proved(inside: str, folder: Path) -> tuple[Path, Proved]:
     path = folder / "mission.xml"
     path.write_text(whole(inside))
-    return path, prove_mission(path, skillsets(), NO_PART)
+    return path, prove_mission(MissionFile.read(path, skillsets(), NO_PART))
 
 
 WAITS = '<WaitFor name="full" if="rover.battery.level &gt; 0.8"/>'
@@ -69,7 +70,7 @@ def test_a_mission_that_waits_for_ever_while_the_battery_stays_low_is_told_and_p
     assert finding.message.endswith("for ever, though nothing fails any more: active('full'), rover.battery.level is <= 0.8")
     assert finding.run is not None
     (tmp_path / "run").mkdir()
-    played = play(path, finding.run, NO_PART, tmp_path / "run")
+    played = play(MissionFile.read(path, finding.run.skillsets, NO_PART), finding.run, tmp_path / "run")
     assert (played.left, played.end.outcome) == ("", Outcome.ABORTED)
     (measured,) = [entry.value for entry in read_record(tmp_path / "run") if entry.topic == DATA_TOPIC]
     assert measured["data"] == "battery"
@@ -119,7 +120,7 @@ def test_what_follows_from_data_plays_to_the_same_end(tmp_path: Path) -> None:
     (finding,) = [one for one in known.findings if isinstance(one, MissionFinding)]
     assert finding.code == "ALU714"
     assert finding.run is not None
-    played = play(path, finding.run, NO_PART)
+    played = play(MissionFile.read(path, finding.run.skillsets, NO_PART), finding.run)
     assert (played.left, played.end.outcome) == ("", Outcome.GIVEN_UP)
 
 
@@ -128,11 +129,12 @@ def test_a_play_without_the_data_leaves_the_counterexample(tmp_path: Path) -> No
     (finding,) = [one for one in known.findings if one.code == "ALU702"]
     assert isinstance(finding, MissionFinding)
     assert finding.run is not None
-    assert play(path, finding.run, NO_PART).left == ""
+    assert play(MissionFile.read(path, finding.run.skillsets, NO_PART), finding.run).left == ""
     events = tuple(
         one._replace(choices=tuple(choice for choice in one.choices if choice.question[0] != "data")) for one in finding.run.events
     )
-    assert "at step" in play(path, finding.run.__class__(events, *vars_of(finding)), NO_PART).left
+    other = finding.run.__class__(events, *vars_of(finding))
+    assert "at step" in play(MissionFile.read(path, other.skillsets, NO_PART), other).left
 
 
 def vars_of(finding: MissionFinding) -> tuple[str, tuple[tuple[str, str], ...], tuple[Skillset, ...]]:
@@ -148,7 +150,7 @@ def test_what_must_come_is_looked_at_while_data_stay_as_they_are(tmp_path: Path)
     finding = next(one for one in known.findings if one.code == "ALU714")
     assert isinstance(finding, MissionFinding)
     assert finding.run is not None
-    assert play(path, finding.run, NO_PART).left == ""
+    assert play(MissionFile.read(path, finding.run.skillsets, NO_PART), finding.run).left == ""
     _, known = proved(PROPERTY.format(f'<Timeout msec="5000">{WAITS}</Timeout>'), tmp_path)
     assert known.findings == []
 

@@ -15,7 +15,7 @@ from alula.campaign.plan import load_campaign
 from alula.common.robots import find_robot
 from alula.language.models import ModelFile, check_texts
 from alula.missions.director import Outcome
-from alula.missions.mission_file import plan_of_file
+from alula.missions.mission_file import MissionFile, plan_of_file
 from alula.missions.mocked import MockedMission
 from alula.missions.part import NO_PART, MissionPart
 from alula.mock import Behaviour
@@ -249,7 +249,7 @@ def test_waits_of_one_length_that_begin_at_once_are_over_at_once(before: str, eq
 def observed(folder: Path, text: str, skillset: Skillset, part: MissionPart) -> set[object]:
     """Return all that can be seen of a mission's situations, one looked at after another."""
     (folder / "seen.xml").write_text(text)
-    system = System.read(folder / "seen.xml", (skillset,), part, LOOKED_AT)
+    system = System.of(MissionFile.read(folder / "seen.xml", (skillset,), part), LOOKED_AT)
     first = system.initial()
     known, todo = {first}, [first]
     while todo:

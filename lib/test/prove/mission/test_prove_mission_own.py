@@ -18,6 +18,7 @@ from test_prove_mission_runs import flown, robots
 from alula import trees
 from alula.language.errors import Diagnostic, Severity
 from alula.language.models import ModelFile, check_texts
+from alula.missions.mission_file import MissionFile
 from alula.missions.part import NO_PART, MissionPart
 from alula.prove.limits import Deadline, OutOfTimeError
 from alula.prove.mission.managers import Failures
@@ -50,7 +51,7 @@ STILL = 'name="own" _description="property still: never r1.wheels == USED"'
 def found(folder: Path, text: str, part: MissionPart = PART) -> list[Diagnostic]:
     path = folder / "mission.xml"
     path.write_text(whole(text))
-    return prove_mission(path, (R1,), part).findings
+    return prove_mission(MissionFile.read(path, (R1,), part)).findings
 
 
 def codes(several: list[Diagnostic]) -> set[str]:
@@ -67,7 +68,7 @@ def test_a_property_is_held_against_what_is_below_a_node_of_the_robots_own(kind:
     assert against.run is not None
     assert "ALU711" not in codes(several)
     assert not any(one.code == "ALU703" and "r1.drive" in one.message for one in several)
-    assert not play(tmp_path / "mission.xml", against.run, PART).left
+    assert not play(MissionFile.read(tmp_path / "mission.xml", against.run.skillsets, PART), against.run).left
 
 
 @register("robot.Never")
@@ -199,7 +200,7 @@ def known_to(folder: Path, text: str, inputs: Mapping[str, object]) -> System:
     path = folder / "mission.xml"
     path.write_text(whole(text).replace("</root>", f'<TreeNodesModel><SubTree ID="mission">{names}</SubTree></TreeNodesModel></root>'))
     part = MissionPart((own_nodes.Place,))
-    return System.read(path, (eyes,), part, Failures(refusals=False, hooks=False, aborts=False), known=inputs)
+    return System.of(MissionFile.read(path, (eyes,), part), Failures(refusals=False, hooks=False, aborts=False), known=inputs)
 
 
 def answers(system: System) -> dict[str, set[str]]:
@@ -399,7 +400,7 @@ def searched(path: Path) -> Regions | None:
     """Return all runs of a mission, None where they are too many."""
     failures = Failures(hooks=False, refusals=False, aborts=False)
     for why in ("", "it needs what is not known"):
-        regions = Regions(System.read(path, robots(), PART, failures, why_any_order=why), Few.after(1e6))
+        regions = Regions(System.of(MissionFile.read(path, robots(), PART), failures, why_any_order=why), Few.after(1e6))
         try:
             regions.explore()
         except OutOfTimeError:

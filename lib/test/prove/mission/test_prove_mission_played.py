@@ -11,6 +11,7 @@ from alula.check.robot import models_of, part_of
 from alula.common.robots import find_robot
 from alula.language.models import ModelFile, check_texts
 from alula.missions.director import Outcome
+from alula.missions.mission_file import MissionFile
 from alula.missions.part import NO_PART
 from alula.prove.limits import Deadline, OutOfTimeError
 from alula.prove.mission.answers import Answers
@@ -45,7 +46,7 @@ def found(folder: Path, code: str) -> tuple[Path, list[MissionFinding]]:
     (robot,) = check_texts([ModelFile("robot.rl", ROBOT)])
     path = folder / "example.xml"
     path.write_text(whole(EXAMPLES[code].broken))
-    findings = prove_mission(path, robot.skillsets, NO_PART).findings
+    findings = prove_mission(MissionFile.read(path, robot.skillsets, NO_PART)).findings
     return path, [one for one in findings if isinstance(one, MissionFinding) and one.run is not None]
 
 
@@ -55,7 +56,7 @@ def test_the_examples_play_to_their_end(code: str, tmp_path: Path) -> None:
     assert findings
     for finding in findings:
         assert finding.run is not None
-        played = play(path, finding.run, NO_PART)
+        played = play(MissionFile.read(path, finding.run.skillsets, NO_PART), finding.run)
         goes_on = code in {"ALU704", "ALU714"}
         assert finding.run.outcome == ("running" if goes_on else "given_up")
         assert (played.left, played.end.outcome) == ("", Outcome.ABORTED if goes_on else Outcome.GIVEN_UP)
@@ -71,14 +72,14 @@ def test_each_end_that_leaves_something_taken_is_told_and_plays(tmp_path: Path) 
     path = tmp_path / "example.xml"
     inside = "<Sequence><drone.lift/><drone.climb/></Sequence><drone.land/>"
     path.write_text(whole(f"<Fallback>{inside}</Fallback>"))
-    found = [one for one in prove_mission(path, robot.skillsets, NO_PART).findings if one.code == "ALU701"]
+    found = [one for one in prove_mission(MissionFile.read(path, robot.skillsets, NO_PART)).findings if one.code == "ALU701"]
     assert [one.message.partition(": left by ")[2] for one in found] == ["drone.lift as ours", "drone.climb as ours"]
     for one in found:
         assert isinstance(one, MissionFinding)
         assert one.run is not None
-        assert play(path, one.run, NO_PART).left == ""
+        assert play(MissionFile.read(path, one.run.skillsets, NO_PART), one.run).left == ""
     path.write_text(whole(f'<Fallback _description="accepted ALU701 (left by drone.lift as ours): so it is">{inside}</Fallback>'))
-    proved = prove_mission(path, robot.skillsets, NO_PART)
+    proved = prove_mission(MissionFile.read(path, robot.skillsets, NO_PART))
     assert [one.message[-19:] for one in proved.findings if one.code == "ALU701"] == ["drone.climb as ours"]
     assert len(proved.accepted) == 1
 
@@ -113,7 +114,7 @@ def test_data_that_break_an_invariant_or_refuse_are_played(tmp_path: Path) -> No
     assert not [one for one in robot.findings if one.code.startswith("ALU0")]
     path = tmp_path / "mission.xml"
     path.write_text(whole(TELLING))
-    system = System.read(path, robot.skillsets, NO_PART, LOOKED_AT)
+    system = System.of(MissionFile.read(path, robot.skillsets, NO_PART), LOOKED_AT)
     regions = Regions(system, Deadline.after(60.0))
     regions.explore()
     rows = {(row.skill, row.end): row for row in Answers(regions).rows}
@@ -123,7 +124,8 @@ def test_data_that_break_an_invariant_or_refuse_are_played(tmp_path: Path) -> No
         outcome = system.outcome(state)
         assert outcome is not None
         kinds |= {event.kind for event in events}
-        played = play(path, MissionRun(tuple(events), outcome.value, (("rover.wheels", "FREE"),), system.skillsets), NO_PART)
+        run = MissionRun(tuple(events), outcome.value, (("rover.wheels", "FREE"),), system.skillsets)
+        played = play(MissionFile.read(path, run.skillsets, NO_PART), run)
         assert (played.left, played.end.outcome) == ("", Outcome.GIVEN_UP)
     assert {Kind.REFUSE, Kind.BREAK} <= kinds
 
@@ -132,18 +134,20 @@ def test_a_run_that_does_not_happen_is_left_where_it_does_not(tmp_path: Path) ->
     path, (finding, *_) = found(tmp_path, "ALU701")
     assert finding.run is not None
     events = tuple(one for one in finding.run.events if not one.changes or one.name != "control")
-    played = play(path, replace(finding.run, events=events), NO_PART)
+    played = play(MissionFile.read(path, finding.run.skillsets, NO_PART), replace(finding.run, events=events))
     assert "at step" in played.left
 
 
 def test_the_axes_that_listing_3_keeps_are_kept_in_a_flight(tmp_path: Path) -> None:
     robot, path = find_robot(ROOT), ROOT / "missions" / "mapping.xml"
     part, models = part_of(robot, print), models_of(robot, print)
-    (finding,) = prove_within(Few.after(1e6), path, models, part, faults=states_of_faults(models, print), given="this test").accepted
+    (finding,) = prove_within(
+        Few.after(1e6), MissionFile.read(path, models, part), faults=states_of_faults(models, print), given="this test"
+    ).accepted
     assert isinstance(finding, MissionFinding)
     assert finding.run is not None
     assert ("navigation.axes_authority", "USED") in finding.run.states
-    played = play(path, finding.run, part, tmp_path)
+    played = play(MissionFile.read(path, finding.run.skillsets, part), finding.run, tmp_path)
     assert (played.left, played.end.outcome) == ("", Outcome.GIVEN_UP)
     assert (tmp_path / "skills.mcap").is_file()
 
@@ -164,13 +168,13 @@ def test_what_models_say_nothing_of_is_looked_at_and_plays(text: str, node: str,
     (robot,) = check_texts([ModelFile("robot.rl", ROBOT)])
     path = tmp_path / "mission.xml"
     path.write_text(text)
-    (finding,) = (one for one in prove_mission(path, robot.skillsets, NO_PART).findings if one.code == "ALU704")
+    (finding,) = (one for one in prove_mission(MissionFile.read(path, robot.skillsets, NO_PART)).findings if one.code == "ALU704")
     assert f"waits in '{node}' for ever" in finding.message
     assert isinstance(finding, MissionFinding)
     assert finding.run is not None
     assert kind in {event.kind for event in finding.run.events}
-    assert play(path, finding.run, NO_PART).left == ""
-    known = prove_within(Deadline.after(60.0), path, robot.skillsets, NO_PART, given="this test").findings
+    assert play(MissionFile.read(path, finding.run.skillsets, NO_PART), finding.run).left == ""
+    known = prove_within(Deadline.after(60.0), MissionFile.read(path, robot.skillsets, NO_PART), given="this test").findings
     assert "ALU704" not in {one.code for one in known}
 
 
@@ -181,4 +185,4 @@ def test_a_script_may_ask_for_what_was_left_wherever_the_mission_may_be_paused(t
     (robot,) = check_texts([ModelFile("robot.rl", ROBOT)])
     path = tmp_path / "mission.xml"
     path.write_text(whole(f"<Fallback><Sequence>{LEFT}</Sequence><drone.land/></Fallback>"))
-    assert prove_mission(path, robot.skillsets, NO_PART).complete
+    assert prove_mission(MissionFile.read(path, robot.skillsets, NO_PART)).complete

@@ -13,6 +13,7 @@ pytest.importorskip("z3")
 
 from test_prove_mission_runs import PART, PICKED, robots, tree, with_visit
 
+from alula.missions.mission_file import MissionFile
 from alula.prove.mission.managers import Failures
 from alula.prove.mission.play import LeftError, _Player
 from alula.prove.mission.run import run_of
@@ -135,11 +136,11 @@ def test_what_is_reached_in_a_few_steps_is_reached_by_the_engine(seed: int, fail
     path = mission(chance, tmp_path)
     if failures.aborts and seed % 2:
         path.write_text(path.read_text().replace("</root>", f"{STOP}</root>"))
-    system = System.read(path, robots(), PART, failures, few=EXACT)
+    system = System.of(MissionFile.read(path, robots(), PART), failures, few=EXACT)
     several = [run for run in ways(system, STEPS) if possible(run)]
     compared: set[State] = set()
     for run in chance.sample(several, min(MOST, len(several))):
-        player = _Player(path, run_of(system, [event for event, _ in run], run[-1][1]), PART, None)
+        player = _Player(MissionFile.read(path, robots(), PART), run_of(system, [event for event, _ in run], run[-1][1]), None)
         for number, (event, state) in enumerate(run, 1):
             found = taken(player, event, system, state)
             assert not found, f"{found}: {[one for one, _ in run[:number]]}"

@@ -23,7 +23,7 @@ from alula.language.codes import RUN_CODES
 from alula.language.load import parse_skillset
 from alula.language.models import ModelFile, check_texts
 from alula.missions.driver import MissionDriver
-from alula.missions.mission_file import plan_of_file
+from alula.missions.mission_file import MissionFile, plan_of_file
 from alula.missions.part import NO_PART, MissionPart
 from alula.missions.skillset import MissionClient
 from alula.model.model import Skillset
@@ -172,7 +172,7 @@ def test_what_a_robots_own_node_writes_may_be_any_text(tmp_path: Path) -> None:
       </Fallback>
     </Sequence>"""
     path.write_text(with_visit(inside))
-    regions = Regions(System.read(path, robots(), PART, Failures(hooks=False)), Deadline.after(100.0))
+    regions = Regions(System.of(MissionFile.read(path, robots(), PART), Failures(hooks=False)), Deadline.after(100.0))
     regions.explore()
     ticked = {number for region in regions.regions for _, one in region.next for way, _ in one.ways for number, _ in way.touched}
     assert [node.name for number, node in enumerate(regions.system.nodes) if number not in ticked] == []
@@ -182,14 +182,14 @@ def test_a_tree_that_an_unknown_value_may_break_is_told(tmp_path: Path) -> None:
     path = tmp_path / "mission.xml"
     inside = '<Sequence><robot.Pick text="{who}" thing="{thing}"/><Script code="tries := thing + 1"/><drone.hover/></Sequence>'
     path.write_text(whole(inside))
-    (finding,) = prove_mission(path, robots(), PART).findings
+    (finding,) = prove_mission(MissionFile.read(path, robots(), PART)).findings
     assert finding.code == "ALU711"
 
 
 def test_a_bound_is_never_silent(tmp_path: Path) -> None:
     path = tmp_path / "mission.xml"
     path.write_text(whole(EXAMPLES["ALU703"].mended))
-    proved = prove_mission(path, robots(), NO_PART, timeout_s=0.0)
+    proved = prove_mission(MissionFile.read(path, robots(), NO_PART), timeout_s=0.0)
     assert not proved.complete
     assert [finding.code for finding in proved.findings] == ["ALU710"]
 
@@ -201,7 +201,7 @@ def test_a_skillset_with_many_free_resources_is_bounded_too(tmp_path: Path) -> N
     models = [parse_skillset(f"skillset s {{{free} skill go {{ precondition {{ p: resource = ({asked}) }} result {{ success DONE }} }} }}")]
     path = tmp_path / "mission.xml"
     path.write_text('<root BTCPP_format="4"><BehaviorTree ID="m"><s.go/></BehaviorTree></root>')
-    proved = prove_mission(path, models, NO_PART, timeout_s=0.0)
+    proved = prove_mission(MissionFile.read(path, models, NO_PART), timeout_s=0.0)
     assert not proved.complete
     assert [finding.code for finding in proved.findings] == ["ALU710"]
 
@@ -222,15 +222,20 @@ def drones(name: str, deadline: Deadline) -> Proved:
     robot = find_robot(ROOT)
     models = models_of(robot, print)
     path = ROOT / "missions" / f"{name}.xml"
-    return prove_within(deadline, path, models, part_of(robot, print), faults=states_of_faults(models, print), given="this test")
+    return prove_within(
+        deadline, MissionFile.read(path, models, part_of(robot, print)), faults=states_of_faults(models, print), given="this test"
+    )
 
 
 def test_within_a_deadline_an_abort_is_looked_at_where_that_is_asked(tmp_path: Path) -> None:
     path = tmp_path / "mission.xml"
     path.write_text(whole('<Sequence name="all" _description="property kept: never outcome aborted;"><drone.hover/></Sequence>'))
-    told = {also: prove_within(Deadline.after(1e6), path, robots(), PART, given="this test", also=also) for also in (False, True)}
+    told = {
+        also: prove_within(Deadline.after(1e6), MissionFile.read(path, robots(), PART), given="this test", also=also)
+        for also in (False, True)
+    }
     assert {also: [one.code for one in proved.findings] for also, proved in told.items()} == {False: ["ALU702"], True: ["ALU702", "ALU714"]}
-    assert [one.code for one in prove_mission(path, robots(), PART).findings] == ["ALU702", "ALU714"]
+    assert [one.code for one in prove_mission(MissionFile.read(path, robots(), PART)).findings] == ["ALU702", "ALU714"]
 
 
 def test_what_was_found_before_the_bound_is_told() -> None:
@@ -324,7 +329,7 @@ def reached(system: System, most: int) -> set[State] | None:
 def test_regions_are_exactly_what_is_reached_step_by_step(seed: int, tmp_path: Path) -> None:
     chance = random.Random(seed)  # noqa: S311 - for tests
     failures = Failures(hooks=chance.random() < 0.5, aborts=False, deaths=chance.random() < 0.3)
-    system = System.read(mission(chance, tmp_path, 1 + seed % 2), robots(), PART, failures)
+    system = System.of(MissionFile.read(mission(chance, tmp_path, 1 + seed % 2), robots(), PART), failures)
     one_by_one = reached(system, 30_000)
     if one_by_one is None:
         pytest.skip("too many situations to look at one by one")
@@ -337,7 +342,7 @@ def test_regions_are_exactly_what_is_reached_step_by_step(seed: int, tmp_path: P
 @pytest.mark.parametrize("seed", range(12))
 def test_a_mission_does_not_end_while_a_skill_runs(seed: int, tmp_path: Path) -> None:
     """So no finding is about that: the engine waits for what it has interrupted."""
-    system = System.read(mission(random.Random(seed), tmp_path, 1), robots(), PART, Failures(hooks=False, aborts=False))  # noqa: S311 - for tests
+    system = System.of(MissionFile.read(mission(random.Random(seed), tmp_path, 1), robots(), PART), Failures(hooks=False, aborts=False))  # noqa: S311 - for tests
     regions = Regions(system, Deadline.after(100.0))
     regions.explore()
     ends = [one for one in regions.regions if system.ticker.memories[one.memory].end is not None]
@@ -349,7 +354,7 @@ def test_a_mission_does_not_end_while_a_skill_runs(seed: int, tmp_path: Path) ->
 
 @pytest.mark.parametrize("seed", range(12))
 def test_a_run_of_a_region_is_a_run_step_by_step(seed: int, tmp_path: Path) -> None:
-    system = System.read(mission(random.Random(seed), tmp_path, 1), robots(), PART, Failures(hooks=False, aborts=False))  # noqa: S311 - for tests
+    system = System.of(MissionFile.read(mission(random.Random(seed), tmp_path, 1), robots(), PART), Failures(hooks=False, aborts=False))  # noqa: S311 - for tests
     regions = Regions(system, Deadline.after(100.0))
     regions.explore()
     for number, region in enumerate(regions.regions):
@@ -393,7 +398,7 @@ def everything(looking: Looking, *_: object, **__: object) -> Ahead:
 
 def shown(path: Path, failures: Failures) -> tuple[set[tuple[object, ...]], set[str]] | None:
     """Return what can be seen of all runs: the nodes that run, the resources, what runs, the outcome; and the findings' messages."""
-    regions = Regions(System.read(path, robots(), PART, failures), Deadline.after(1e6))
+    regions = Regions(System.of(MissionFile.read(path, robots(), PART), failures), Deadline.after(1e6))
     regions._deadline = Many.after(1e6)
     try:
         regions.explore()
@@ -465,7 +470,9 @@ def test_what_is_forgotten_is_what_nothing_tells_apart(seed: int, tmp_path: Path
 def test_what_is_asked_long_afterwards_is_remembered(inside: str, tmp_path: Path) -> None:
     path = tmp_path / "mission.xml"
     path.write_text(whole(f"<Sequence><Script code=\"last := ''\"/>{inside}</Sequence>"))
-    regions = Regions(System.read(path, robots(), PART, Failures(hooks=False, refusals=False, aborts=False)), Deadline.after(1e6))
+    regions = Regions(
+        System.of(MissionFile.read(path, robots(), PART), Failures(hooks=False, refusals=False, aborts=False)), Deadline.after(1e6)
+    )
     regions.explore()
     assert "there" in ticked_in(regions)
 
@@ -481,7 +488,9 @@ def test_an_entry_that_a_subtree_reads_by_the_default_of_its_port_is_remembered(
     <TreeNodesModel><SubTree ID="inner"><input_port name="mine" default="{last}"/></SubTree></TreeNodesModel>"""
     outer = """<Sequence><Script code="last := 'x'"/><Sleep msec="100"/><SubTree ID="inner"/></Sequence>"""
     path.write_text(whole(outer).replace("<root", '<root main_tree_to_execute="mission"').replace("</root>", f"{inner}</root>"))
-    regions = Regions(System.read(path, robots(), PART, Failures(hooks=False, refusals=False, aborts=False)), Deadline.after(1e6))
+    regions = Regions(
+        System.of(MissionFile.read(path, robots(), PART), Failures(hooks=False, refusals=False, aborts=False)), Deadline.after(1e6)
+    )
     regions.explore()
     assert "there" in ticked_in(regions)
 
@@ -490,7 +499,7 @@ def test_an_entry_that_a_subtree_reads_by_the_default_of_its_port_is_remembered(
 def test_what_is_ticked_was_ahead(seed: int, tmp_path: Path) -> None:
     chance = random.Random(2000 + seed)  # noqa: S311 - for tests
     path = with_conditions(mission(chance, tmp_path, 3), chance)
-    system = System.read(path, robots(), PART, Failures(hooks=False, aborts=False))
+    system = System.of(MissionFile.read(path, robots(), PART), Failures(hooks=False, aborts=False))
     ticker, keeper = system.ticker, system.ticker._keeper
     regions = Regions(system, Few.after(1e6))
     with contextlib.suppress(OutOfTimeError):
@@ -588,7 +597,7 @@ MEASURED = (
 def test_what_the_engine_does_is_within_the_search(seed: int, leaves: Sequence[str], tmp_path: Path) -> None:
     chance = random.Random(100 + seed)  # noqa: S311 - for tests
     path = mission(chance, tmp_path, 2, leaves)
-    system = System.read(path, robots(), PART, Failures(hooks=False, refusals=False, aborts=False))
+    system = System.of(MissionFile.read(path, robots(), PART), Failures(hooks=False, refusals=False, aborts=False))
     states = reached(system, 40_000)
     if states is None:
         pytest.skip("too many situations to look at one by one")

@@ -15,6 +15,7 @@ from test_prove_mission_own import R1, Few, within
 from test_prove_mission_runs import flown, robots
 
 from alula.language.errors import Diagnostic
+from alula.missions.mission_file import MissionFile
 from alula.missions.part import NO_PART, MissionPart
 from alula.prove.limits import OutOfTimeError
 from alula.prove.mission.managers import Failures
@@ -78,7 +79,7 @@ def mission(folder: Path, text: str, inputs: str = "") -> Path:
 
 def against(path: Path) -> MissionFinding:
     """Return the finding against the property; all runs of the mission were looked at."""
-    proved = prove_mission(path, (R1,), PART)
+    proved = prove_mission(MissionFile.read(path, (R1,), PART))
     several: list[Diagnostic] = proved.findings
     assert proved.complete
     assert "ALU711" not in {one.code for one in several}, [one.message for one in several]
@@ -103,7 +104,7 @@ def test_each_case_of_a_switch_is_looked_at(how: str, reader: str, tmp_path: Pat
     path = mission(tmp_path, *inside(how, reader))
     found = against(path)
     assert found.run is not None
-    assert not play(path, found.run, PART).left
+    assert not play(MissionFile.read(path, found.run.skillsets, PART), found.run).left
 
 
 COUNTED = (
@@ -125,7 +126,7 @@ def test_counts_and_times_may_be_any(how: str, reader: str, tmp_path: Path) -> N
     path = mission(tmp_path, *inside(how, f'<Script code="y := true"/>{reader}'))
     found = against(path)
     assert found.run is not None
-    assert not play(path, found.run, PART).left
+    assert not play(MissionFile.read(path, found.run.skillsets, PART), found.run).left
 
 
 LOOPS = (
@@ -140,7 +141,7 @@ def test_a_loop_is_looked_at_with_any_items(how: str, reader: str, tmp_path: Pat
     path = mission(tmp_path, *inside(how, reader))
     found = against(path)
     assert found.run is not None
-    assert not play(path, found.run, PART).left
+    assert not play(MissionFile.read(path, found.run.skillsets, PART), found.run).left
 
 
 def test_what_a_switch_has_seen_of_a_text_stays_so(tmp_path: Path) -> None:
@@ -154,12 +155,12 @@ def test_what_a_switch_has_seen_of_a_text_stays_so(tmp_path: Path) -> None:
         <AlwaysSuccess/>
       </Switch2>"""
     path = mission(tmp_path, f'<Sequence {STILL}><robot.Tell text="{{x}}"/><Sleep msec="20"/>{both}</Sequence>')
-    assert "ALU714" not in {one.code for one in prove_mission(path, (R1,), PART).findings}
+    assert "ALU714" not in {one.code for one in prove_mission(MissionFile.read(path, (R1,), PART)).findings}
 
 
 def test_a_number_of_which_no_type_is_known_is_told_with_its_cure(tmp_path: Path) -> None:
     path = mission(tmp_path, '<Sequence><robot.Tell thing="{x}"/><Repeat num_cycles="{x}"><r1.drive/></Repeat></Sequence>')
-    (finding,) = prove_mission(path, (R1,), PART).findings
+    (finding,) = prove_mission(MissionFile.read(path, (R1,), PART)).findings
     assert finding.code == "ALU711"
     assert "`x` as int, and what has written it does not say of which type it is" in finding.message
 
@@ -167,7 +168,7 @@ def test_a_number_of_which_no_type_is_known_is_told_with_its_cure(tmp_path: Path
 def test_a_text_that_is_made_of_a_number_is_told_rather_than_taken_for_another(tmp_path: Path) -> None:
     script = "<ScriptCondition code=\"('at ' .. x) == 'at 2'\"/>"
     path = mission(tmp_path, f'<Sequence><robot.Tell number="{{x}}"/>{script}<r1.drive/></Sequence>')
-    assert [one.code for one in prove_mission(path, (R1,), PART).findings] == ["ALU711"]
+    assert [one.code for one in prove_mission(MissionFile.read(path, (R1,), PART)).findings] == ["ALU711"]
 
 
 def test_scripts_compare_what_a_declared_node_writes_by_what_they_need(tmp_path: Path) -> None:
@@ -249,7 +250,9 @@ DECLARED = """<TreeNodesModel><Action ID="robot.Tell">
 
 def searched(path: Path, part: MissionPart) -> Regions:
     """Return all runs of a mission; skips where they are too many, or hang on what the search does not know."""
-    regions = Regions(System.read(path, robots(), part, Failures(hooks=False, refusals=False, aborts=False)), Few.after(1e6))
+    regions = Regions(
+        System.of(MissionFile.read(path, robots(), part), Failures(hooks=False, refusals=False, aborts=False)), Few.after(1e6)
+    )
     try:
         regions.explore()
     except OutOfTimeError:

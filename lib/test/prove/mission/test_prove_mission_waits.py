@@ -12,6 +12,7 @@ pytest.importorskip("py_trees")
 
 from test_prove_mission_wanted import FAULTS, TREE, TREES, proved, read, skillsets, written
 
+from alula.missions.mission_file import MissionFile
 from alula.missions.part import NO_PART
 from alula.prove.limits import Deadline, OutOfTimeError
 from alula.prove.mission.ending import Ending
@@ -47,7 +48,7 @@ def test_a_mission_that_never_ends_is_found_and_plays(tree: str, words: str, tmp
     assert words in finding.message
     assert isinstance(finding, MissionFinding)
     assert finding.run is not None
-    assert play(tmp_path / "mission.xml", finding.run, NO_PART).left == ""
+    assert play(MissionFile.read(tmp_path / "mission.xml", finding.run.skillsets, NO_PART), finding.run).left == ""
 
 
 @pytest.mark.parametrize("tree", ENDING)
@@ -63,7 +64,7 @@ def test_waits_are_those_of_the_search_one_situation_after_another(seed: int, tm
     chance = random.Random(seed)  # noqa: S311 - for tests
     trees = [chance.choice((*TREES, *ENDING, *(tree for tree, _ in ROUNDS)))]
     path = written(tmp_path, "", "".join(trees))
-    system = System.read(path, skillsets(), NO_PART, LOOKED_AT)
+    system = System.of(MissionFile.read(path, skillsets(), NO_PART), LOOKED_AT)
     regions = Regions(system, Deadline.after(100.0))
     regions.explore()
     ends = " or ".join(f"outcome {one}" for one in ("accomplished", "degraded", "given_up", "aborted"))
@@ -79,7 +80,7 @@ COMES = ("outcome accomplished or outcome degraded or outcome given_up", "outcom
 @pytest.mark.parametrize("comes", COMES)
 def test_what_is_the_case_at_each_end_comes_where_each_run_ends(tree: str, comes: str, tmp_path: Path) -> None:
     """Two ways to the same answer: by the ends, where they decide it, and one situation after another."""
-    system = System.read(written(tmp_path, "", tree), skillsets(), NO_PART, LOOKED_AT)
+    system = System.of(MissionFile.read(written(tmp_path, "", tree), skillsets(), NO_PART), LOOKED_AT)
     regions = Regions(system, Deadline.after(100.0))
     regions.explore()
     looked = Waits(regions)
@@ -93,7 +94,7 @@ def test_what_is_the_case_at_each_end_comes_where_each_run_ends(tree: str, comes
 
 @pytest.mark.parametrize("tree", [*TREES, *ENDING, *(tree for tree, _ in ROUNDS)])
 def test_groups_after_which_a_mission_surely_ends_hide_no_wait(tree: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    regions = Regions(System.read(written(tmp_path, "", tree), skillsets(), NO_PART, LOOKED_AT), Deadline.after(100.0))
+    regions = Regions(System.of(MissionFile.read(written(tmp_path, "", tree), skillsets(), NO_PART), LOOKED_AT), Deadline.after(100.0))
     regions.explore()
 
     def found() -> tuple[list[object], bool]:
@@ -106,7 +107,7 @@ def test_groups_after_which_a_mission_surely_ends_hide_no_wait(tree: str, tmp_pa
 
 
 def test_what_every_end_brings_needs_no_search(tmp_path: Path) -> None:
-    regions = Regions(System.read(written(tmp_path, "", TREE), skillsets(), NO_PART, LOOKED_AT), Deadline.after(100.0))
+    regions = Regions(System.of(MissionFile.read(written(tmp_path, "", TREE), skillsets(), NO_PART), LOOKED_AT), Deadline.after(100.0))
     regions.explore()
     ends = " or ".join(f"outcome {one}" for one in ("accomplished", "degraded", "given_up"))
     wanted = read(f"p: fault pilot leads to {ends} assuming termination")
@@ -128,7 +129,7 @@ class Steps(Deadline):
 
 def test_waits_that_are_told_when_the_time_is_over_are_waits(tmp_path: Path) -> None:
     path = written(tmp_path, "", "".join(tree for tree, _ in ROUNDS[:1]))
-    regions = Regions(System.read(path, skillsets(), NO_PART, LOOKED_AT), Deadline.after(100.0))
+    regions = Regions(System.of(MissionFile.read(path, skillsets(), NO_PART), LOOKED_AT), Deadline.after(100.0))
     regions.explore()
     whole_time = [node.name for node, *_ in Waits(regions).found(Deadline.after(100.0))]
     assert whole_time == ["ours"]

@@ -17,6 +17,7 @@ from alula.language.lexer import Source
 from alula.language.models import ModelFile, check_texts
 from alula.language.syntax.cursor import Cursor
 from alula.language.syntax.properties import read_mission_property
+from alula.missions.mission_file import MissionFile
 from alula.missions.part import NO_PART
 from alula.model.model import Property, Skillset
 from alula.prove.limits import Deadline
@@ -49,7 +50,7 @@ def written(folder: Path, wanted: str, tree: str) -> Path:
 
 
 def proved(folder: Path, wanted: str, tree: str = TREE, time_s: float = 60.0) -> Proved:
-    return prove_mission(written(folder, wanted, tree), skillsets(), NO_PART, faults=FAULTS, timeout_s=time_s)
+    return prove_mission(MissionFile.read(written(folder, wanted, tree), skillsets(), NO_PART), faults=FAULTS, timeout_s=time_s)
 
 
 def about(found: Proved) -> list[Diagnostic]:
@@ -96,7 +97,7 @@ def test_what_does_not_hold_has_a_run_that_plays(wanted: str, tree: str, words: 
     assert finding.run is not None
     assert finding.example[-1].startswith("=> ")
     assert words in finding.example[-1]
-    played = play(tmp_path / "mission.xml", finding.run, NO_PART)
+    played = play(MissionFile.read(tmp_path / "mission.xml", finding.run.skillsets, NO_PART), finding.run)
     assert played.left == ""
 
 
@@ -177,7 +178,7 @@ def read(text: str) -> Property:
 def test_single_situations_are_those_that_are_reached_one_after_another(seed: int, tmp_path: Path) -> None:
     chance = random.Random(seed)  # noqa: S311 - for tests
     path = written(tmp_path, "", '<AlwaysFailure name="some"/>' + TREES[seed % len(TREES)])
-    system = System.read(path, skillsets(), NO_PART, Failures(refusals=False, hooks=seed % 2 == 0, aborts=False))
+    system = System.of(MissionFile.read(path, skillsets(), NO_PART), Failures(refusals=False, hooks=seed % 2 == 0, aborts=False))
     regions = Regions(system, Deadline.after(100.0))
     regions.explore()
     states = reached(system)
@@ -205,7 +206,7 @@ def test_a_run_against_what_must_come_never_sees_it(seed: int, tmp_path: Path) -
     """And where there is none, no random run comes to rest without it."""
     chance = random.Random(seed)  # noqa: S311 - for tests
     path = written(tmp_path, "", '<AlwaysFailure name="some"/>' + TREES[seed % len(TREES)])
-    system = System.read(path, skillsets(), NO_PART, LOOKED_AT)
+    system = System.of(MissionFile.read(path, skillsets(), NO_PART), LOOKED_AT)
     regions = Regions(system, Deadline.after(100.0))
     regions.explore()
     for _ in range(20):
@@ -215,7 +216,7 @@ def test_a_run_against_what_must_come_never_sees_it(seed: int, tmp_path: Path) -
         assert one.consequence is not None
         if seen.finding is not None:
             assert seen.finding.run is not None
-            left = play(path, seen.finding.run, NO_PART).left
+            left = play(MissionFile.read(path, seen.finding.run.skillsets, NO_PART), seen.finding.run).left
             assert left == "" or left.endswith("which no play can bring about")
             continue
         for _ in range(20):
@@ -251,12 +252,12 @@ skillset eyes {
 def test_a_race_between_a_condition_and_a_request_is_told_and_plays(tmp_path: Path) -> None:
     (robot,) = check_texts([ModelFile("eyes.rl", EYES)])
     path = written(tmp_path, "", '<Sequence><ScriptCondition code="eyes.lens == CLEAR"/><eyes.look/></Sequence>')
-    (finding,) = prove_mission(path, robot.skillsets, NO_PART).findings
+    (finding,) = prove_mission(MissionFile.read(path, robot.skillsets, NO_PART)).findings
     assert finding.code == "ALU705"
     assert "NOT_READY (clear), because after the tree has asked eyes.lens CLEAR -> DIRTY" in finding.message
     assert isinstance(finding, MissionFinding)
     assert finding.run is not None
-    played = play(path, finding.run, NO_PART)
+    played = play(MissionFile.read(path, finding.run.skillsets, NO_PART), finding.run)
     assert (played.left, played.end.outcome.value) == ("", "given_up")
 
 
@@ -280,12 +281,12 @@ def test_a_refusal_is_told_where_a_tick_needs_more_of_another_skillset(tmp_path:
     first = "<drone.land/><Sequence><drone.hover/><drone.climb/></Sequence>"
     both = "".join(f'<Parallel success_count="1" failure_count="1">{one}</Parallel>' for one in (first, "<drone.land/><eyes.watch/>"))
     path = written(tmp_path, "", f"<Fallback>{both}</Fallback>")
-    found = [one for one in prove_mission(path, robot.skillsets, NO_PART).findings if one.code == "ALU705"]
+    found = [one for one in prove_mission(MissionFile.read(path, robot.skillsets, NO_PART)).findings if one.code == "ALU705"]
     assert found
     for one in found:
         assert isinstance(one, MissionFinding)
         assert one.run is not None
-        assert not play(path, one.run, NO_PART).left
+        assert not play(MissionFile.read(path, one.run.skillsets, NO_PART), one.run).left
 
 
 REACHING = """
@@ -298,14 +299,14 @@ skillset arm {
 def test_inputs_that_a_function_may_refuse_need_an_answer_and_the_refusal_plays(tmp_path: Path) -> None:
     (robot,) = check_texts([ModelFile("arm.rl", REACHING)])
     path = written(tmp_path, "", '<arm.reach height="1.0"/>')
-    (finding,) = prove_mission(path, robot.skillsets, NO_PART).findings
+    (finding,) = prove_mission(MissionFile.read(path, robot.skillsets, NO_PART)).findings
     assert (finding.code, "is refused: NOT_VALIDATED" in finding.message) == ("ALU705", True)
     assert isinstance(finding, MissionFinding)
     assert finding.run is not None
-    played = play(path, finding.run, NO_PART)
+    played = play(MissionFile.read(path, finding.run.skillsets, NO_PART), finding.run)
     assert (played.left, played.end.outcome.value) == ("", "given_up")
     path = written(tmp_path, "", '<Fallback><arm.reach height="1.0"/><AlwaysFailure/></Fallback>')
-    assert prove_mission(path, robot.skillsets, NO_PART).findings == []
+    assert prove_mission(MissionFile.read(path, robot.skillsets, NO_PART)).findings == []
 
 
 DRIVING = """
@@ -322,10 +323,10 @@ def test_progress_that_a_script_waits_for_is_played(tmp_path: Path) -> None:
     assert not has_errors(robot.findings)
     tree = '<Sequence><WaitFor if="progress(rover.look) &gt;= 0.7"/><rover.drive/></Sequence>'
     path = written(tmp_path, "property still: never running(rover.drive)", PARALLEL.format(f"<rover.look/>{tree}"))
-    (finding,) = (one for one in prove_mission(path, robot.skillsets, NO_PART).findings if one.code == "ALU714")
+    (finding,) = (one for one in prove_mission(MissionFile.read(path, robot.skillsets, NO_PART)).findings if one.code == "ALU714")
     assert isinstance(finding, MissionFinding)
     assert finding.run is not None
-    assert play(path, finding.run, NO_PART).left == ""
+    assert play(MissionFile.read(path, finding.run.skillsets, NO_PART), finding.run).left == ""
 
 
 PARALLEL = '<Parallel success_count="1" failure_count="1">{}</Parallel>'
@@ -335,7 +336,7 @@ PARALLEL = '<Parallel success_count="1" failure_count="1">{}</Parallel>'
 
 
 def codes(folder: Path, tree: str) -> set[str]:
-    return {one.code for one in prove_mission(written(folder, "", tree), skillsets(), NO_PART).findings}
+    return {one.code for one in prove_mission(MissionFile.read(written(folder, "", tree), skillsets(), NO_PART)).findings}
 
 
 FIGHT = """<Parallel success_count="2" failure_count="2">
@@ -347,7 +348,7 @@ AGAIN = '<RetryUntilSuccessful num_attempts="3"><drone.land/></RetryUntilSuccess
 
 def test_who_fights_for_a_resource_is_told_and_plays(tmp_path: Path) -> None:
     path = written(tmp_path, "", FIGHT.format(land=AGAIN))
-    (finding,) = (one for one in prove_mission(path, skillsets(), NO_PART).findings if one.code == "ALU708")
+    (finding,) = (one for one in prove_mission(MissionFile.read(path, skillsets(), NO_PART)).findings if one.code == "ALU708")
     assert "'drone.land' and 'drone.hover' fight for drone.axes" in finding.message
     assert [line.split(". ")[1] for line in finding.example][-2:] == [
         "drone.land is refused: NOT_READY (free)",
@@ -355,7 +356,7 @@ def test_who_fights_for_a_resource_is_told_and_plays(tmp_path: Path) -> None:
     ]
     assert isinstance(finding, MissionFinding)
     assert finding.run is not None
-    assert not play(path, finding.run, NO_PART).left
+    assert not play(MissionFile.read(path, finding.run.skillsets, NO_PART), finding.run).left
 
 
 def test_one_refusal_is_no_fight_nor_is_asking_again_once_it_is_free(tmp_path: Path) -> None:
@@ -379,7 +380,7 @@ def test_an_outcome_that_never_comes_is_told_of_the_skills_that_write_it(tmp_pat
       <Sequence><ScriptCondition code="how {asked}"/><drone.lift/></Sequence>
       <drone.land/>
     </Fallback>"""
-    found = prove_mission(written(tmp_path, "", tree.format(asked="== 'NOT_READY'")), skillsets(), NO_PART).findings
+    found = prove_mission(MissionFile.read(written(tmp_path, "", tree.format(asked="== 'NOT_READY'")), skillsets(), NO_PART)).findings
     assert [one.message for one in found if one.code == "ALU707"] == ["`how == 'NOT_READY'` is asked, but 'drone.hover' never ends so"]
     assert "ALU707" not in codes(tmp_path, tree.format(asked="== 'ABORTED'"))
     also = "<Sequence><Script code=\"how := 'NOT_READY'\"/>" + tree.format(asked="== 'NOT_READY'") + "</Sequence>"
