@@ -1,17 +1,25 @@
-"""A call of a service that never takes longer than it may: rospy's own has no time limit."""
+"""A call of a service that never takes longer than it may, and never comes later: rospy's own has no time limit.
+
+What was given up is not asked for any more when a network that was away comes back: where nothing was sent yet, nothing will be, and what
+waits to be sent again is dropped with its connection, which is reset.
+"""
 
 from __future__ import annotations
 
 import contextlib
 import socket
+import struct
 import threading
 from dataclasses import dataclass, field
 from typing import Any
 
 import rospy
+from rospy.impl.tcpros_base import TCPROSTransport
 
 CALL_LIMIT_S = 2.0
 MOST_ABANDONED = 4
+RESET = struct.pack("ii", 1, 0)
+"""Of SO_LINGER: a close drops what was not acknowledged."""
 
 
 class CallFailedError(RuntimeError):
@@ -25,6 +33,7 @@ class _Attempt:
     done: threading.Event = field(default_factory=threading.Event)
     response: Any = None
     error: str = ""
+    abandoned: bool = False
 
 
 class ServiceCaller:
@@ -34,6 +43,7 @@ class ServiceCaller:
         self.name = name
         self._kind = kind
         self._proxy: rospy.ServiceProxy | None = None
+        self._lock = threading.Lock()
         self._abandoned: list[threading.Thread] = []
 
     def call(self, request: Any, *, limit_s: float = CALL_LIMIT_S) -> Any:
@@ -46,6 +56,8 @@ class ServiceCaller:
         thread = threading.Thread(target=self._run, args=(request, attempt), daemon=True)
         thread.start()
         if not attempt.done.wait(limit_s):
+            with self._lock:
+                attempt.abandoned = True
             self.close()
             self._abandoned.append(thread)
             raise CallFailedError(f"{self.name} did not answer within {limit_s:.3g} s")
@@ -57,18 +69,44 @@ class ServiceCaller:
     def close(self) -> None:
         """Drop the connection; a thread that waits on it ends."""
         proxy, self._proxy = self._proxy, None
-        transport = proxy.transport if proxy is not None else None
-        if transport is not None and transport.socket is not None:
-            with contextlib.suppress(OSError):
-                transport.socket.shutdown(socket.SHUT_RDWR)
-            transport.close()
+        if proxy is not None:
+            _drop(proxy)
 
     def _run(self, request: Any, attempt: _Attempt) -> None:
         try:
-            if self._proxy is None:
-                self._proxy = rospy.ServiceProxy(self.name, self._kind, persistent=True)
-            attempt.response = self._proxy(request)
+            proxy = self._proxy or self._connected(request)
+            with self._lock:
+                if attempt.abandoned:
+                    _drop(proxy)
+                    return
+                self._proxy = proxy
+            attempt.response = proxy(request)
         except Exception as error:  # noqa: BLE001  # rospy lets through all that the sockets below it raise
             attempt.error = f"{self.name}: {error}"
         finally:
             attempt.done.set()
+
+    def _connected(self, request: Any) -> rospy.ServiceProxy:
+        """Return a proxy that is connected, as its own call would make it, before anything is sent."""
+        proxy = rospy.ServiceProxy(self.name, self._kind, persistent=True)
+        uri = proxy._get_service_uri(request)  # noqa: SLF001
+        transport = TCPROSTransport(proxy.protocol, proxy.resolved_name)
+        transport.buff_size = proxy.buff_size
+        try:
+            transport.connect(*rospy.core.parse_rosrpc_uri(uri), uri)
+        except rospy.exceptions.TransportInitError as error:
+            raise rospy.ServiceException(f"unable to connect to service: {error}") from error
+        proxy.transport = transport
+        return proxy
+
+
+def _drop(proxy: rospy.ServiceProxy) -> None:
+    """End a proxy's connection, and what of it is under way; a thread that waits on it ends."""
+    transport = proxy.transport
+    connection = None if transport is None else transport.socket
+    if connection is not None:
+        with contextlib.suppress(OSError):
+            connection.setsockopt(socket.SOL_SOCKET, socket.SO_LINGER, RESET)
+            connection.shutdown(socket.SHUT_RD)  # wakes who reads, and sends nothing
+        connection.close()  # before the transport, which would first end it in order
+        transport.close()
