@@ -6,8 +6,12 @@ and the first that arrives ends its time. Before, the busy links have carried al
 
 import os
 import signal
+import socket
 import time
 from functools import partial
+from pathlib import Path
+from urllib.parse import urlsplit
+from xmlrpc.client import ServerProxy
 
 import pytest
 from ros_bridge_action_nodes import ActionNode, Sent
@@ -117,6 +121,27 @@ def test_every_link_carries_again_after_a_cut(base, probes, seconds):
             carry_on(probes, seconds)
 
     all_carry(disturb, probes)
+
+
+def waits_to_be_sent(address, port):
+    """Tell whether a connection of this computer to that place has something that was not acknowledged (proc(5): net/tcp)."""
+    place = f"{int.from_bytes(socket.inet_aton(address), 'little'):08X}:{port:04X}"
+    rows = (line.split() for line in Path("/proc/net/tcp").read_text(encoding="ascii").splitlines()[1:])
+    return any(row[2] == place and int(row[4].partition(":")[0], 16) for row in rows)
+
+
+def test_call_that_was_given_up_in_a_cut_is_not_sent_again_after_it(base, probes):
+    calls = {"service in ROS 1": probes["service in ROS 1"]}
+    times_until_all_arrive(calls)  # a connection is there
+    uri = ServerProxy(base.uri).lookupService("/bridge_test", "/net/in_ros1")[2]
+    place = base.computer.address, urlsplit(uri).port
+    with base.cut():
+        (call,) = calls.values()
+        call.next_s = 0.0
+        call.step(time.monotonic())
+        until(lambda: waits_to_be_sent(*place), "the request is on its way")
+        until(lambda: not waits_to_be_sent(*place), "it is dropped at its timeout, 3 s", 10 * 3.0)
+    times_until_all_arrive(calls)
 
 
 @pytest.mark.parametrize("there", [True, False])

@@ -156,6 +156,9 @@ void CallConnection::take_answer() {
 
 void CallConnection::drop() {
   if (state_ == State::kClosed) return;
+  // A request that was given up is not sent again when a network that was away comes back: its close drops what was not acknowledged.
+  const linger reset{1, 0};
+  if (state_ == State::kCalling) setsockopt(fd_, SOL_SOCKET, SO_LINGER, &reset, sizeof reset);
   state_ = State::kClosed;
   if (key_) loop_.remove(key_, fd_);
   if (fd_ >= 0) ::shutdown(fd_, SHUT_RDWR);
