@@ -10,7 +10,6 @@ from dataclasses import dataclass
 from pathlib import Path
 
 from alula_testing.waits import until
-from alula_testing.wall_clock import LIBRARY, WallClock
 from link_rig.computers import LOOK_S, Mission, RigError, TwoComputers, two_computers
 from link_rig.verdicts import End, Fault, Verdict, driving_since, judge
 
@@ -20,8 +19,6 @@ MISSION_S = 600.0
 """Wall clock; a mission that lasts longer hangs."""
 DELAY_S, LOSS, SEED = 0.3, 0.2, 1
 """Of a bad link: each way, of each frame."""
-STEP_S = 3600
-"""By so much the wall clock is set forward, and back."""
 LINK = ("link", "heartbeat", "silent")
 """What a true cause of a lost link names one of."""
 Act = Callable[[TwoComputers, Mission], AbstractContextManager[None]]
@@ -32,7 +29,7 @@ class Case:
     """A fault, prepared by ``act`` and made by entering what that returns.
 
     It lasts ``lasts_s`` simulated seconds at least. ``again``: the mission can't survive it, and another one has to be accomplished.
-    ``stops``: as long as it lasts nobody can supervise the rover. ``sets_clock``: the decision side has a wall clock of its own.
+    ``stops``: as long as it lasts nobody can supervise the rover.
     """
 
     name: str
@@ -41,7 +38,6 @@ class Case:
     cause: tuple[str, ...]
     again: bool = False
     stops: bool = True
-    sets_clock: bool = False
 
 
 def _cut(rig: TwoComputers, _mission: Mission) -> AbstractContextManager[None]:
@@ -69,15 +65,6 @@ def _master(rig: TwoComputers, _mission: Mission) -> Iterator[None]:
     rig.kill_master()
     yield
     rig.start_master()
-
-
-@contextmanager
-def _clock(rig: TwoComputers, _mission: Mission) -> Iterator[None]:
-    if rig.clock is None:
-        raise RigError("the clock of the decision side can't be set")
-    rig.clock.step(STEP_S)
-    yield
-    rig.clock.step(-STEP_S)
 
 
 def _kill(part: str) -> Act:
@@ -110,7 +97,6 @@ CASES: Mapping[str, Case] = {
     "half-open": Case("the decision computer without its address for 30 s", _address, 30.0, LINK),
     "bad": Case(f"{LOSS:.0%} loss and {DELAY_S:g} s of delay each way for 30 s", _bad, 30.0, LINK, stops=False),
     "master": Case("the ROS master killed, and another one after 5 s", _master, 5.0, ("master", *LINK), stops=False),
-    "clock": Case("the decision side's clock an hour ahead for 10 s", _clock, 10.0, (), stops=False, sets_clock=True),
     "bridge": Case("the bridge killed", _kill("bridge"), 0.0, ("bridge", *LINK)),
     "managers": Case("the managers killed", _kill("managers"), 0.0, ("managers", *LINK)),
     "mission": Case("the mission killed", _kill("mission"), 0.0, ("mission died",), again=True),
@@ -120,9 +106,7 @@ CASES: Mapping[str, Case] = {
 
 def run_case(case: Case, folder: Path) -> Verdict:
     """Run a whole mission with the fault while it drives; ``folder`` takes what is written. Judge it by the simulator's truth."""
-    if case.sets_clock and LIBRARY is None:
-        raise RigError("the clock of a computer can't be set here: apt install faketime")
-    with two_computers(folder, WallClock(folder) if case.sets_clock else None) as rig:
+    with two_computers(folder) as rig:
         mission = rig.start_mission()
         until(lambda: mission.ended or _drives(rig), "the rover drives", every_s=LOOK_S)
         if mission.ended:

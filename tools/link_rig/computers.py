@@ -19,7 +19,6 @@ from alula.common.processes import command_line, node_name, processes_of_run
 from alula_testing.networks import Computer, Network
 from alula_testing.ros1 import end_process
 from alula_testing.waits import until
-from alula_testing.wall_clock import WallClock
 from link_rig.verdicts import End, Pose
 
 ALULA_ROOT = Path(__file__).resolve().parents[2]
@@ -42,15 +41,14 @@ class RigError(Exception):
 class TwoComputers:
     """The rover's base on one computer and its decision side on the other."""
 
-    def __init__(self, network: Network, folder: Path, clock: WallClock | None = None) -> None:
-        """Take two computers of a network; ``folder`` takes what they write, ``clock`` is the decision side's where that is to be set."""
+    def __init__(self, network: Network, folder: Path) -> None:
+        """Take two computers of a network; ``folder`` takes what they write."""
         self.network, self.folder = network, folder
         self.base, self.decision = network.computer("base"), network.computer("decision")
         self._inside = {one.name: _namespace(_holder(one)) for one in (self.base, self.decision)}  # also told once the holder has died
         self._claim = claim_domain()  # of this machine, as shared memory is
         self._name = f"link_rig_{os.getpid()}"
         self._deployment = ROVER / f"deployments/{self._name}.yaml"
-        self.clock = clock
         self._processes: list[subprocess.Popen[bytes]] = []
         self._truth = folder / "truth.jsonl"
         self._missions = 0
@@ -86,7 +84,7 @@ class TwoComputers:
     def _base_environment(self) -> dict[str, str]:
         ros1 = self.base.ros1_environment(self.base, port=MASTER_PORT)
         graph = {name: ros1[name] for name in ("ROS_MASTER_URI", "ROS_IP")}
-        return {**_own_environment(), "ALULA_ROBOT": str(ROVER), "ROS_HOME": str(self.folder / "ros"), **graph}
+        return {**self._environment(), "ALULA_ROBOT": str(ROVER), "ROS_HOME": str(self.folder / "ros"), **graph}
 
     @property
     def silent_after_s(self) -> float:
@@ -170,7 +168,7 @@ class TwoComputers:
         return ["env", "-C", str(ROVER), str(ALULA_ROOT / "alula"), *words]
 
     def _environment(self) -> dict[str, str]:
-        return {**_own_environment(), **({} if self.clock is None else self.clock.variables)}
+        return {name: value for name, value in os.environ.items() if not name.startswith(FOREIGN)}
 
     # --- both --------------------------------------------------------------------------------------------------------
 
@@ -253,10 +251,6 @@ class Mission:
         return End(str(said["outcome"]), "; ".join([*([said["reason"]] if said["reason"] else []), *died]))
 
 
-def _own_environment() -> dict[str, str]:
-    return {name: value for name, value in os.environ.items() if not name.startswith(FOREIGN)}
-
-
 def _holder(computer: Computer) -> int:
     """Return the process that keeps a computer's network there."""
     return int(computer.enter[1].partition("=")[2])
@@ -267,10 +261,10 @@ def _namespace(pid: int) -> Path:
 
 
 @contextmanager
-def two_computers(folder: Path, clock: WallClock | None = None) -> Iterator[TwoComputers]:
-    """Have the base run and the decision side be up; ``clock`` is the decision side's, where that is to be set."""
+def two_computers(folder: Path) -> Iterator[TwoComputers]:
+    """Have the base run and the decision side be up."""
     with Network() as network:
-        rig = TwoComputers(network, folder, clock)
+        rig = TwoComputers(network, folder)
         try:
             rig.start_base()
             rig.up()

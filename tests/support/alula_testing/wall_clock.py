@@ -22,13 +22,8 @@ class WallClock:
     @property
     def environment(self) -> dict[str, str]:
         """Return what a process needs, the environment of this one included."""
-        return {**os.environ, **self.variables}
-
-    @property
-    def variables(self) -> dict[str, str]:
-        """Return what a process needs besides an environment."""
         own = {"LD_PRELOAD": str(LIBRARY), "FAKETIME_TIMESTAMP_FILE": str(self._file), "FAKETIME_NO_CACHE": "1"}
-        return {**own, "FAKETIME_DONT_FAKE_MONOTONIC": "1"}
+        return {**os.environ, **own, "FAKETIME_DONT_FAKE_MONOTONIC": "1"}
 
     def step(self, by_s: int) -> None:
         """Set the clock forward, or back."""

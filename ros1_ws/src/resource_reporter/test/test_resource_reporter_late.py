@@ -69,6 +69,14 @@ def serve(server: socket.socket) -> tuple[bytes, bool]:
     return taken, False
 
 
+def take_request(server: socket.socket) -> bytes:
+    """Take the next request of an empty type, and end its connection."""
+    with server.accept()[0] as peer:
+        peer.settimeout(HANGS_S)
+        take_header(peer)
+        return read(peer, 4)
+
+
 def test_what_was_given_up_before_it_was_connected_is_not_asked_for_afterwards(late):
     caller = ServiceCaller(NAME, Trigger)
     with pytest.raises(CallFailedError, match=f"did not answer within {LIMIT_S:g} s"):
@@ -83,6 +91,25 @@ def test_what_was_sent_and_given_up_is_dropped_with_its_connection(late):
         with pytest.raises(CallFailedError, match="did not answer"):
             caller.call(TriggerRequest(), limit_s=LIMIT_S)
         assert served.result()[1], "a connection that ends in order sends again what was not acknowledged"
+
+
+def test_a_connection_that_does_not_come_about_is_begun_anew(ros_master):
+    master = rosgraph.Master(NAME)
+    with socket.create_server(("127.0.0.1", 0), backlog=0) as server, ThreadPoolExecutor() as others:
+        server.settimeout(HANGS_S)
+        place = server.getsockname()
+        uri = f"rosrpc://127.0.0.1:{place[1]}"
+        master.registerService(NAME, uri, "http://127.0.0.1:1/")
+        caller = ServiceCaller(NAME, Trigger)
+        with socket.create_connection(place):  # nobody else can connect
+            with pytest.raises(CallFailedError, match="unable to connect to service"):
+                caller.call(TriggerRequest(), limit_s=HANGS_S)
+            server.accept()[0].close()
+        asked = others.submit(take_request, server)
+        with pytest.raises(CallFailedError, match=r"unable to receive data|no response"):
+            caller.call(TriggerRequest(), limit_s=HANGS_S)
+        assert asked.result() == bytes(4), "its length: it is empty"
+        master.unregisterService(NAME, uri)
 
 
 def test_the_next_call_has_a_connection_of_its_own(late):

@@ -17,6 +17,8 @@ import rospy
 from rospy.impl.tcpros_base import TCPROSTransport
 
 CALL_LIMIT_S = 2.0
+CONNECT_LIMIT_S = 1.5
+"""So long may a connection take. In a cut the kernel tries later and later again: one that is begun anew stands soon after its end."""
 MOST_ABANDONED = 4
 RESET = struct.pack("ii", 1, 0)
 """Of SO_LINGER: a close drops what was not acknowledged."""
@@ -93,7 +95,8 @@ class ServiceCaller:
         transport = TCPROSTransport(proxy.protocol, proxy.resolved_name)
         transport.buff_size = proxy.buff_size
         try:
-            transport.connect(*rospy.core.parse_rosrpc_uri(uri), uri)
+            transport.connect(*rospy.core.parse_rosrpc_uri(uri), uri, timeout=CONNECT_LIMIT_S)
+            transport.socket.settimeout(None)
         except rospy.exceptions.TransportInitError as error:
             raise rospy.ServiceException(f"unable to connect to service: {error}") from error
         proxy.transport = transport
