@@ -148,7 +148,7 @@ class TwoComputers:
         """Return the processes of the parts that are up, and of their keeper."""
         said = json.loads((ROVER / ".alula/up" / self._name / "state.json").read_text(encoding="utf-8"))
         parts = {name: int(one["pid"]) for name, one in said["parts"].items()}
-        return {name: pid for name, pid in {**parts, "keeper": int(said["keeper"])}.items() if pid}
+        return {name: pid for name, pid in {**parts, "keeper": int(said["keeper"])}.items() if pid and psutil.pid_exists(pid)}
 
     def nodes(self) -> dict[str, int]:
         """Return the nodes of the base that roslaunch has started."""
