@@ -6,6 +6,7 @@ import os
 from dataclasses import replace
 
 import pytest
+from link_rig.__main__ import main
 from link_rig.cases import CASES, run_case
 from link_rig.verdicts import HEAD, End, Fault, Pose, Survived, driving_since, judge, judge_kills
 
@@ -107,6 +108,12 @@ def test_since_when_it_drives_is_told_while_it_drives_only():
     assert driving_since([]) is None
     assert driving_since(driven((0.0, 3.0), (0.5, 3.0))) == pytest.approx(3.0, abs=STEP_S)
     assert driving_since(driven((0.5, 3.0), (0.0, 3.0))) is None
+
+
+def test_what_an_earlier_run_has_left_is_not_taken_for_this_ones(tmp_path, capsys):
+    (tmp_path / "cut-5/run1").mkdir(parents=True)
+    assert main(["--case", "cut-5", "--keep", str(tmp_path)]) == 2
+    assert "cut-5 is not empty" in capsys.readouterr().err
 
 
 @pytest.mark.skipif(RIG not in os.environ, reason=f"takes two minutes and root: {RIG}=cut-5 runs this case, or another of tools/link_rig")

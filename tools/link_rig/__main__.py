@@ -29,15 +29,14 @@ def main(words: Sequence[str] | None = None) -> int:
     parser.add_argument("--kills", type=int, metavar="MINUTES", help="no case: a process is killed at random each minute, for so long")
     parser.add_argument("--seed", type=int, default=1, help="of which ones are killed (default: 1)")
     given = parser.parse_args(words)
-    reason = why_impossible() or ("" if (ROVER / ".alula/venv2").is_dir() else f"the rover is not set up: alula setup in {ROVER}")
-    if reason:
+    runs: dict[str, Callable[[Path], Verdict]] = {name: functools.partial(run_case, CASES[name]) for name in given.case or CASES}
+    if given.kills:
+        runs = {"kills": functools.partial(run_kills, given.kills, given.seed)}
+    if reason := _why_not(given.keep and [given.keep / name for name in runs]):
         sys.stderr.write(f"link_rig: {reason}\n")
         return 2
     wrong = False
     sys.stdout.write(HEAD)
-    runs: dict[str, Callable[[Path], Verdict]] = {name: functools.partial(run_case, CASES[name]) for name in given.case or CASES}
-    if given.kills:
-        runs = {"kills": functools.partial(run_kills, given.kills, given.seed)}
     for name, run in runs.items():
         with tempfile.TemporaryDirectory(prefix="link_rig_") as temporary:
             folder = given.keep.resolve() / name if given.keep else Path(temporary)
@@ -54,6 +53,16 @@ def main(words: Sequence[str] | None = None) -> int:
         for one in verdict.wrong:
             sys.stderr.write(f"link_rig: {name}: {one}\n")
     return 1 if wrong else 0
+
+
+def _why_not(folders: Sequence[Path] | None) -> str:
+    """Return why nothing can be run here; empty: it can."""
+    for folder in folders or ():
+        if folder.exists() and any(folder.iterdir()):
+            return f"{folder} is not empty: what lies there would be taken for what this run writes"
+    if reason := why_impossible():
+        return reason
+    return "" if (ROVER / ".alula/venv2").is_dir() else f"the rover is not set up: alula setup in {ROVER}"
 
 
 if __name__ == "__main__":
