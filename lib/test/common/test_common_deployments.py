@@ -116,7 +116,7 @@ def test_what_is_wrong_is_said_with_its_place_and_what_would_be_right(tmp_path, 
     assert "\n" not in str(raised.value)
 
 
-@settings(suppress_health_check=[HealthCheck.function_scoped_fixture])
+@settings(suppress_health_check=[HealthCheck.function_scoped_fixture, HealthCheck.too_slow])
 @given(
     st.text(max_size=200)
     | st.sampled_from(sorted({*KEYS, *ROS1_KEYS, *ROS2_KEYS, *RECORD_KEYS, *PAGE_KEYS})).map(lambda key: f"{key}: [1]")

@@ -5,7 +5,7 @@ from __future__ import annotations
 import json
 
 import pytest
-from hypothesis import HealthCheck, given, settings
+from hypothesis import given, settings
 from language_strategies import skillsets
 
 from alula.language import paper, rl
@@ -15,14 +15,14 @@ from alula.model.expressions import Comparison, DataIs
 from alula.model.json_form import from_json, to_json
 from alula.model.model import Assignment, Effect, Event, Precondition, Result, ResultKind, Skill, Skillset
 
-SLOW = settings(max_examples=80, suppress_health_check=[HealthCheck.too_slow])
+FEW = settings(max_examples=80)
 
 
 PARSE = {Notation.PAPER: paper.parse, Notation.ROBOT_LANGUAGE: rl.parse}
 BOTH = (Notation.PAPER, Notation.ROBOT_LANGUAGE)
 
 
-@SLOW
+@FEW
 @given(skillsets)
 def test_what_is_printed_reads_back_in_each_notation_and_through_both(skillset):
     for first, second in ((a, b) for a in BOTH for b in BOTH):
@@ -36,7 +36,7 @@ def test_what_is_printed_reads_back_in_each_notation_and_through_both(skillset):
         assert repr_without_places(back) == repr_without_places(skillset)
 
 
-@SLOW
+@FEW
 @given(skillsets)
 def test_json_reads_back(skillset):
     text = to_json(skillset)

@@ -1,8 +1,10 @@
-"""Properties without a time limit on one example: on a busy machine any may take long, and speed is what benchmarks are for."""
+"""Properties without limits of wall clock: on a busy machine any example may take long, and speed is what benchmarks are for."""
 
 from __future__ import annotations
 
-from hypothesis import settings
+from hypothesis import HealthCheck, settings
 
-settings.register_profile("alula", deadline=None)
-settings.load_profile("alula")
+PROFILE = "alula"
+
+settings.register_profile(PROFILE, deadline=None, suppress_health_check=[HealthCheck.too_slow])
+settings.load_profile(PROFILE)

@@ -5,12 +5,14 @@ from __future__ import annotations
 import pytest
 from hypothesis import settings
 
+from alula_testing.examples import PROFILE
+
 LIVE = {"ros_master", "ros2_domain", "browser"}
 """Fixtures that start what a test of the daily loop does not wait for."""
 MARKS = ("flight", "long")
 EXAMPLES = 10
 
-settings.register_profile("quick", deadline=None, max_examples=EXAMPLES)
+settings.register_profile("quick", settings.get_profile(PROFILE), max_examples=EXAMPLES)
 
 
 def pytest_configure() -> None:
