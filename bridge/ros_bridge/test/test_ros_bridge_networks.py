@@ -125,7 +125,7 @@ def test_every_link_carries_again_after_a_cut(base, probes, seconds):
 
 ESTABLISHED, FIN_WAIT1 = "01", "04"  # proc(5): net/tcp
 LOOKS = 10
-"""A connection that is reset is seen in no look after it was ended, one that is ended in order in 33 on a busy machine, in more on another."""
+"""A connection that is reset is seen in no look after its end, one that is ended in order in 33 on a busy machine, in more on another."""
 
 
 def waits_to_be_sent(address, port):
