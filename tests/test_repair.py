@@ -20,6 +20,7 @@ import yaml
 from alula import Mission
 from alula.check.robot import part_of
 from alula.cli.check import main as check
+from alula.cli.plan import main as plan
 from alula.cli.repair import main as repair
 from alula.cli.run import main as run
 from alula.common.robots import find_robot
@@ -296,6 +297,53 @@ def test_a_way_that_is_blocked_gets_another_chance(rover: Path, capsys: pytest.C
 @pytest.mark.parametrize("fault", ["laser", "person", "door"])
 def test_the_rover_survives_as_it_is(rover: Path, capsys: pytest.CaptureFixture[str], fault: str) -> None:
     assert answer(capsys, rover / "patrol.xml", "--fault", fault)["answer"] == "nothing to repair"
+
+
+PATROL = "arrival then base.base_status == DOCKED"
+DELIVER = "arrival then cargo.box == FULL then arrival then cargo.box == EMPTY then base.base_status == DOCKED"
+INPUTS = {
+    "target": {"x": 2.0, "y": 0.0, "theta": 0.0},
+    "target_2": {"x": 4.0, "y": 1.0, "theta": 0.0},
+    "parcel": "letter",
+    "patience": 30.0,
+}
+
+
+@pytest.mark.long
+@pytest.mark.timeout(0)  # a minute of processor time: as long as the machine needs
+@pytest.mark.parametrize(
+    ("scenario", "goal", "skills", "survived"),
+    [
+        ("patrol", PATROL, ["drive_to", "dock"], {"navigation", "person"}),
+        ("deliver", DELIVER, ["drive_to", "load", "drive_to", "unload", "dock"], {"door", "navigation"}),
+    ],
+)
+def test_what_the_rover_does_for_one_place_and_one_parcel_is_planned(
+    rover: Path, capsys: pytest.CaptureFixture[str], scenario: str, goal: str, skills: list[str], survived: set[str]
+) -> None:
+    out = rover / "planned.xml"
+    using = ",".join(f"{'cargo' if one in {'load', 'unload'} else 'base'}.{one}" for one in dict.fromkeys(skills))
+    assert plan(["--goal", goal, "--using", using, "--out", str(out), "--time", TIME_S, "--json"]) == 0
+    found = json.loads(capsys.readouterr().out)
+    assert [one.partition(".")[2] for one in found["plan"]["steps"]] == skills
+    assert found["plan"]["nodes"] <= 15
+    fates = {one["faults"][0]: one for one in found["fates"]}
+    assert {name for name, one in fates.items() if one["survives"]} >= survived
+    assert check([str(out), "--json", "--time", TIME_S]) == 0
+    findings = json.loads(capsys.readouterr().out)["files"][0]["findings"]
+    assert {one["severity"] for one in findings} <= {"note"}, "what the goal asks for"
+    mission = Mission.load(scenario, ALULA_ROOT / "examples/rover")
+    name = re.findall(r'main_tree_to_execute="(\w+)"', out.read_text())[0]
+    asked = {key: value for key, value in INPUTS.items() if f'"{key}"' in out.read_text()}
+    planned = replace(mission, plan=plan_of_file(out, name, mission.skillsets, asked, part_of(find_robot(), pytest.fail)))
+    well = planned.run(seed=1)
+    assert (well.outcome, [one.skill for one in well.ended if one.skill in skills]) == (Outcome.ACCOMPLISHED, skills)
+    for fault in mission.behaviour.faults:
+        for moment in (1, 4, 9):
+            outcome = planned.run(f"{fault}@{moment}", seed=1).outcome
+            good = {Outcome.ACCOMPLISHED, Outcome.DEGRADED}
+            survives = fates[fault.partition(":")[0]]["survives"]
+            assert outcome in (good if survives else good | {Outcome.GIVEN_UP}), f"{fault}@{moment}"
 
 
 def test_ctrl_c_ends_the_search_with_what_it_has(no_lidar: Path) -> None:

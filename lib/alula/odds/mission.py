@@ -17,7 +17,7 @@ from fnmatch import fnmatchcase
 from typing import NamedTuple
 
 from alula.missions.director import Outcome as Ended
-from alula.model.expressions import Expression
+from alula.model.expressions import And, Expression, ResourceIs
 from alula.model.model import Skill
 from alula.odds.figures import NEVER, Figures
 from alula.odds.system import DEPARTURE, Kind, Outcome, Step
@@ -73,7 +73,9 @@ class MissionSteps:
         self._system = system
         self._faults = {name: one for name, one in faults.items() if _touches(one, system)}
         self._brought = brought
-        self._departure = departure
+        known = {f"{of.name}.{one.name}" for of in system.skillsets for one in of.resources}
+        self._achieved = {f"{of.name}.{one.name}": [*achieved(of.name, one)] for of in system.skillsets for one in of.skills}
+        self._departure = departure if departure is not None and departure[0] in known else None
         self._figures = figures
         self._states = {pair for several in brought.values() for pair in several}
         self._at_first = frozenset(at_first)
@@ -211,8 +213,8 @@ class MissionSteps:
         yield from (Step(Kind.NOW, state.coming, there._replace(state=after)) for after in found or [state.state])
 
     def _with_brought(self, skill: str, state: State) -> State:
-        """Return a situation with what a success of the skill brings about, where the models have an arrow for it."""
-        for resource, wanted in self._brought.get(skill, ()):
+        """Return a situation with what a success of the skill brings about, or achieves, where the models have an arrow for it."""
+        for resource, wanted in (*self._brought.get(skill, ()), *self._achieved.get(skill, ())):
             found = [after for event, after in self._system.steps(state) if _is_extern(event, resource, wanted)]
             state = found[0] if found else state
         return state
@@ -223,6 +225,12 @@ class MissionSteps:
         resource, state = self._departure
         left = self._system.resource(before, resource) == state != self._system.resource(after, resource)
         return (DEPARTURE,) if left else ()
+
+
+def achieved(skillset: str, skill: Skill) -> Iterator[tuple[str, str]]:
+    """Yield the states that a model says are there after a success of a skill: resource and state."""
+    several = skill.achieves.operands if isinstance(skill.achieves, And) else (skill.achieves,)
+    yield from ((f"{skillset}.{one.resource}", one.state) for one in several if isinstance(one, ResourceIs) and not one.negated)
 
 
 def _touches(fault: FaultEffects, system: System) -> bool:

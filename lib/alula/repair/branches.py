@@ -93,8 +93,7 @@ class Branch:
         """Return why a node is put in that has no tree of its own, which would say it."""
         if self.tree is not None or self.around:
             return []
-        lines = wrap(_said(" ".join(self.why)), width - len("<!--  -->"))
-        return [f"{'     ' if number else '<!-- '}{line}{' -->' if line is lines[-1] else ''}" for number, line in enumerate(lines)]
+        return comment_lines(" ".join(self.why), width)
 
     def written(self, subject: Subject, leave_out: tuple[str, ...] = (), more: str = "") -> tuple[str, list[str]]:
         """Return the mission's file with it, and the properties that ask for nodes of these names, which are left out.
@@ -213,6 +212,12 @@ def _lead(parent: Element, element: Element) -> str:
 def tree_lines(name: str, top: Element) -> list[str]:
     """Return the lines of a tree as they stand in a file, without its indentation."""
     return [f'<BehaviorTree ID="{name}">', *(STEP + one for one in _lines(top, 2)), "</BehaviorTree>"]
+
+
+def comment_lines(text: str, width: int) -> list[str]:
+    """Return the lines of a comment."""
+    lines = wrap(_said(text), width - len("<!--  -->"))
+    return [f"{'     ' if number else '<!-- '}{line}{' -->' if line is lines[-1] else ''}" for number, line in enumerate(lines)]
 
 
 def _lines_of_tree(branch: Branch) -> list[str]:

@@ -10,7 +10,7 @@ from alula.model.model import Parameter
 from alula.model.units import told_unit
 from alula.repair.branches import node
 from alula.repair.courses import Course, Courses, Here, Wanted
-from alula.repair.naming import Vocabulary, chances, told_states
+from alula.repair.naming import Vocabulary, in_short, told_states
 from alula.repair.purposes import Purpose
 from alula.trees.document import Element
 from alula.trees.node import pointer
@@ -50,6 +50,10 @@ class Sources:
             if value is not None:
                 made.set(name, value)
         return made
+
+    def lacking(self, purpose: Purpose) -> list[str]:
+        """Return the inputs of a skill that come from nowhere."""
+        return [one.name for one in purpose.skill.inputs if not one.default and self._binding(None, purpose, one) is None]
 
     @property
     def ports(self) -> list[str]:
@@ -116,61 +120,89 @@ class Composer:
     Attributes:
         sources: of inputs.
         courses: what tells which skills can fill a role.
-        alternatives: each skill of a role that can run is tried, one after another; else the first one alone.
-        attempts: how often a skill is started at most that does not succeed.
     """
 
     sources: Sources
     courses: Courses
-    alternatives: bool = False
-    attempts: int = 1
 
     def after_one_another(
-        self, course: Course, wanted: Wanted | None, known: Mapping[str, str], reused: Mapping[str, Element]
+        self,
+        course: Course,
+        wanted: Mapping[int, Wanted],
+        known: Sequence[Mapping[str, str]] = (),
+        reused: Mapping[str, Element] | None = None,
     ) -> list[Element]:
         """Return the nodes of a course in their order, none where an input comes from nowhere.
 
-        ``reused``: what stands for a skill, by its name. What the functional layer tells of a step is waited for before the next one.
+        Steps that need the same beside them share it. What the functional layer tells of a step is waited for before the next one.
+
+        Args:
+            course: the skills.
+            wanted: by the number of steps that have come before, what has to be so then.
+            known: of each step, values of its inputs.
+            reused: what stands for a skill, by its name.
         """
-        found: list[Element] = []
+        found: list[tuple[list[Element], list[Element], str]] = []
         for number, step in enumerate(course.steps):
-            made = self.step(step, course.heres[number], known, reused.get(step.name))
-            if made is None:
+            leaf = (reused or {}).get(step.name) or self.sources.leaf(step, known[number] if known else {})
+            watching = self._watching(step, course.heres[number])
+            if leaf is None or watching is None:
                 return []
-            found.append(made)
-            several = course.told_between(number, wanted)
+            earlier = sum(one.name == step.name for one in course.steps[:number])
+            if earlier:
+                leaf.set("name", f"{node_name(leaf)} {earlier + 1}")
+            several = course.told_between(number, wanted.get(number + 1))
             told = " && ".join(f"{name} == {state}" for name, state in several)
-            if told:
-                name = self.sources.words.wait(told, told_states(several))
-                found.append(node("Awaits", name=name, if_=told, within=TOLD_WITHIN_S))
+            name = self.sources.words.wait(told, told_states(several))
+            awaits = [node("Awaits", name=name, if_=told, within=TOLD_WITHIN_S)] if told else []
+            found.append(([leaf, *awaits], watching, _filled(step)))
+        return self._sharing(found)
+
+    def step(self, purpose: Purpose, here: Here, known: Mapping[str, str]) -> Element | None:
+        """Return a skill with what it needs beside it; None where an input comes from nowhere."""
+        leaf, watching = self.sources.leaf(purpose, known), self._watching(purpose, here)
+        return None if leaf is None or watching is None else self._watched([leaf], watching, _filled(purpose))
+
+    def _watching(self, purpose: Purpose, here: Here) -> list[Element] | None:
+        """Return what fills the roles that a skill needs; None where nothing does."""
+        found: list[Element] = []
+        for role in purpose.skill.needs:
+            leaves = (self.sources.leaf(each, {}) for each in self.courses.providers(here, role.name, purpose))
+            first = next((one for one in leaves if one is not None), None)
+            if first is None:
+                return None
+            found.append(first)
         return found
 
-    def step(self, purpose: Purpose, here: Here, known: Mapping[str, str], instead: Element | None = None) -> Element | None:
-        """Return a skill with what it needs beside it; ``instead``: a node that stands for it."""
-        leaf = instead if instead is not None else self.sources.leaf(purpose, known)
-        several = [[leaf]] if leaf is not None else []
-        for role in purpose.skill.needs:
-            providers = self.courses.providers(here, role.name, purpose)
-            watching = [one for one in (self.sources.leaf(each, {}) for each in providers) if one is not None]
-            several = [[*one, watch] for one in several for watch in (watching if self.alternatives else watching[:1])]
-        filled = " and ".join(role.name.replace("_", " ") for role in purpose.skill.needs)
-        ways = [self._watched(one[0], one[1:], filled) for one in several]
-        if not ways:
-            return None
-        made = ways[0] if len(ways) == 1 else node("Fallback", *ways, name=", or ".join(map(node_name, ways)))
-        if self.attempts == 1:
-            return made
-        name = chances(self.attempts, self.sources.words.leaf(purpose.name))
-        return node("RetryUntilSuccessful", made, name=name, num_attempts=str(self.attempts))
+    def _sharing(self, steps: Sequence[tuple[list[Element], list[Element], str]]) -> list[Element]:
+        """Return the nodes of steps, each with what runs beside it: what is the same runs from the first step that needs it to the last."""
+        found: list[Element] = []
+        at = 0
+        while at < len(steps):
+            nodes, watching, filled = steps[at]
+            kinds = [one.tag for one in watching]
+            end = at + 1
+            for number in range(at + 1, len(steps)) if watching else ():
+                others = [one.tag for one in steps[number][1]]
+                if others and others != kinds:
+                    break
+                end = number + 1 if others else end
+            together = [one for several, *_ in steps[at:end] for one in several]
+            found += [self._watched(together, watching, filled)] if watching else nodes
+            at = end
+        return found
 
-    def _watched(self, leaf: Element, watching: Sequence[Element], filled: str) -> Element:
-        """Return a node that runs while others fill its roles, once these make progress; it ends with the first of them that ends."""
+    def _watched(self, nodes: Sequence[Element], watching: Sequence[Element], filled: str) -> Element:
+        """Return nodes that run one after another while others fill their roles, once these make progress; the first that ends ends it."""
         if not watching:
-            return leaf
-        made = type(leaf)(leaf.tag, leaf.place, dict(leaf.attributes), list(leaf.content), empty=leaf.empty)  # may stand in several ways
-        name = node_name(leaf)
+            return nodes[0]
+        name = in_short([node_name(one) for one in nodes if one.tag != "Awaits"])
         sees = " && ".join(f"progress({one.tag}) >= 1" for one in watching)
         wait = node("WaitFor", name=self.sources.words.wait(sees, f"there is {filled}"), if_=sees)
-        inner = node("Sequence", wait, made, name=f"with {filled}")
+        inner = node("Sequence", wait, *nodes, name=f"with {filled}")
         called = f"{' and '.join(node_name(one) for one in watching)} and {name}"
         return node("Parallel", *watching, inner, name=called, success_count="1", failure_count="1")
+
+
+def _filled(purpose: Purpose) -> str:
+    return " and ".join(role.name.replace("_", " ") for role in purpose.skill.needs)

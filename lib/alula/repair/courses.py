@@ -77,7 +77,7 @@ class Course:
         Each is ``skillset.resource`` and its state.
         """
         before, after = self.heres[number], self.heres[number + 1]
-        asked = [wanted] if number + 1 == len(self.steps) and wanted is not None else []
+        asked = [wanted] if wanted is not None else []
         if number + 1 < len(self.steps):
             step = self.steps[number + 1]
             asked = [(step.skillset.name, one.condition) for one in step.skill.preconditions]
@@ -96,9 +96,8 @@ class Courses:
         self._models = {one.skillset.name: over_approximate(one.skillset).skillset for one in purposes.known.values()}
         self._acting = [one for one in purposes.known.values() if one.achieves and (not using or one.name in using)]
 
-    def to(self, states: States, reaches: Callable[[Course], bool]) -> Iterator[Course]:
+    def to(self, first: Here, reaches: Callable[[Course], bool]) -> Iterator[Course]:
         """Yield courses that reach what is wanted, the shortest first."""
-        first = Here(states)
         todo = deque([Course((), (first,))])
         seen = {first.key}
         while todo and len(seen) < MOST_SITUATIONS:

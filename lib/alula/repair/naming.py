@@ -101,6 +101,12 @@ def often_when(attempts: int, results: Iterable[str]) -> str:
     return f"{_OFTEN.get(attempts, f'{attempts} times')} when {ends}"
 
 
+def in_short(steps: Sequence[str]) -> str:
+    """Return what several steps are called together."""
+    first, *others = dict.fromkeys(steps)
+    return f"{first}, ..., {others[-1]}" if len(others) > 1 else " and ".join([first, *others])
+
+
 def another(name: str, taken: Iterable[str]) -> str:
     """Return a name that nothing has yet."""
     used = set(taken)

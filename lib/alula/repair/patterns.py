@@ -27,7 +27,7 @@ from alula.repair.standing_in import StandIns
 from alula.repair.subject import Subject
 from alula.trees.document import Element
 from alula.trees.node import Node, pointer
-from alula.trees.reading import node_name
+from alula.trees.reading import node_name, type_name
 
 MOST_NODES = 15
 RETRIES = frozenset({"RetryAfter", "RetryUntilSuccessful"})
@@ -66,6 +66,18 @@ class Patterns:
         """Return the skills for the same purpose, that skill itself first, whether or not they can run."""
         found = [self._purposes.known[failing.skill], *self._purposes.alike(failing.skill)]
         return [one for one in found if one.name == failing.skill or not self._using or one.name in self._using]
+
+    @property
+    def lacking(self) -> list[str]:
+        """Tell which skills are left out of the branches made so far, as inputs of theirs come from nowhere."""
+        words = "{} would bring about what is needed, but nothing says what its input {} is; use it in a tree of the mission"
+        return [words.format(skill, " and ".join(f"`{one}`" for one in names)) for skill, names in self._remedies.lacking.items()]
+
+    def asked_in(self, element: Element) -> Iterator[tuple[str, str]]:
+        """Yield what the skills in a part need of the functional layer: ``skillset.resource`` and its state."""
+        for purpose in (self._purposes.known.get(type_name(one)) for one in element.iterate()):
+            for resource, state in asked_of_others(purpose) if purpose is not None else ():
+                yield f"{purpose.skillset.name}.{resource.name}", state  # type: ignore[union-attr]  # it has one
 
     def may_leave_out(self, failing: Failing) -> bool:
         """Tell whether the mission may go on without what failed, as something else is for the same."""

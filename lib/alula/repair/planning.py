@@ -8,7 +8,9 @@
 
 from __future__ import annotations
 
+import re
 import tempfile
+from collections import Counter
 from collections.abc import Iterator, Sequence
 from contextlib import contextmanager, suppress
 from dataclasses import dataclass, field, replace
@@ -16,17 +18,18 @@ from itertools import islice
 from pathlib import Path
 
 from alula.language.errors import Severity
-from alula.model.expressions import And, Expression, ResourceIs, atoms
+from alula.missions.mission_file import READY, STOP_HERE
+from alula.model.expressions import TRUE, And, Expression, ResourceIs, atoms
 from alula.model.model import Skillset
 from alula.prove.limits import Deadline, OutOfTimeError
-from alula.repair.branches import node, tree_lines
+from alula.repair.branches import WIDTH, comment_lines, node, parent_of, tree_lines
 from alula.repair.composing import Composer, Sources
 from alula.repair.courses import Course, Courses, Here, States, Wanted, initial_states
 from alula.repair.errors import RepairError
 from alula.repair.fates import MOST_FAULTS, Fate
 from alula.repair.judging import Judge
-from alula.repair.naming import plain, told_state
-from alula.repair.purposes import Purpose, Purposes, asked_of_others
+from alula.repair.naming import another, in_short, plain, told_state
+from alula.repair.purposes import Purpose, Purposes, asked_of_others, broken_by
 from alula.repair.repairing import Question, Search, Tell, condition_of
 from alula.repair.subject import Subject, with_property
 from alula.trees.document import Element
@@ -35,6 +38,10 @@ from alula.trees.reading import type_name
 
 MOST_COURSES = 12
 MOST_NODES = 15
+LEFT = "ALU701"
+"""The finding that a skill can't start any more once the mission has ended."""
+NEVER = "ALU703"
+"""The finding that a node is never ticked: what gives up where nothing fails."""
 EMPTY = '<root BTCPP_format="4" main_tree_to_execute="plan"><BehaviorTree ID="plan"><AlwaysSuccess/></BehaviorTree></root>\n'
 
 
@@ -43,7 +50,8 @@ class Aim:
     """What is asked for.
 
     Attributes:
-        goal: a condition, written as in properties of missions, or a role that a skill has to have filled.
+        goal: a condition, written as in properties of missions, or a role that a skill has to have filled; or several, with `then`
+            between them, which are reached one after another.
         start: what is so at first, a condition of states; what it leaves open is as after power-up.
         never: what no run may come to.
         using: the skills that may be used, ``skillset.skill``; empty: all.
@@ -55,6 +63,18 @@ class Aim:
     never: str = ""
     using: tuple[str, ...] = ()
     most_faults: int = MOST_FAULTS
+
+
+@dataclass(frozen=True)
+class Stage:
+    """A part of a goal: a role, or what is wanted (``role`` is empty)."""
+
+    role: str = ""
+    wanted: Wanted = ("", TRUE)
+
+    def reached_by(self, course: Course) -> bool:
+        """Tell whether a course leads there."""
+        return self.role in course.steps[-1].roles if self.role else course.heres[-1].fulfils(self.wanted)
 
 
 @dataclass(frozen=True)
@@ -104,18 +124,20 @@ class Planner:
         wrong = [one for one in aim.using if one not in self._purposes.known]
         if wrong:
             raise RepairError(f"--using {wrong[0]}: there is no such skill; there are {', '.join(sorted(self._purposes.known))}")
-        roles = {role for one in self._purposes.known.values() if one.achieves for role in one.roles}
-        self._role = aim.goal if aim.goal in roles else ""
-        if aim.goal.isidentifier() and not self._role:
-            raise RepairError(
-                f"--goal '{aim.goal}': no skill fills this role by its success; there are {', '.join(sorted(roles)) or 'none'}"
-            )
-        self._wanted: Wanted | None = None if self._role else ("", condition_of("--goal", aim.goal))
-        if self._wanted is not None:
-            _check_names("--goal", aim.goal, self._wanted[1], self._subject.skillsets)
+        self._stages = [self._stage(one.strip()) for one in re.split(r"\bthen\b", aim.goal)]
         self._courses = Courses(self._purposes, aim.using)
         sources = Sources(self._subject.files, self._subject.mission.palette, self._subject.vocabulary(), asks=True)
         self._composer = Composer(sources, self._courses)
+
+    def _stage(self, text: str) -> Stage:
+        roles = {role for one in self._purposes.known.values() if one.achieves for role in one.roles}
+        if text in roles:
+            return Stage(text)
+        if text.isidentifier():
+            raise RepairError(f"--goal '{text}': no skill fills this role by its success; there are {', '.join(sorted(roles)) or 'none'}")
+        wanted = condition_of("--goal", text)
+        _check_names("--goal", text, wanted, self._subject.skillsets)
+        return Stage(wanted=("", wanted))
 
     def stop(self) -> None:
         """Have the search end with the best that it has found; a signal's handler may call it."""
@@ -127,16 +149,17 @@ class Planner:
     def run(self) -> Answer:
         """Search; raises AlulaError where the robot can't be looked at."""
         states = initial_states(self._subject.skillsets, self._subject.at_first)
-        if self._wanted is not None and Here(states).fulfils(self._wanted):
+        first = self._stages[0]
+        if not first.role and Here(states).fulfils(first.wanted):
             raise RepairError(f"--goal '{self._aim.goal}': it is so at first; say what is so by --from")
         tried = 0
         with suppress(OutOfTimeError):  # the search ends at once then
             self._can_be_asked()
-        for course in islice(self._courses.to(states, self._reaches), MOST_COURSES):
+        for course, ends in islice(self._through(Here(states), self._stages), MOST_COURSES):
             tried += 1
             names = ", ".join(one.name for one in course.steps)
             try:
-                plan = self._proved(course)
+                plan = self._proved(course, ends)
             except OutOfTimeError:
                 return Answer(None, tried, stopped=True)
             if isinstance(plan, Plan):
@@ -154,10 +177,17 @@ class Planner:
                 with_property(document.root, subject.files.main, f"asked: never {self._aim.never}")
                 self._judge(subject).refuse_unread(document.text(), "--never", self._aim.never)
 
-    def _reaches(self, course: Course) -> bool:
-        if self._role:
-            return self._role in course.steps[-1].roles
-        return self._wanted is not None and course.heres[-1].fulfils(self._wanted)
+    def _through(self, here: Here, stages: Sequence[Stage]) -> Iterator[tuple[Course, tuple[int, ...]]]:
+        """Yield courses to one part of the goal after another, and how many steps have come before each of these ends."""
+        if not stages:
+            yield Course((), (here,)), ()
+            return
+        so_already = not stages[0].role and here.fulfils(stages[0].wanted)
+        for first in [Course((), (here,))] if so_already else self._courses.to(here, stages[0].reached_by):
+            for rest, ends in self._through(first.heres[-1], stages[1:]):
+                steps = len(first.steps)
+                course = Course((*first.steps, *rest.steps), (*first.heres, *rest.heres[1:]))
+                yield course, (steps, *(steps + one for one in ends))
 
     def _why(self, states: States) -> Iterator[str]:
         """Yield what keeps each skill from starting at first."""
@@ -171,16 +201,19 @@ class Planner:
 
     # --- a course -----------------------------------------------------------------------------------------------------
 
-    def _proved(self, course: Course) -> Plan | str:
-        """Return the mission of a course, or why it is none."""
-        text, nodes = self._text(course)
+    def _proved(self, course: Course, ends: Sequence[int]) -> Plan | str:
+        """Return the mission of a course, or why it is none; ``ends``: after how many steps each part of the goal is reached."""
+        text, nodes = self._text(course, ends)
         if not text:
             return "an input comes from nowhere"
         if nodes > MOST_NODES:
             return f"it has {nodes} nodes"
         with _file(text) as path:
-            subject = self._of(path)
-            judge = self._judge(subject)
+            judge = self._judge(self._of(path))
+            findings = judge.check(text).findings
+            asked = [one for one in self._kept(course) if any(it.code == LEFT and _words(*one) in it.message for it in findings)]
+            fails = not any(it.code == NEVER for it in findings)
+            text, nodes = self._text(course, ends, asked, fails=fails)
             for also in (False, True):
                 found = judge.check(text, also=also)
                 bad = next((one for one in found.findings if one.severity is not Severity.NOTE), None)
@@ -192,33 +225,51 @@ class Planner:
         steps = tuple(one.name for one in course.steps)
         return Plan(text, steps, nodes) if fate.survives else "it may not be accomplished though nothing fails"
 
-    def _text(self, course: Course) -> tuple[str, int]:
-        """Return the file of a course, and how many nodes it has."""
-        steps = self._composer.after_one_another(course, self._wanted, {}, {})
+    def _text(
+        self, course: Course, ends: Sequence[int], accepted: Sequence[tuple[str, str]] = (), *, fails: bool = True
+    ) -> tuple[str, int]:
+        """Return the file of a course, and how many nodes it has.
+
+        Args:
+            course: the skills.
+            ends: after how many steps each part of the goal is reached.
+            accepted: states that the goal asks for, which may be left.
+            fails: whether its work may fail: then it needs an end.
+        """
+        wanted = {end: one.wanted for end, one in zip(ends, self._stages, strict=True) if not one.role}
+        steps = self._composer.after_one_another(course, wanted, _inputs(course))
         if not steps:
             return "", 0
-        words = [plain(one.name) for one in course.steps]
-        name = "_and_".join("_".join(one.split()) for one in dict.fromkeys(words))
-        work = steps[0] if len(steps) == 1 else node("Sequence", *steps, name=" and ".join(words))
+        words = in_short([plain(one.name) for one in course.steps])
+        name = "_".join(re.findall(r"\w+", words))
+        work = steps[0] if len(steps) == 1 else node("Sequence", *steps, name=words)
         rest = self._rest(course)
         end = node("AlwaysFailure", name="given up")
         if rest:
             stopping = node("Script", name="stopping", code="@stopping := true")
-            stop = node("SubTree", ID="stop_here", name="stop here", _autoremap="true")
+            stop = node("SubTree", ID=STOP_HERE, name="stop here", _autoremap="true")
             give_up = node("Sequence", node("NoteReason", name="note why"), stopping, stop, name="give up")
             end = node("ForceFailure", give_up, name="the mission fails")
-        top = node("Fallback", work, end, name=f"{name.replace('_', ' ')}, or give up")
-        if self._aim.never:
-            top.set("_description", f"property asked_never: never {self._aim.never}")
-        nodes = sum(1 for _ in top.iterate())
-        trees = {name: top}
+        top = node("Fallback", work, end, name=f"{words}, or give up") if fails else work
+        said = [f"accepted {LEFT} ({_words(*one)}): the goal asks for it" for one in accepted]
+        said += [f"property asked_never: never {self._aim.never}"] if self._aim.never else []
+        if said:
+            top.set("_description", "; ".join(said))
+        trees = {name: top} | _shared(top, course, name)
+        nodes = sum(1 for tree in trees.values() for _ in tree.iterate())
         if rest:
-            trees["stop_here"] = rest[0] if len(rest) == 1 else node("Sequence", *rest, name="come to rest")
+            trees[STOP_HERE] = rest[0] if len(rest) == 1 else node("Sequence", *rest, name="come to rest")
         needs = list(self._needs(course))
         if needs:
-            trees["ready"] = node("Sequence", *needs)
+            trees[READY] = node("Sequence", *needs)
         why = [f"{one.name}{_role_words(one)}" for one in course.steps]
-        return _file_text(name, trees, f"For {self._aim.goal}: {', then '.join(why)}.", _ports(trees[name])), nodes
+        return _file_text(name, trees, f"For {self._aim.goal}: {', then '.join(why)}."), nodes
+
+    def _kept(self, course: Course) -> list[tuple[str, str]]:
+        """Return the states of the goal that a step of the course can't start in: the mission may end in what is asked for."""
+        asked = [one for stage in self._stages for one in atoms(stage.wanted[1]) if isinstance(one, ResourceIs) and not one.negated]
+        there = dict.fromkeys((one.resource, one.state) for one in asked)
+        return [(at, state) for at, state in there if any(_is_kept_from(one, at, state) for one in course.steps)]
 
     def _rest(self, course: Course) -> list[Element]:
         """Return what brings the robot to rest from anywhere in the course; nothing where it is at rest all the time."""
@@ -229,9 +280,9 @@ class Planner:
 
         moving = [one for one in course.heres if not is_safe(one)]
         for here in moving[:1]:
-            found = self._courses.to(here.states, lambda other: is_safe(other.heres[-1]))
+            found = self._courses.to(here, lambda other: is_safe(other.heres[-1]))
             for way in islice(found, 1):
-                return self._composer.after_one_another(way, None, {}, {})
+                return self._composer.after_one_another(way, {})
         return []
 
     def _needs(self, course: Course) -> Iterator[Element]:
@@ -257,8 +308,8 @@ class Planner:
         names = sorted(self._subject.faults)
         different = {(one.states, one.ends, one.later): name for name, one in sorted(self._subject.faults.items(), reverse=True)}
         with suppress(OutOfTimeError):
-            for fault in sorted(different.values()):
-                plan = self._repaired_for(fault, plan)
+            for left, fault in zip(range(len(different), 0, -1), sorted(different.values()), strict=True):
+                plan = self._repaired_for(fault, plan, self._deadline.left_s() / (left + 1))
             with _file(plan.text) as path:
                 judge = self._judge(self._of(path))
                 fate_of = judge.fates(plan.text)
@@ -268,23 +319,25 @@ class Planner:
                         fates[fault] = fate
         return replace(plan, fates=fates, left_out=tuple(one for one in names if one not in fates))
 
-    def _repaired_for(self, fault: str, plan: Plan) -> Plan:
+    def _repaired_for(self, fault: str, plan: Plan, time_s: float) -> Plan:
+        """Return the plan with a branch for a fault, if there is one in its share of the time."""
         self._deadline.check()
         with _file(plan.text) as path:
             aim, left = self._aim, MOST_NODES - plan.nodes
             question = Question(fault, using=aim.using, most_faults=aim.most_faults, reached=self._goal, most_nodes=left, others=False)
-            self._search = Search(self._of(path), question, self._deadline, self._tell)
+            self._search = Search(self._of(path), question, Deadline.after(time_s, self._tell), self._tell)
             try:
                 repair = self._search.run().repair
-            except RepairError:
-                return plan  # no skill of it ends by this fault
+            except (RepairError, OutOfTimeError):
+                return plan  # no skill of it ends by this fault, or its time is over
         if repair is None:
             return plan
         return replace(plan, text=repair.text, nodes=plan.nodes + repair.branch.size + repair.branch.wraps)
 
     @property
     def _goal(self) -> Expression | None:
-        return None if self._wanted is None else self._wanted[1]
+        last = self._stages[-1]
+        return None if last.role else last.wanted[1]
 
     def _judge(self, subject: Subject) -> Judge:
         return Judge(subject, self._deadline, strikes=self._aim.most_faults, reached=self._goal)
@@ -303,6 +356,39 @@ def _file(text: str) -> Iterator[Path]:
         path = Path(folder) / "plan.xml"
         path.write_text(text, encoding="utf-8")
         yield path
+
+
+def _inputs(course: Course) -> list[dict[str, str]]:
+    """Return the mission's own inputs for those of each step: a skill that comes again has others, skills share those of a name."""
+    found: list[dict[str, str]] = []
+    for number, step in enumerate(course.steps):
+        earlier = sum(one.name == step.name for one in course.steps[:number])
+        end = f"_{earlier + 1}" if earlier else ""
+        found.append({name: f"{{{name}{end}}}" for name in step.inputs})
+    return found
+
+
+def _shared(top: Element, course: Course, main: str) -> dict[str, Element]:
+    """Put skills that come more than once into trees of their own, so that one branch answers for each use; return these trees."""
+    names = Counter(one.name for one in course.steps)
+    trees: dict[str, Element] = {}
+    for step in {one.name: one for one in course.steps if names[one.name] > 1}.values():
+        tree = another(step.skill.name, [main, STOP_HERE, READY, *trees])
+        trees[tree] = node(step.name, name=plain(step.name), **{given: f"{{{given}}}" for given in step.inputs})
+        for leaf in [one for one in top.iterate() if type_name(one) == step.name]:
+            above = parent_of(top, leaf)
+            use = node("SubTree", ID=tree, **{one.name: one.value for one in leaf.attributes.values()})
+            above.content[above.content.index(leaf)] = use
+    return trees
+
+
+def _words(at: str, state: str) -> str:
+    return f"{at} == {state}"
+
+
+def _is_kept_from(purpose: Purpose, at: str, state: str) -> bool:
+    skillset, _, resource = at.partition(".")
+    return purpose.skillset.name == skillset and broken_by(purpose.skill, resource, state) is not None
 
 
 def _states_of(condition: str, skillsets: Sequence[Skillset]) -> dict[str, str]:
@@ -348,19 +434,22 @@ def _ports(top: Element) -> list[str]:
     """Return the entries that leaves of a tree read and none of its own writes."""
     found: dict[str, None] = {}
     for one in top.iterate():
-        if "." in type_name(one):
-            entries = (pointer(attribute.value, name) for name, attribute in one.attributes.items() if name != "name")
+        if "." in type_name(one) or one.tag == "SubTree":
+            entries = (pointer(attribute.value, name) for name, attribute in one.attributes.items() if name not in {"name", "ID"})
             found |= {entry: None for entry in entries if entry}
     return list(found)
 
 
-def _file_text(name: str, trees: dict[str, Element], why: str, ports: Sequence[str]) -> str:
-    lines = ['<root BTCPP_format="4" main_tree_to_execute="' + name + '">', f"  <!-- {why} -->"]
+def _file_text(name: str, trees: dict[str, Element], why: str) -> str:
+    lines = ['<root BTCPP_format="4" main_tree_to_execute="' + name + '">', *(f"  {one}" for one in comment_lines(why, WIDTH - 2))]
     for tree, top in trees.items():
         lines += [f"  {one}" for one in tree_lines(tree, top)] + [""]
-    if ports:
-        model = [f'      <input_port name="{one}"/>' for one in ports]
-        lines += ["  <TreeNodesModel>", f'    <SubTree ID="{name}">', *model, "    </SubTree>", "  </TreeNodesModel>"]
+    models = [(tree, ports) for tree, top in trees.items() if tree not in {STOP_HERE, READY} and (ports := _ports(top))]
+    if models:
+        lines.append("  <TreeNodesModel>")
+        for tree, ports in models:
+            lines += [f'    <SubTree ID="{tree}">', *(f'      <input_port name="{one}"/>' for one in ports), "    </SubTree>"]
+        lines.append("  </TreeNodesModel>")
     elif not lines[-1]:
         lines.pop()
     return "\n".join([*lines, "</root>"]) + "\n"

@@ -34,6 +34,8 @@ class Remedies:
         self._courses = courses
         self._composer = Composer(sources, courses)
         self._attempts = attempts
+        self.lacking: dict[str, list[str]] = {}
+        """The skills that would bring about what a failed one needs, each with its inputs that come from nowhere."""
 
     def around(self, place: Node, failing: Failing, states: States) -> Iterator[Branch]:
         """Yield the node with other chances, each after skills that make true what the failed one needs."""
@@ -46,12 +48,14 @@ class Remedies:
         here = Here(self._at_rest(states))
         if here.fulfils(wanted):
             return
-        courses = list(islice(self._courses.to(here.states, lambda one: one.heres[-1].fulfils(wanted)), MOST_COURSES))
+        courses = list(islice(self._courses.to(here, lambda one: one.heres[-1].fulfils(wanted)), MOST_COURSES))
         for course in (one for one in courses if failing.skill not in {step.name for step in one.steps}):
             for reused in self._reused(course, failing):
-                steps = self._composer.after_one_another(course, wanted, {}, reused)
+                steps = self._composer.after_one_another(course, {len(course.steps): wanted}, reused=reused)
                 if steps:
                     yield self._again_after(place, failing, course, steps)
+                else:
+                    self.lacking |= {one.name: lacking for one in course.steps if (lacking := self._sources.lacking(one))}
 
     def at_the_safe_place(self, place: Node, failing: Failing, states: States) -> Iterator[Branch]:
         """Yield the way to the place that the mission calls safe, by each skill that may do what one of its own skills does."""
@@ -119,12 +123,10 @@ class Remedies:
         return [self._purposes.known[name] for name in names if name in self._purposes.known]
 
     def _at_rest(self, states: States) -> dict[str, str]:
-        """Return the states of all resources once the skills that ran have given theirs back."""
+        """Return the states of all resources once the skills that ran have given theirs back: what their starts take is as at first."""
         found = initial_states(self._subject.skillsets, self._subject.at_first)
-        extern = {
-            f"{of.name}.{one.name}" for of in self._subject.skillsets for one in of.resources if any(a.extern for a in one.transitions)
-        }
-        return found | {name: state for name, state in states.items() if name in extern}
+        taken = {(f"{one.skillset.name}.{name}", state) for one in self._purposes.known.values() for name, state in one.holds.items()}
+        return found | {name: state for name, state in states.items() if (name, state) not in taken}
 
     def _reused(self, course: Course, failing: Failing) -> Iterator[Mapping[str, Element]]:
         """Yield which trees of the files stand for skills of a course: each that has one of them and no other part in it, then none."""

@@ -11,7 +11,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Callable, Iterable, Iterator, Sequence
 from contextlib import suppress
 from dataclasses import dataclass, field, replace
 from functools import cached_property
@@ -21,6 +21,7 @@ from alula.language.lexer import Source
 from alula.language.syntax.cursor import Cursor, SyntaxFault
 from alula.language.syntax.properties import read_mission_property
 from alula.model.expressions import Expression
+from alula.odds.mission import achieved
 from alula.prove.limits import Deadline, OutOfTimeError
 from alula.prove.mission.run import MissionRun
 from alula.prove.mission.system import System
@@ -189,6 +190,9 @@ class Search:
         repair, tried = self._first_proved(before, failing, fate, finding)
         if repair is not None and self._question.others:
             repair = self._with_fates(text, repair)
+        if repair is None and not reasons:
+            reasons = [*self._why_unknown(text), *self._patterns.lacking]
+            return Answer(tuple(failing), fate, None, reasons=tuple(reasons), tried=tried, stopped=self._stopped)
         return Answer(tuple(failing), fate, repair, bool(reasons), tuple(reasons), tried, self._stopped)
 
     def _can_be_asked(self) -> None:
@@ -266,7 +270,7 @@ class Search:
             now = self._judge.fate(text, fate.faults)
             assuming = now.assuming
             if not now.answered and (fate.safe or not now.safe):
-                return f"with {' and '.join(fate.faults)} it {_told(now)}"
+                return f"with {' and '.join(fate.faults)} it {_told(now)}{self._what_is_missing(branch, now)}"
         judgement = self._judge.check(text)
         new = judgement.new(before)
         if new:
@@ -285,6 +289,24 @@ class Search:
         left = dict.fromkeys(one.message for one in whole.findings if one.severity is not Severity.NOTE)
         return Repair(branch, written, 0, tuple(not_asked), tuple(left), assuming=assuming)
 
+    def _what_is_missing(self, branch: Branch, fate: Fate) -> str:
+        """Return what skills of a branch need of the functional layer, and is not so where the mission can't be accomplished any more."""
+        return "".join(f"; {one}" for one in self._missing_in((branch.use, branch.tree), fate))
+
+    def _missing_in(self, parts: Iterable[Element | None], fate: Fate) -> list[str]:
+        asked = [one for part in parts if part is not None for one in self._patterns.asked_in(part)]
+        missing = [(at, state) for at, state in asked if fate.states.get(at, state) != state]
+        return [f"{at} may be {fate.states[at]} then" for at in dict.fromkeys(at for at, _ in missing)]
+
+    def _why_unknown(self, text: str) -> list[str]:
+        """Return why the mission can't be accomplished though nothing fails, if that is so: no branch for a fault mends it."""
+        try:
+            calm = self._judge.fate(text, ())
+        except OutOfTimeError:
+            return []
+        missing = self._missing_in(self._subject.files.trees.values(), calm)
+        return [] if calm.survives else ["; ".join(["the mission may not be accomplished though nothing fails", *missing])]
+
     def _why_impossible(self, text: str, failing: Failing) -> list[str]:
         """Return why no tree can have done what a skill is for that the mission needs; empty where one might."""
         lines: list[str] = []
@@ -297,6 +319,8 @@ class Search:
             ):
                 return []
         except OutOfTimeError:
+            return []
+        if self._can_be_left(failing):
             return []
         for purpose in self._patterns.all_stand_ins(failing):
             own = [(at.partition(".")[2], state) for at, state in failing.states if at.partition(".")[0] == purpose.skillset.name]
@@ -315,6 +339,13 @@ class Search:
         others = f"of {', '.join(self._question.using)} none" if self._question.using else "no other skill"
         needed = f"the mission is accomplished in no run without {failing.skill}, and {others} is for the same and can run"
         return [needed, *lines]
+
+    def _can_be_left(self, failing: Failing) -> bool:
+        """Tell whether some skill brings about another state than the one that shows the fault: nobody knows what comes of that."""
+        skills = [(of.name, one) for of in self._subject.skillsets for one in of.skills]
+        brought = {pair for several in self._subject.brought.values() for pair in several}
+        brought |= {pair for skillset, skill in skills for pair in achieved(skillset, skill)}
+        return any(at == other and state != to for at, state in failing.states for other, to in brought)
 
     # --- counterexamples ---------------------------------------------------------------------------------------------
 

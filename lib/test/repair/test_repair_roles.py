@@ -21,7 +21,7 @@ from alula.missions.part import NO_PART
 from alula.mock import load_behaviour
 from alula.model.expressions import Comparison, DataIs, ResourceIs
 from alula.prove.limits import Deadline
-from alula.repair.courses import Courses, initial_states
+from alula.repair.courses import Courses, Here, initial_states
 from alula.repair.errors import RepairError
 from alula.repair.judging import Judge
 from alula.repair.planning import Aim, Planner
@@ -51,7 +51,7 @@ def course(states: dict[str, str], *wanted: tuple[str, ResourceIs | DataIs], usi
     """Return the shortest course from power-up, but for ``states``, to what is wanted."""
     courses = Courses(Purposes(SKILLSETS, BROUGHT), using)
     start = initial_states(SKILLSETS, []) | states
-    found = courses.to(start, lambda one: all(map(one.heres[-1].fulfils, wanted)))
+    found = courses.to(Here(start), lambda one: all(map(one.heres[-1].fulfils, wanted)))
     return next(([step.name for step in one.steps] for one in found), None)
 
 
@@ -209,6 +209,60 @@ def test_a_state_is_planned_from_another_one(tmp_path: Path, monkeypatch: pytest
     assert re.findall(r'<Needs name="(.*?)"', plan.text) == ["the laser is OK"]  # what no skill of it brings about
 
 
+def test_parts_of_a_goal_are_reached_one_after_another(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    """Steps that need the same share what fills it; a skill that comes again has inputs of its own."""
+    plan = planned(Aim("arrival then arrival then base.place == DOCKED"), tmp_path, monkeypatch).plan
+    assert plan is not None
+    assert plan.steps == ("base.drive", "base.drive", "base.dock")
+    work = plan.text.partition("<BehaviorTree ID=")[2].partition("</BehaviorTree>")[0]
+    assert skills_in(work)[:2] == ["eyes.scan", "base.dock"]
+    uses = [' ID="drive" name="drive" to="{to}"/>', ' ID="drive" name="drive 2" to="{to_2}"/>']
+    assert re.findall(r"<SubTree( .* to=.*)", work) == uses
+    assert re.search(r'<Awaits name=".*" if="base.place == DOCKED" within="5"/>', work)
+    assert plan.nodes <= 15
+    path = tmp_path / "missions/planned.xml"
+    path.write_text(re.sub(r'(<input_port name="to(?:_2)?")/>', r'\1 default="1"/>', plan.text))
+    assert all("base.dock" in run for run in fly(Subject.read(path, quiet), path.read_text(), "person"))
+
+
+def test_a_part_of_a_goal_that_is_so_already_takes_no_step(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    plan = planned(Aim("base.place == DOCKED then arrival then base.place == AWAY", "base.place == AWAY"), tmp_path, monkeypatch).plan
+    assert plan is not None
+    assert plan.steps == ("base.dock", "base.drive")
+
+
+BOX = """
+skillset cargo {
+  resource box { initial EMPTY  EMPTY -> FULL  FULL -> EMPTY }
+  skill load {
+    effect { full: box -> FULL }  precondition { room: resource = (box == EMPTY) }  result { success LOADED: apply = full } }
+  skill unload {
+    effect { empty: box -> EMPTY }  precondition { full: resource = (box == FULL) }  result { success UNLOADED: apply = empty } }
+}
+"""
+
+
+@pytest.mark.parametrize(
+    ("goal", "steps", "accepted"),
+    [
+        ("cargo.box == FULL", ("cargo.load",), ["cargo.box == FULL"]),
+        ("cargo.box == FULL then arrival then cargo.box == EMPTY", ("cargo.load", "base.drive", "cargo.unload"), ["cargo.box == FULL"]),
+    ],
+)
+def test_a_state_that_the_goal_asks_for_may_be_left(
+    goal: str, steps: tuple[str, ...], accepted: list[str], tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """Nothing can be loaded any more once the box is full; and the robot departs with a skillset that such a mission may not use."""
+    folder = rover(tmp_path, ROUNDS).parents[1]
+    (folder / "skillsets/box.skill").write_text(BOX)
+    (folder / "robot.yaml").write_text("name: rover\ndeparture: base.place DOCKED\nrest: base.wheels FREE\n")
+    monkeypatch.setenv("ALULA_ROBOT", str(folder))
+    plan = Planner(Aim(goal, most_faults=1), Deadline.after(TIME_S), quiet).run().plan
+    assert plan is not None
+    assert plan.steps == steps
+    assert re.findall(r"accepted ALU701 \((.*?)\): the goal asks for it", plan.text) == accepted
+
+
 def test_what_no_skill_leads_to_is_impossible(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     answer = planned(Aim("eyes.laser == OK", "eyes.laser == BROKEN"), tmp_path, monkeypatch)
     assert (answer.plan, answer.impossible, answer.tried) == (None, True, 0)
@@ -226,6 +280,8 @@ def test_what_no_skill_leads_to_is_impossible(tmp_path: Path, monkeypatch: pytes
         (Aim("arrival", "not base.place == AWAY"), "--from 'not base.place == AWAY': write states"),
         (Aim("arrival", using=("base.fly",)), "--using base.fly: there is no such skill"),
         (Aim("sight"), "--goal 'sight'"),
+        (Aim("arrival then sight"), "--goal 'sight': no skill fills this role by its success; there are arrival"),
+        (Aim("arrival then"), "--goal '': can't be read as a condition"),
     ],
 )
 def test_what_can_not_be_planned_is_one_line(aim: Aim, message: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:

@@ -115,7 +115,7 @@ def plan(parser: ArgumentParser) -> None:
         metavar="SKILLSETS",
         help="a robot's folder, or its skillsets (default: the current folder's robot)",
     )
-    goal = "the goal: skillset.resource == STATE, several with and, or, not; or a role that skills provide"
+    goal = "the goal: skillset.resource == STATE, several with and, or, not; or a role that skills provide; `then` between"
     parser.add_argument("--goal", default="", metavar="CONDITION", help=goal)
     start = "the initial states: skillset.resource == STATE, several with and (default: as after power-up)"
     parser.add_argument("--from", dest="start", default="", metavar="CONDITION", help=start)
