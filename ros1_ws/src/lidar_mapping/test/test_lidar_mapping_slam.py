@@ -162,6 +162,14 @@ def test_a_height_of_the_autopilot_that_runs_away_does_not_take_the_map_along(ra
     assert slam.T_map_odom[2, 3] == pytest.approx(-rate_m_s * 23.0, abs=0.06)
 
 
+@pytest.mark.parametrize("rate_m_s", [0.03, -0.03])
+def test_a_height_that_begins_to_run_away_on_a_straight_leg_does_not_take_the_map_along(rate_m_s) -> None:
+    slam = Slam(SlamSettings())
+    off_m = off_height(Path(straight, across_deg=17.0), slam, 18.0, lambda t: rate_m_s * max(0.0, t - 6.0))
+    assert np.abs(off_m).max() < 0.09, "0.29 m where the rate can't change at once"
+    assert slam.height_drift_m == pytest.approx(rate_m_s * 12.0, abs=0.08)
+
+
 @pytest.mark.parametrize("ground", ["slope", "roof"])
 def test_neither_a_slope_nor_the_edge_of_a_roof_is_taken_for_a_drift_of_the_height(ground) -> None:
     slam = Slam(SlamSettings())

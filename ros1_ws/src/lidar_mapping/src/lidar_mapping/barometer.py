@@ -3,6 +3,10 @@
 While the vehicle flies straight, a drift looks like a map that is tilted along the way: 0.015 m/s at 1 m/s are 0.86 degrees. Where it
 climbs, hovers or turns, only the drift goes on. So heights count there, too, though no keyframe is made. Which of the two is more likely is
 a matter of what is known before: the drift is some millimetres a second, with a long tail (`HeightSettings`), the tilt half a degree.
+
+A drift that begins in flight bends the heights along the way, which a tilt does not. A rate that walks would follow such a bend with a
+delay and leave the rest to the map. So the rate is also allowed to change at once, at the node where that explains the heights best, as
+soon as it explains them much better (the likelihood ratio of a change, as in tests for outliers).
 """
 
 from __future__ import annotations
@@ -20,6 +24,8 @@ if TYPE_CHECKING:
 
 LEAST_S = 0.1  # between two nodes
 JUMP_WITHIN_S = 1.0  # what changed over a longer silence is no jump
+DOUBTED = 100  # nodes, the last ones, a minute and more: what changed before has been found
+LEAST_EXPLAINED = 1e-6  # of a walk's variance: less is rounding
 
 
 @dataclass(frozen=True)
@@ -27,16 +33,19 @@ class HeightSettings:
     """What is known of the autopilot's height; metres, seconds.
 
     It is noisy by ``noise_m``. Its zero walks by ``walk_m`` a root second and drifts by ``drift_m_s``, of which more than ``tail`` times
-    that counts less and less (Cauchy); the rate walks by ``drift_walk_m_s`` a root second. What changes by more than ``jump_m`` from one
-    sweep to the next is a jump. On a known map the zero is known to ``known_m``. While the vehicle stays near a keyframe, a height counts
-    every ``stay_s``, and after long stays every tenth of their time.
+    that counts less and less (Cauchy); the rate walks by ``drift_walk_m_s`` a root second, and changes by ``change_m_s`` where twice the
+    logarithm of the likelihood ratio for that exceeds ``change_gain``. What changes by more than ``jump_m`` from one sweep to the next is a
+    jump. On a known map the zero is known to ``known_m``. While the vehicle stays near a keyframe, a height counts every ``stay_s``, and
+    after long stays every tenth of their time.
     """
 
-    noise_m: float = 0.03
-    walk_m: float = 0.005
+    noise_m: float = 0.01
+    walk_m: float = 0.003
     drift_m_s: float = 0.0035
     tail: float = 0.8
     drift_walk_m_s: float = 0.0005
+    change_m_s: float = 0.01
+    change_gain: float = 6.0
     jump_m: float = 0.1
     known_m: float = 0.3
     stay_s: float = 1.0
@@ -49,6 +58,8 @@ class _Node:
     stamp_ns: int
     zero_m: float
     rate_m_s: float
+    walk: int | None = None
+    """The factor that ties the rate to that of the node before; None where there is none, or the rate may change at once."""
 
 
 class BarometerZero:
@@ -70,6 +81,11 @@ class BarometerZero:
     def rate_m_s(self) -> float:
         """The drift's rate."""
         return self._nodes[-1].rate_m_s if self._nodes else 0.0
+
+    @property
+    def changes_s(self) -> list[float]:
+        """When the rate was allowed to change at once, seconds since the first height."""
+        return [(node.stamp_ns - self._nodes[0].stamp_ns) / NS for node in self._nodes[1:] if node.walk is None]
 
     def hear(self, stamp_ns: int, height_m: float, up_m: float) -> None:
         """Take the autopilot's height at the end of a sweep, and the height in the map, which the scan says."""
@@ -101,7 +117,8 @@ class BarometerZero:
             self._factors.add(_drifting(node, passed_s, isotropic(1, settings.walk_m * np.sqrt(passed_s))))
             rate_walk = isotropic(1, settings.drift_walk_m_s * np.sqrt(passed_s))
             self._factors.add(gtsam.BetweenFactorDouble(_rate(node - 1), _rate(node), 0.0, rate_walk))
-            self._nodes.append(_Node(stamp_ns, before.zero_m + passed_s * before.rate_m_s, before.rate_m_s))
+            walk = self._factors.size() - 1
+            self._nodes.append(_Node(stamp_ns, before.zero_m + passed_s * before.rate_m_s, before.rate_m_s, walk))
         else:
             known = isotropic(1, settings.known_m if keyframe else 1e-3)
             self._factors.add(gtsam.PriorFactorDouble(_zero(node), self._above_m, known))
@@ -122,6 +139,39 @@ class BarometerZero:
         """Take what the optimisation has found."""
         for n, node in enumerate(self._nodes):
             node.zero_m, node.rate_m_s = values.atDouble(_zero(n)), values.atDouble(_rate(n))
+
+    def allow_change(self, values: gtsam.Values) -> bool:
+        """Let the rate change at once where that explains the heights much better than its walk; return whether there is such a node.
+
+        ``values`` are those that agree best with all factors. What a rate's change would be without the factor of its walk, and how surely,
+        follows from the change with it.
+        """
+        marginals = gtsam.Marginals(self._factors, values)
+        doubted = range(max(1, len(self._nodes) - DOUBTED), len(self._nodes))
+        gains = {n: self._gain(n, values, marginals) for n in doubted}
+        best = max(gains, key=gains.__getitem__, default=0)
+        walk = self._nodes[best].walk if gains else None
+        if walk is None or gains[best] <= self._settings.change_gain:
+            return False
+        change = gtsam.noiseModel.Isotropic.Sigma(1, self._settings.change_m_s)
+        self._factors.replace(walk, gtsam.BetweenFactorDouble(_rate(best - 1), _rate(best), 0.0, change))
+        self._nodes[best].walk = None
+        return True
+
+    def _gain(self, node: int, values: gtsam.Values, marginals: gtsam.Marginals) -> float:
+        """Return twice the logarithm of the likelihood ratio of a change at a node and the walk up to it."""
+        keys, before = (_rate(node - 1), _rate(node)), self._nodes[node - 1]
+        if self._nodes[node].walk is None:
+            return 0.0
+        passed_s = max(abs(self._nodes[node].stamp_ns - before.stamp_ns) / NS, LEAST_S)
+        walked = self._settings.drift_walk_m_s**2 * passed_s
+        joint = marginals.jointMarginalCovariance(gtsam.KeyVector(list(keys))).fullMatrix()
+        left = 1.0 - (joint[0, 0] + joint[1, 1] - 2.0 * joint[0, 1]) / walked  # of the walk's variance, explained by the heights
+        if left < LEAST_EXPLAINED:
+            return 0.0
+        free_m_s = (values.atDouble(keys[1]) - values.atDouble(keys[0])) / left
+        free, changed = walked / left, walked / left - walked + self._settings.change_m_s**2
+        return float(free_m_s**2 * (1.0 / free - 1.0 / changed) - np.log(changed / free))
 
 
 def _zero(node: int) -> int:

@@ -1,7 +1,8 @@
 """The pose graph of the keyframes: odometry, loops, and what the autopilot says of place, height and the vertical (gtsam).
 
 The odometry alone keeps the tilt with which the map began: 0.3 degrees are 0.1 m of height after 20 m. The autopilot's height comes from
-a barometer, which drifts with time and not with the way (`BarometerZero`), so its differences along the way say what is level.
+a barometer, which drifts with time and not with the way (`BarometerZero`), so its differences along the way say what is level. The
+autopilot's vertical leans by a constant about the body's axes: when the vehicle turns, the lean turns in the map and is told from a tilt.
 
 The graph also says how well the last keyframe is known in the map. The odometry lays each scan onto keyframes that it has placed itself,
 so its own covariance is that of the pose relative to them, and says nothing of the error that they hand on from one to the next.
@@ -27,7 +28,8 @@ if TYPE_CHECKING:
     Floats = NDArray[np.float64]
 
 
-_UP = gtsam.Unit3(np.array([0.0, 0.0, 1.0]))
+LEAN = int(gtsam.symbol("l", 0))
+ANY_TILT_RAD = 0.1  # of a new map: the autopilot's vertical tells
 
 
 @dataclass(frozen=True)
@@ -37,9 +39,9 @@ class GraphSettings:
     A keyframe is held against one that lies at least ``path_m`` of flight back and within ``reach_m``. The drift of the odometry is
     ``drift`` of the way and ``turn_rad`` a keyframe; upwards, where the ground holds the scan, it is ``up_m`` a keyframe. The autopilot's
     position is believed to ``autopilot_m``: loosely, for its error is the same for minutes, so that many keyframes know no more of it than
-    one. What is known of its height stands in ``height``. The map begins level to ``tilt_rad``, and the autopilot's vertical is believed to
-    ``upright_rad`` at one keyframe, loosely, as its position. With every ``every``th keyframe loops are looked for and all is optimised;
-    keyframes are moved where one is off by ``moved_m``.
+    one. What is known of its height stands in ``height``. Its vertical leans by a constant of ``tilt_rad``, and by ``upright_rad`` more at
+    one keyframe, loosely, as its position; a new map begins upright by it to ``begin_rad``. With every ``every``th keyframe loops are
+    looked for and all is optimised; keyframes are moved where one is off by ``moved_m``.
     """
 
     path_m: float = 25.0
@@ -47,14 +49,15 @@ class GraphSettings:
     every: int = 3
     drift: float = 0.01
     least_m: float = 0.005
-    turn_rad: float = 0.001
-    up_m: float = 0.003
+    turn_rad: float = 0.0005
+    up_m: float = 0.001
     loop_m: float = 0.03
     loop_rad: float = 0.005
     loop_fitness: float = 0.7
     autopilot_m: float = 30.0
-    tilt_rad: float = 0.01
-    upright_rad: float = 0.1
+    tilt_rad: float = 0.012
+    upright_rad: float = 0.01
+    begin_rad: float = 0.002
     moved_m: float = 0.02
     submap: int = 6
     height: HeightSettings = field(default_factory=HeightSettings)
@@ -68,9 +71,17 @@ class PoseGraph:
         self._factors = gtsam.NonlinearFactorGraph()
         self._path_m: list[float] = []
         self.barometer = BarometerZero(settings.height, self._factors)
+        self._lean_rad: Floats = np.zeros(3)
+        leaning = gtsam.noiseModel.Diagonal.Sigmas(np.array([settings.tilt_rad, settings.tilt_rad, 1e-3]))
+        self._factors.add(gtsam.PriorFactorVector(LEAN, np.zeros(3), leaning))
         self.loops = 0
         self.covariance: Floats = np.zeros((6, 6))
         """Of the last keyframe's pose: rotation vector and position, map frame (6, 6)."""
+
+    @property
+    def lean_rad(self) -> Floats:
+        """How the autopilot's vertical leans about the body's x and y, (2,)."""
+        return self._lean_rad[:2]
 
     def stay(self, keyframes: Keyframes, stamp_ns: int) -> None:
         """Take the height that the barometer has heard, where the vehicle stays near the last keyframe."""
@@ -98,8 +109,8 @@ class PoseGraph:
         return self._optimise(keyframes)
 
     def _begin(self, frame: Keyframe) -> None:
-        """Place the first keyframe: a new map is level as the autopilot says, one that is known already was levelled before."""
-        tilt_rad = 1e-3 if frame.everywhere else self._settings.tilt_rad
+        """Place the first keyframe: a new map is level as the autopilot's vertical leans, one that is known already was levelled before."""
+        tilt_rad = 1e-3 if frame.everywhere else ANY_TILT_RAD
         start = gtsam.noiseModel.Diagonal.Sigmas(np.array([tilt_rad, tilt_rad, 1e-3, 1e-3, 1e-3, 1e-3]))
         self._factors.add(gtsam.PriorFactorPose3(0, gtsam.Pose3(frame.pose), start))
         self._path_m.append(0.0)
@@ -122,8 +133,8 @@ class PoseGraph:
         """Take the autopilot's place, vertical and height."""
         settings, isotropic = self._settings, gtsam.noiseModel.Isotropic.Sigma
         self._factors.add(gtsam.GPSFactor(index, np.asarray(T_odom_base[:3, 3], dtype=np.float64), isotropic(3, settings.autopilot_m)))
-        up = gtsam.Unit3(np.asarray(T_odom_base[2, :3], dtype=np.float64))
-        self._factors.add(gtsam.AttitudeFactorPose3(index, _UP, isotropic(2, settings.upright_rad), up))
+        upright = isotropic(2, settings.upright_rad if index else settings.begin_rad)
+        self._factors.add(_leaning(index, frame.pose, T_odom_base[2, :3], upright))
         self.barometer.tie(frame.stamp_ns, index, float(frame.pose[2, 3]))
 
     def _go_on(self, moved_m: Floats, odometry: gtsam.noiseModel.Diagonal) -> None:
@@ -166,10 +177,14 @@ class PoseGraph:
         values = gtsam.Values()
         for i, frame in enumerate(keyframes.all):
             values.insert(i, gtsam.Pose3(frame.pose))
+        values.insert(LEAN, self._lean_rad)
         self.barometer.insert_into(values)
         best = gtsam.LevenbergMarquardtOptimizer(self._factors, values).optimize()
+        while self.barometer.allow_change(best):
+            best = gtsam.LevenbergMarquardtOptimizer(self._factors, best).optimize()
         poses = [best.atPose3(i).matrix() for i in range(len(keyframes.all))]
         self.barometer.take_from(best)
+        self._lean_rad = best.atVector(LEAN)
         turn = np.kron(np.eye(2), poses[-1][:3, :3])  # gtsam tells of the body's axes
         self.covariance = turn @ gtsam.Marginals(self._factors, best).marginalCovariance(len(poses) - 1) @ turn.T
         off_m = max(float(np.linalg.norm(pose[:3, 3] - frame.pose[:3, 3])) for pose, frame in zip(poses, keyframes.all, strict=True))
@@ -178,6 +193,21 @@ class PoseGraph:
         for pose, frame in zip(poses, keyframes.all, strict=True):
             frame.pose = pose
         return True
+
+
+def _leaning(index: int, pose: Floats, up: Floats, noise: gtsam.noiseModel.Isotropic) -> gtsam.LinearContainerFactor:
+    """Return the factor that says: the autopilot's vertical ``up`` (3,), body frame, is that of a keyframe's pose, and the lean.
+
+    A turn d of the pose about the body's axes, and a lean l, both small, take the vertical v to v - (d + l) x v.
+    """
+    at = gtsam.Values()
+    at.insert(index, gtsam.Pose3(pose))
+    at.insert(LEAN, np.zeros(3))
+    vertical = pose[2, :3]
+    turned = cross_matrix(vertical)[:2]
+    of_pose = np.hstack([turned, np.zeros((2, 3))])
+    linear = gtsam.JacobianFactor(index, of_pose, LEAN, turned, np.asarray(up - vertical, dtype=np.float64)[:2], noise)
+    return gtsam.LinearContainerFactor(linear, at)
 
 
 def _noise(turn_rad: float, shift_m: float) -> gtsam.noiseModel.Diagonal:
