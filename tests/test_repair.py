@@ -20,6 +20,7 @@ import yaml
 from alula import Mission
 from alula.check.robot import part_of
 from alula.cli.check import main as check
+from alula.cli.compare import main as compare
 from alula.cli.plan import main as plan
 from alula.cli.repair import main as repair
 from alula.cli.run import main as run
@@ -30,12 +31,15 @@ from alula.missions.drawing import ROW_PX
 from alula.missions.mission_file import plan_of_file
 from alula.missions.mocked import MockedMission
 from alula.missions.scenario import inputs_of
+from alula_testing.flights import start_flight, with_mission
 from repair_bench.cases import copied, without_chances, without_end, without_lidar, without_video_end
 
 ALULA_ROOT = Path(__file__).resolve().parents[1]
 TIME_S = "600"
 """What a search may take here: it ends by its result, also on a busy machine."""
 LONG = "ALULA_LONG_REPAIRS"
+WITHIN_S = "5"
+"""How much sooner or later two live flights may decide the same: two of one tree have differed by 1.9 s; a leg takes 15 s and more."""
 
 
 @pytest.fixture
@@ -251,6 +255,24 @@ def test_over_mocks_all_faults_end_as_with_the_branch_by_hand(repaired: Repaired
 def decisions(run: MockedMission) -> list[str]:
     """Return the skills that have ended, in their order."""
     return [one.skill for one in run.ended]
+
+
+@pytest.mark.flight
+@pytest.mark.long
+@pytest.mark.timeout(0)  # two flights: as long as the machine needs
+def test_live_the_written_branch_decides_what_the_one_by_hand_does(
+    repaired: Repaired, tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    checkout = with_mission(tmp_path / "checkout", "mapping.xml", repaired.out.read_text())
+    lost = ("--rate", "0", "--seed", "1", "--fail", "zed@12")
+    flights = [start_flight(tmp_path / "by-hand", *lost), start_flight(tmp_path / "written", *lost, checkout=checkout)]
+    try:
+        assert [flight.end() for flight in flights] == [0, 0]
+    finally:
+        for flight in flights:
+            flight.give_up()
+    assert [flight.summary["outcome"] for flight in flights] == ["degraded", "degraded"]
+    assert compare([*(str(flight.out) for flight in flights), "--within", WITHIN_S]) == 0, capsys.readouterr().out
 
 
 @pytest.mark.skipif(LONG not in os.environ, reason=f"takes more than a minute of processor time: {LONG}=1 runs it")

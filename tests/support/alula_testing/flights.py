@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import json
 import os
+import shutil
 import signal
 import subprocess
 import time
@@ -120,18 +121,38 @@ def story(flight: Flight) -> list[tuple[str, str, str]]:
     return [(e["skill"], e["outcome"], e["result"]) for e in in_order(flight)]
 
 
-def start_flight(out: Path, *arguments: str, scenario: str = "mapping") -> Flight:
-    """Start ``./alula fly SCENARIO ARGUMENTS`` as fast as the machine can, as a user's shell would."""
+def with_mission(checkout: Path, name: str, text: str) -> Path:
+    """Make a checkout of links in a folder, with another mission file of this name in it; what was built is shared."""
+    checkout.mkdir()
+    for entry in ALULA_ROOT.iterdir():
+        if entry.name not in {".alula", ".git", "missions", "runs", "setup"}:
+            (checkout / entry.name).symlink_to(entry)
+    shutil.copytree(ALULA_ROOT / "setup", checkout / "setup")  # its scripts find the checkout by where they are
+    shutil.copytree(ALULA_ROOT / "missions", checkout / "missions")
+    (checkout / "missions" / name).write_text(text, encoding="utf-8")
+    return checkout
+
+
+def start_flight(out: Path, *arguments: str, scenario: str = "mapping", checkout: Path = ALULA_ROOT) -> Flight:
+    """Start ``./alula fly SCENARIO ARGUMENTS`` as fast as the machine can, as a user's shell would; ``checkout``: of `with_mission`."""
     environment = {k: v for k, v in os.environ.items() if not k.startswith(("ROS_", "PYTHON", "AMENT", "CMAKE", "LD_"))}
+    command = [str(ALULA_ROOT / "alula"), "fly"]
+    if checkout != ALULA_ROOT:
+        environment = {k: v for k, v in environment.items() if not k.startswith("ALULA_")} | {"ALULA_STATE": str(_state())}
+        command = [str(checkout / "setup/in_ros1"), "python3", "-m", "alula_flight.run"]
     with (out.parent / f"{out.name}.txt").open("w", encoding="utf-8") as words:
         process = subprocess.Popen(
-            [str(ALULA_ROOT / "alula"), "fly", scenario, "--out", str(out), *arguments],
+            [*command, scenario, "--out", str(out), *arguments],
             stdin=subprocess.DEVNULL,
             stdout=words,
             stderr=subprocess.STDOUT,
             text=True,
             env=environment,
-            cwd=ALULA_ROOT,
+            cwd=checkout,
             start_new_session=True,
         )
     return Flight(process, out)
+
+
+def _state() -> Path:
+    return Path(os.environ.get("ALULA_STATE", ALULA_ROOT / ".alula"))
