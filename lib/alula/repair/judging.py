@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import re
 from collections import Counter
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 
@@ -35,6 +35,11 @@ class Judgement:
 
     findings: tuple[Diagnostic, ...]
     complete: bool
+
+    @property
+    def clean(self) -> bool:
+        """Tell whether nothing was found."""
+        return all(one.code == BOUND for one in self.findings)
 
     def new(self, before: Judgement) -> list[Diagnostic]:
         """Return the findings that another mission has not: what says the same of another place counts as often as it is there."""
@@ -68,17 +73,26 @@ class Judge:
         self._goal = goal
         self._reached = reached
 
-    def check(self, text: str, *, prove: bool = True, also: bool = False) -> Judgement:
-        """Return what `check` tells of a text of the mission's file; raises OutOfTimeError.
+    def read(self, text: str) -> Judgement:
+        """Return what `check` tells of a text of the mission's file without looking at its runs."""
+        return Judgement(tuple(self._subject.findings(text)), complete=False)
 
-        ``also``: of runs in which hooks raise, processes die or people interfere, too; else only of what the models make go wrong.
+    def check(self, text: str) -> Judgement:
+        """Return what `check` tells of a text, of what the models make go wrong; raises OutOfTimeError."""
+        return next(self.parts(text))
+
+    def parts(self, text: str) -> Iterator[Judgement]:
+        """Yield what `check` does, then that of runs in which hooks raise, processes die or people interfere, too; raises OutOfTimeError.
+
+        The second part goes on with what the first one knows. Of a text with errors, both are these.
         """
-        found = self._subject.findings(text)
-        if any(one.severity is Severity.ERROR for one in found) or not prove:
-            return Judgement(tuple(found), complete=False)
+        found = self.read(text)
+        if any(one.severity is Severity.ERROR for one in found.findings):
+            yield from (found, found)
+            return
         with self._subject.copy(text) as path:
-            proved = self._prove(path, also=also)
-        return Judgement((*found, *proved.findings), proved.complete)
+            for proved in self._prove(path):
+                yield Judgement((*found.findings, *proved.findings), proved.complete)
 
     def refuse_unread(self, text: str, option: str, condition: str) -> None:
         """Raise RepairError where the property that asks for an option's condition can't be read in a text of the mission's file."""
@@ -86,11 +100,11 @@ class Judge:
         if wrong is not None:
             raise RepairError(f"{option} '{condition}': {wrong.message}{f'; {wrong.hint}' if wrong.hint else ''}")
 
-    def _prove(self, path: Path, *, also: bool) -> Proved:
+    def _prove(self, path: Path) -> Iterator[Proved]:
         self._deadline.check()
         subject = self._subject
         given = f"{self._deadline.left_s():.3g} s"
-        return prove_within(self._deadline, subject.changed(path), faults=subject.shown, given=given, also=also)
+        return prove_within(self._deadline, subject.changed(path), faults=subject.shown, given=given)
 
     def skills(self, text: str) -> list[str]:
         """Return the skills of the leaves of a text of the mission's file, by the leaves' numbers."""

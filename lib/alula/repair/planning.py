@@ -214,8 +214,7 @@ class Planner:
             asked = [one for one in self._kept(course) if any(it.code == LEFT and _words(*one) in it.message for it in findings)]
             fails = not any(it.code == NEVER for it in findings)
             text, nodes = self._text(course, ends, asked, fails=fails)
-            for also in (False, True):
-                found = judge.check(text, also=also)
+            for found in judge.parts(text):
                 bad = next((one for one in found.findings if one.severity is not Severity.NOTE), None)
                 if bad is not None:
                     return bad.message

@@ -158,10 +158,24 @@ class Search:
         self._missing = tuple(subject.names_asked())
 
     @cached_property
+    def _text_before(self) -> str:
+        """The mission's file as it is, without the properties that ask for nodes which it has not."""
+        return self._without_branch(self._missing)[0]
+
+    @cached_property
+    def _before(self) -> Judgement:
+        """What `check` finds in the mission as it is, of what the models make go wrong."""
+        return self._judge.check(self._text_before)
+
+    @cached_property
     def _whole_before(self) -> Judgement:
         """What `check` finds in the mission as it is, in all the runs that it looks at."""
-        text, _ = self._without_branch(self._missing)
-        return self._judge.check(text, also=True)
+        *_, whole = self._judge.parts(self._text_before)
+        return whole
+
+    def _new(self, judgement: Judgement, *, whole: bool = False) -> list[Diagnostic]:
+        """Return the findings that the mission as it is has not; of that nothing need be known where nothing was found."""
+        return [] if judgement.clean else judgement.new(self._whole_before if whole else self._before)
 
     def stop(self) -> None:
         """Have the search end with the best that it has found; a signal's handler may call it."""
@@ -170,14 +184,14 @@ class Search:
 
     def run(self) -> Answer:
         """Search; raises AlulaError where the mission can't be looked at."""
-        text, _ = self._without_branch(self._missing)
-        before = self._judge.check(text)
-        errors = [one for one in before.findings if one.severity is Severity.ERROR and one.code < "ALU7"]
+        text = self._text_before
+        read = self._judge.read(text)
+        errors = [one for one in read.findings if one.severity is Severity.ERROR and one.code < "ALU7"]
         if errors:
             raise RepairError(f"the mission has errors, which come first: {errors[0].render()}")
         self._can_be_asked()
         system = System.of(self._subject.mission)
-        finding = self._finding(before)
+        finding = self._finding()
         failing = self._failing(system, finding)
         fault = (self._question.fault,) if self._question.fault else ()
         fate = self._judge.fate(text, fault) if fault else None
@@ -187,7 +201,7 @@ class Search:
         reasons = next((lines for one in failing if (lines := self._why_impossible(text, one))), [])
         if reasons and (fate is None or fate.safe):
             return Answer(tuple(failing), fate, None, impossible=True, reasons=tuple(reasons))
-        repair, tried = self._first_proved(before, failing, fate, finding)
+        repair, tried = self._first_proved(read, failing, fate, finding)
         if repair is not None and self._question.others:
             repair = self._with_fates(text, repair)
         if repair is None and not reasons:
@@ -208,11 +222,11 @@ class Search:
         with_property(document.root, self._subject.files.main, more)
         return document.text(), taken
 
-    def _finding(self, before: Judgement) -> Diagnostic | None:
+    def _finding(self) -> Diagnostic | None:
         number = self._question.finding
         if not number:
             return None
-        playable = [one for one in before.findings if run_of(one) is not None]
+        playable = [one for one in self._before.findings if run_of(one) is not None]
         if not 1 <= number <= len(playable):
             raise RepairError(f"--finding {number}: the mission has {len(playable)} counterexamples that are not accepted in its file")
         return playable[number - 1]
@@ -236,7 +250,7 @@ class Search:
         return found
 
     def _first_proved(
-        self, before: Judgement, failing: Sequence[Failing], fate: Fate | None, finding: Diagnostic | None
+        self, read: Judgement, failing: Sequence[Failing], fate: Fate | None, finding: Diagnostic | None
     ) -> tuple[Repair | None, int]:
         """Return the first branch that is proved, and how many were tried."""
         tried = 0
@@ -249,7 +263,7 @@ class Search:
                 continue
             tried += 1
             try:
-                found = self._judged(branch, before, fate, finding)
+                found = self._judged(branch, read, fate, finding)
             except OutOfTimeError:
                 self._stopped = True
                 return None, tried
@@ -258,12 +272,12 @@ class Search:
             self._tell(f"{branch.size} nodes, '{branch.name}': no: {found}")
         return None, tried
 
-    def _judged(self, branch: Branch, before: Judgement, fate: Fate | None, finding: Diagnostic | None) -> Repair | str:
+    def _judged(self, branch: Branch, read: Judgement, fate: Fate | None, finding: Diagnostic | None) -> Repair | str:
         """Return the repair, or why it is none."""
         names = {node_name(one) for one in (branch.tree.iterate() if branch.tree is not None else ())}
         leave_out = tuple(one for one in self._missing if one not in names)
         text, not_asked = branch.written(self._subject, leave_out, self._question.never_asked)
-        if errors := [one for one in self._judge.check(text, prove=False).new(before) if one.severity is Severity.ERROR]:
+        if errors := [one for one in self._judge.read(text).new(read) if one.severity is Severity.ERROR]:
             return errors[0].message
         assuming: tuple[str, ...] = ()
         if fate is not None:
@@ -271,17 +285,17 @@ class Search:
             assuming = now.assuming
             if not now.answered and (fate.safe or not now.safe):
                 return f"with {' and '.join(fate.faults)} it {_told(now)}{self._what_is_missing(branch, now)}"
-        judgement = self._judge.check(text)
-        new = judgement.new(before)
-        if new:
+        parts = self._judge.parts(text)
+        judgement = next(parts)
+        if new := self._new(judgement):
             self._learn(branch, text, new[0])
             return new[0].message
         if not judgement.complete:
             return "not all its runs were looked at"
-        if finding is not None and _is_left(judgement, before, finding):
+        if finding is not None and _is_left(judgement, self._before, finding):
             return "the counterexample is still there"
-        whole = self._judge.check(text, also=True)
-        if new := whole.new(self._whole_before):
+        whole = next(parts)
+        if new := self._new(whole, whole=True):
             return new[0].message
         if not whole.complete:
             return "not all its runs in which hooks raise, managers die, or somebody aborts or pauses it were looked at"

@@ -158,7 +158,7 @@ def test_models_that_can_not_be_read_are_refused_with_their_file(robot: Path, ca
 
 @pytest.mark.parametrize(
     ("moment", "code", "answer"),
-    [((planning.Judge, "check"), 1, "unknown"), ((planning.Search, "run"), 0, "planned")],
+    [((planning.Judge, "parts"), 1, "unknown"), ((planning.Search, "run"), 0, "planned")],
     ids=["before a course is proved", "while a fault is answered"],
 )
 def test_ctrl_c_ends_it_with_what_is_proved(

@@ -64,8 +64,10 @@ class Ending:
         self._memories = regions.system.ticker.memories
         self._come = come
         self.groups = list(groups)
-        self._sets: list[Sets] = [tuple(map(frozenset, group.managers)) for group in self.groups]
+        self._sets: list[Sets] = [tuple(regions.same(frozenset(one)) for one in group.managers) for group in self.groups]
         self._ways: list[_Way] = []
+        self._coming: dict[tuple[int, int, frozenset[int]], tuple[frozenset[int], frozenset[tuple[int, ...]]]] = {}
+        """By a skillset's place, the identity of an outcome and managers before it, what of each of them has to be in a target."""
         self._leading: defaultdict[int, list[int]] = defaultdict(list)
         """By memories the numbers of the groups from which a tick can come to them."""
         self._sure: defaultdict[int, list[Sets]] = defaultdict(list)
@@ -105,11 +107,19 @@ class Ending:
     def _following(self, memory: int, answers: tuple[Answer, ...], sets: Sets) -> _Way:
         found = self._regions.follow(memory, TICK, answers, sets)
         if isinstance(found, Outcome):
-            come = [{self._come(place, number, found) for number in numbers} for place, numbers in enumerate(sets)]
-            must = (frozenset(one[0] for one in several if len(one) == 1) for several in come)
-            return _Way(found, tuple(must), tuple(frozenset(one for one in several if len(one) != 1) for several in come))
+            several = [self._coming_of(place, numbers, found) for place, numbers in enumerate(sets)]
+            return _Way(found, tuple(must for must, _ in several), tuple(either for _, either in several))
         parts = tuple(self._following(memory, (*answers, answer), left) for answer, left in found.ways)
         return _Way(parts=parts, any_part=found.free)
+
+    def _coming_of(self, place: int, numbers: frozenset[int], outcome: Outcome) -> tuple[frozenset[int], frozenset[tuple[int, ...]]]:
+        """Return the managers of a skillset that come surely, and the choices of which one comes; the ticker keeps outcomes."""
+        key = (place, id(outcome), numbers)
+        if key not in self._coming:
+            come = {self._come(place, number, outcome) for number in numbers}
+            must = self._regions.same(frozenset(one[0] for one in come if len(one) == 1))
+            self._coming[key] = must, frozenset(one for one in come if len(one) != 1)
+        return self._coming[key]
 
     def _ends(self, way: _Way, values: Values) -> bool:
         if way.outcome is None:

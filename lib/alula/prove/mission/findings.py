@@ -28,9 +28,14 @@ ANSWER = "put a Fallback around it with what is to be done then, or `<AlwaysFail
 
 def findings(regions: Regions, answers: Answers) -> list[Diagnostic]:
     """Return what is wrong, or can go wrong, each thing with a run that shows it."""
-    found = [*_left_taken(regions), *_fighting(regions)]
+    found = leaving_and_fighting(regions)
     # What never happens is known only when all runs were looked at.
     return [*found, *_unanswered(regions, answers), *_never(regions)] if regions.complete else found
+
+
+def leaving_and_fighting(regions: Regions) -> list[Diagnostic]:
+    """Return which skills a mission leaves so that they can't start any more (ALU701), and what fights for a resource (ALU708)."""
+    return [*_left_taken(regions), *_fighting(regions)]
 
 
 def taken_as(system: System, *, exactly: bool = True) -> Iterator[Diagnostic]:

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import re
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass, field, replace
 from pathlib import Path
 
@@ -16,7 +16,7 @@ from alula.prove.mission.accepted import acceptances, divided
 from alula.prove.mission.answers import Answers, Row
 from alula.prove.mission.asked import with_asked_resources
 from alula.prove.mission.conditions import NO_FAULTS, Faults
-from alula.prove.mission.findings import WAITS, findings, taken_as, unless_held_up, waits
+from alula.prove.mission.findings import WAITS, findings, leaving_and_fighting, taken_as, unless_held_up, waits
 from alula.prove.mission.holding import SINGLE, held
 from alula.prove.mission.managers import Failures
 from alula.prove.mission.oracle import UndecidedError
@@ -31,11 +31,6 @@ ALSO = Failures(deaths=True, pauses=True)
 """What is looked at afterwards: hooks that raise, managers' processes that die, an abort and a pause from outside besides."""
 SHARE = 0.5
 """How long that may take, by the time that the rest has."""
-TOLD = frozenset({"ALU701", "ALU708"})
-"""Codes of which that is told, too, besides what waits for ever and the file's properties of single situations.
-
-What nothing answers is not: the last of all answers can always fail so. What never happens is asked of the models' failures alone.
-"""
 
 
 @dataclass(frozen=True)
@@ -76,15 +71,17 @@ def prove_within(
     *,
     faults: Faults = NO_FAULTS,
     given: str,
-    also: bool = False,
-) -> Proved:
-    """Return what the models alone make go wrong, within a deadline; ``given`` is what messages call it.
+) -> Iterator[Proved]:
+    """Yield what the models alone make go wrong, then that and what ``prove_mission`` looks at afterwards, within a deadline.
 
-    ``also`` has runs looked at, too, in which hooks raise, processes die or people interfere, as ``prove_mission`` does.
+    What the first part has found of ticks and managers serves the second; ``given`` is what messages call the time.
+    Raises OutOfTimeError where it is over before the second part.
     """
     search = _Search(mission, faults)
     seen = search.within(deadline, given)
-    return (search.also(seen, deadline, given) if also else seen).proved()
+    yield seen.proved()
+    deadline.check()
+    yield search.also(seen, deadline, given).proved()
 
 
 @dataclass(frozen=True)
@@ -163,7 +160,8 @@ class _Search:
         try:
             regions = Regions(before.regions.system.looking_at(ALSO), deadline)
             _explore(regions)
-            found = [one for one in findings(regions, Answers(regions)) if one.code in TOLD]
+            # What nothing answers is not told: the last of all answers can always fail so. What never happens was told before.
+            found = leaving_and_fighting(regions)
             seen_waiting, complete = _waits(Waits(regions), regions, deadline)
         except UndecidedError as error:
             message = f"its runs with hooks that raise, managers that die, an abort or a pause can't be looked at: {error}"

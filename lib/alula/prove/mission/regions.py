@@ -11,7 +11,9 @@ import math
 from collections import deque
 from collections.abc import Callable, Collection, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field
+from functools import cached_property
 from itertools import islice
+from operator import is_not
 
 from alula.common.graphs import ShortestWays
 from alula.prove.limits import Deadline
@@ -32,12 +34,12 @@ class Closure:
     before: Mapping[int, tuple[int, Event] | None]
     depth: Mapping[int, int]
 
-    @property
+    @cached_property
     def all(self) -> frozenset[int]:
         """All of them."""
         return frozenset(self.before)
 
-    @property
+    @cached_property
     def roots(self) -> frozenset[int]:
         """Where they begin."""
         return frozenset(number for number, step in self.before.items() if step is None)
@@ -127,6 +129,8 @@ class Regions:
         self._closures: dict[tuple[int, frozenset[int], tuple[bool, bool]], Closure] = {}
         self._answers: dict[tuple[frozenset[int], Question], tuple[tuple[Answer, frozenset[int]], ...]] = {}
         self._commanded: dict[tuple[int, int, int, tuple[int, ...], tuple[int, ...]], int] = {}
+        self._followed: dict[tuple[int, frozenset[int], int, tuple[int, ...], tuple[int, ...]], frozenset[int]] = {}
+        self._same: dict[frozenset[int], frozenset[int]] = {}
 
     def explore(self, begin: State | None = None, until: Callable[[Region], bool] = lambda _: False) -> None:
         """Find them all from a situation on (default: power-up), or up to one region; raises OutOfTimeError.
@@ -188,11 +192,15 @@ class Regions:
             one = Ticked(act, ((outcome, left),), left)
             while (other := next((known for known in same if _differ(known.sets, one.sets) <= 1), None)) is not None:
                 same.remove(other)
-                both = tuple(a | b for a, b in zip(other.sets, one.sets, strict=True))
+                both = tuple(a if a is b else self.same(a | b) for a, b in zip(other.sets, one.sets, strict=True))
                 one = Ticked(act, (*other.ways, *one.ways), both)
             same.append(one)
         for same in found.values():
             yield from same
+
+    def same(self, numbers: frozenset[int]) -> frozenset[int]:
+        """Return the one set of these numbers that all have: there are few that differ, and they are held many times."""
+        return self._same.setdefault(numbers, numbers)
 
     def split(self, memory: int, act: str, sets: Sets) -> Iterator[tuple[Outcome, Sets]]:
         """Yield each way in which a tick can go, with the managers that it can go so with."""
@@ -222,7 +230,7 @@ class Regions:
             found: dict[Answer, list[int]] = {}
             for number in sets[place]:
                 found.setdefault(self.system.answer(number, known.question), []).append(number)
-            self._answers[key] = tuple((answer, frozenset(numbers)) for answer, numbers in found.items())
+            self._answers[key] = tuple((answer, self.same(frozenset(numbers))) for answer, numbers in found.items())
         for answer, numbers in self._answers[key]:
             yield answer, (*sets[:place], numbers, *sets[place + 1 :])
 
@@ -237,8 +245,13 @@ class Regions:
         return self._commanded[key]
 
     def _after(self, ticked: Ticked) -> Sets:
-        outcome = ticked.outcome
-        return tuple(frozenset(self.after(place, number, outcome) for number in numbers) for place, numbers in enumerate(ticked.sets))
+        return tuple(self._all_after(place, numbers, ticked.outcome) for place, numbers in enumerate(ticked.sets))
+
+    def _all_after(self, place: int, numbers: frozenset[int], outcome: Outcome) -> frozenset[int]:
+        key = (place, numbers, outcome.memory, outcome.started, outcome.interrupted)
+        if key not in self._followed:
+            self._followed[key] = self.same(frozenset(self.after(place, number, outcome) for number in numbers))
+        return self._followed[key]
 
     # --- regions -----------------------------------------------------------------------------------------------------
 
@@ -250,7 +263,7 @@ class Regions:
 
     def _add(self, memory: int, roots: Sets, origin: tuple[int, Ticked] | None) -> int:
         closures = tuple(self.closure(place, numbers, memory) for place, numbers in enumerate(roots))
-        sets = tuple(one.all for one in closures)
+        sets = tuple(self.same(one.all) for one in closures)
         self.situations += math.prod(map(len, sets))
         depth = 0 if origin is None else self.regions[origin[0]].depth + 1
         self.regions.append(Region(memory, closures, [(roots, origin)], sets, depth))
@@ -270,7 +283,7 @@ class Regions:
             gone = self.regions[other]
             roots = [a.roots | b.roots for a, b in zip(region.closures, gone.closures, strict=True)]
             region.closures = tuple(self.closure(place, numbers, region.memory) for place, numbers in enumerate(roots))
-            region.sets = tuple(one.all for one in region.closures)
+            region.sets = tuple(self.same(one.all) for one in region.closures)
             region.origins += gone.origins
             region.depth = min(region.depth, gone.depth)
 
@@ -363,7 +376,8 @@ class Regions:
 
 
 def _differ(one: Sets, other: Sets) -> int:
-    return sum(a != b for a, b in zip(one, other, strict=True))
+    """Return in how many places sets differ; equal ones are the same object (`Regions.same`)."""
+    return sum(map(is_not, one, other))
 
 
 class _Any:

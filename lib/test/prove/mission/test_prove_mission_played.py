@@ -141,9 +141,8 @@ def test_a_run_that_does_not_happen_is_left_where_it_does_not(tmp_path: Path) ->
 def test_the_axes_that_listing_3_keeps_are_kept_in_a_flight(tmp_path: Path) -> None:
     robot, path = find_robot(ROOT), ROOT / "missions" / "mapping.xml"
     part, models = part_of(robot, print), models_of(robot, print)
-    (finding,) = prove_within(
-        Few.after(1e6), MissionFile.read(path, models, part), faults=states_of_faults(models, print), given="this test"
-    ).accepted
+    file = MissionFile.read(path, models, part)
+    (finding,) = next(prove_within(Few.after(1e6), file, faults=states_of_faults(models, print), given="this test")).accepted
     assert isinstance(finding, MissionFinding)
     assert finding.run is not None
     assert ("navigation.axes_authority", "USED") in finding.run.states
@@ -174,7 +173,7 @@ def test_what_models_say_nothing_of_is_looked_at_and_plays(text: str, node: str,
     assert finding.run is not None
     assert kind in {event.kind for event in finding.run.events}
     assert play(MissionFile.read(path, finding.run.skillsets, NO_PART), finding.run).left == ""
-    known = prove_within(Deadline.after(60.0), MissionFile.read(path, robot.skillsets, NO_PART), given="this test").findings
+    known = next(prove_within(Deadline.after(60.0), MissionFile.read(path, robot.skillsets, NO_PART), given="this test")).findings
     assert "ALU704" not in {one.code for one in known}
 
 
