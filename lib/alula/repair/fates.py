@@ -2,10 +2,10 @@
 
 The world's moves are those that the odds are computed from (`MissionSteps`): what a mission's skills bring about, what the functional layer
 does in time, the chosen faults in their order, each at any moment, and whatever a fault that is there may bring about. A fault that has
-come stays, but it ends skills badly no more often than faults may come. Requests are not refused, and executions not ended, by data of
-which nothing is known, unless a fault that is there does that. Data are told, and actions of the robot's own do not fail of which nobody
-knows what they do. Executions end well; fairness is the prover's: what can happen again and again happens some time. So a mission survives
-when, from every situation that it can come into, it can still be accomplished.
+come stays, but it ends skills badly, or has requests refused by data, no more often than faults may come. Requests are not refused, and
+executions not ended, by data of which nothing is known, unless a fault that is there does that. Data are told, and actions of the robot's
+own do not fail of which nobody knows what they do. Executions end well; fairness is the prover's: what can happen again and again happens
+some time. So a mission survives when, from every situation that it can come into, it can still be accomplished.
 
 A state that comes `later`, of what others do about a fault, such as an autopilot that flies home by itself, may be one after which no
 mission can do anything. So situations without such states are looked at first: a mission that survives in these does under an assumption.
@@ -23,6 +23,7 @@ from alula.model.model import ResultKind, Skillset
 from alula.odds.mission import MissionSteps, Place
 from alula.odds.system import Kind, Outcome, Step
 from alula.prove.limits import Deadline
+from alula.prove.mission.state import Kind as Happens
 
 GOOD = frozenset({Outcome.ACCOMPLISHED, Outcome.DEGRADED})
 MOST_FAULTS = 2
@@ -39,7 +40,7 @@ class Here(NamedTuple):
 
 @dataclass(frozen=True)
 class _Ends:
-    """How executions end: by ``skillset.skill`` the good results, and ``skillset.skill RESULT`` of the bad ones."""
+    """How executions end: by ``skillset.skill`` the good results, and ``skillset.skill END`` of the bad ones and of broken invariants."""
 
     good: Mapping[str, frozenset[str]]
     bad: frozenset[str]
@@ -52,7 +53,9 @@ class _Ends:
             for skill in skillset.skills:
                 name = f"{skillset.name}.{skill.name}"
                 good[name] = frozenset(one.name for one in skill.results if skill.kind_of(one.name) is ResultKind.SUCCESS)
-                bad |= {f"{name} {one.name}" for one in skill.results if one.name not in good[name]}
+                ends = [*(one.name for one in skill.results), *(one.name for one in skill.invariants)]
+                bad |= {f"{name} {one}" for one in ends if one not in good[name]}
+                bad.add(f"{name} {Happens.FAIL.value}")
         return cls(good, frozenset(bad))
 
 
@@ -238,8 +241,9 @@ def _following(
             case Kind.NOW if place.coming:
                 struck = steps.only_ends(place.coming) and step.target.state != place.state
                 found.append((step, there._replace(struck=min(here.struck + struck, strikes))))
-            case Kind.NOW if step.result and step.name in can_start and not steps.may_end(place, f"{step.name} {step.result}"):
-                pass  # by data, which are as they should be
+            case Kind.NOW if step.result and step.name in can_start:  # a refusal by data, which are as they should be without a fault
+                if here.struck < strikes and steps.may_end(place, f"{step.name} {step.result}"):
+                    found.append((step, there._replace(struck=here.struck + 1)))
             case Kind.ANY if step.name in ends.bad:
                 if here.struck < strikes:
                     found.append((step, there._replace(struck=here.struck + 1)))

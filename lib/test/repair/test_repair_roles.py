@@ -177,6 +177,24 @@ def test_what_a_skill_needs_is_brought_about_before_it_has_another_chance(tmp_pa
     assert any("power.charge" in run for run in runs)
 
 
+def test_a_fault_refuses_requests_no_more_often_than_it_ends_skills(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    """A battery that is low ends the supply, or has it refused, by the same condition: charged as often as that, it is survived."""
+    monkeypatch.setenv("ALULA_ROBOT", str(tmp_path))
+    path = rover(tmp_path, ROUNDS)
+    faults = path.parents[1] / "skillsets/faults.yaml"
+    faults.write_text(faults.read_text().replace("power.supply: EMPTY", "power.supply: [EMPTY, enough]"))
+    subject = Subject.read(path, quiet)
+    found = []
+    for strikes in (1, 2):
+        answer = Search(subject, Question("battery", most_faults=strikes, others=False), Deadline.after(TIME_S), quiet).run()
+        assert answer.repair is not None
+        fates = [
+            Judge(subject, Deadline.after(TIME_S), strikes=more).fate(answer.repair.text, ["battery"]) for more in (strikes, strikes + 1)
+        ]
+        found.append([fate.survives for fate in fates])
+    assert found == [[True, False]] * 2
+
+
 # --- plans --------------------------------------------------------------------------------------------------------------
 
 
