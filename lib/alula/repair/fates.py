@@ -232,9 +232,7 @@ def _following(
             case Kind.FAULT:
                 if here.come < len(faults) and step.name == faults[here.come]:
                     found.append((step, there._replace(come=here.come + 1)))
-            case Kind.MENDED:
-                pass
-            case _ if step.failing and not also_failing:
+            case _ if step.kind is Kind.MENDED or (step.failing and not also_failing):
                 pass
             case Kind.END if step.result not in ends.good[step.name]:
                 pass
