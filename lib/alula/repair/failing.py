@@ -18,7 +18,7 @@ _DEGRADED = re.compile(r"\bdegraded\s*:=")
 class Failing:
     """What is to be answered: a leaf, and the states with which its skill can't run (``skillset.resource``, state).
 
-    ``results`` are those by which the fault ends it.
+    ``results`` are those by which the fault ends it, and the conditions by which it has it refused or ended.
     """
 
     leaf: Node
@@ -54,7 +54,10 @@ def failing_by(fault: str, subject: Subject, system: System) -> list[Failing]:
         name = f"{leaf.skillset}.{leaf.model.name}"
         mine = tuple((at.partition(".")[2], state) for at, state in states if at.partition(".")[0] == leaf.skillset)
         broken = tuple((at, state) for at, state in mine if broken_by(leaf.model, at, state))
-        results = tuple(one.name for one in leaf.model.results if any(fnmatchcase(f"{name} {one.name}", end) for end in effects.ends))
+        model = leaf.model
+        ends = dict.fromkeys(one.name for one in model.results)
+        ends |= dict.fromkeys(one.name for several in (model.preconditions, model.invariants) for one in several)
+        results = tuple(one for one in ends if any(fnmatchcase(f"{name} {one}", end) for end in effects.ends))
         if (broken or results) and leaf in system.trees[0].nodes:
             full = tuple((f"{leaf.skillset}.{at}", state) for at, state in broken)
             found.setdefault(id(leaf.wiring.element), Failing(leaf, name, full, fault, results))

@@ -5,8 +5,9 @@ from __future__ import annotations
 from collections.abc import Iterator, Mapping
 from itertools import islice
 
+from alula.missions.skill_types import OUTCOME_PORT
 from alula.model.expressions import And
-from alula.repair.branches import HOLE, Branch, Rank, node
+from alula.repair.branches import FALLBACKS, HOLE, Branch, Rank, node
 from alula.repair.composing import Composer, Sources, first_skills, opening
 from alula.repair.courses import Course, Courses, Here, States, initial_states
 from alula.repair.failing import Failing
@@ -14,7 +15,7 @@ from alula.repair.naming import another, chances, plain, told_state
 from alula.repair.purposes import Purpose, Purposes, asked_of_others
 from alula.repair.subject import Subject
 from alula.trees.document import Element
-from alula.trees.node import Node
+from alula.trees.node import Node, pointer
 from alula.trees.reading import node_name, type_name
 
 AGAIN_S = "1"
@@ -22,6 +23,8 @@ AGAIN_S = "1"
 SAFE = "safe"
 """A mission's input that has this word in its name says where the robot may be left."""
 MOST_COURSES = 3
+LOOP = "Until"
+"""A node that ticks its child again when that has succeeded, unless it is through."""
 
 
 class Remedies:
@@ -38,7 +41,7 @@ class Remedies:
         """The skills that would bring about what a failed one needs, each with its inputs that come from nowhere."""
 
     def around(self, place: Node, failing: Failing, states: States) -> Iterator[Branch]:
-        """Yield the node with other chances, each after skills that make true what the failed one needs."""
+        """Yield skills that make true what the failed one needs, before the next round of a loop, or before other chances of the node."""
         purpose = self._purposes.known[failing.skill]
         skill = purpose.skill
         several = [*(one.condition for one in skill.preconditions), *(one.condition for one in skill.invariants)]
@@ -52,6 +55,8 @@ class Remedies:
         for course in (one for one in courses if failing.skill not in {step.name for step in one.steps}):
             for reused in self._reused(course, failing):
                 steps = self._composer.after_one_another(course, {len(course.steps): wanted}, reused=reused)
+                if steps and _begins_again(place):
+                    yield self._before_the_next_round(place, failing, course, steps)
                 if steps:
                     yield self._again_after(place, failing, course, steps)
                 else:
@@ -138,14 +143,27 @@ class Remedies:
                 yield {mine[0]: node("SubTree", ID=name, name=plain(name), _autoremap="true")}
         yield {}
 
+    def _before_the_next_round(self, place: Node, failing: Failing, course: Course, steps: list[Element]) -> Branch:
+        """Return the course as another child of a Fallback that a loop ticks again when it has succeeded."""
+        needed, name = self._guard(course.steps[0], steps[0])
+        after: list[Element] = []
+        entry = pointer(failing.leaf.wiring.element.get(OUTCOME_PORT), OUTCOME_PORT)
+        if entry and failing.results:
+            mine = " || ".join(f"{entry} == '{one}'" for one in failing.results)
+            needed, name = f"({mine}) && {needed}" if needed else mine, name or f"is for {plain(failing.skill)}"
+            after = [node("Script", name="it may go on", code=f"{entry} := ''")]
+        top = node("Sequence", opening(needed, name, "@degraded := true"), *steps, *after, name=_words(course))
+        use = node("SubTree", ID=self._tree(course), name=_words(course), _autoremap="true")
+        return Branch(use, top, place.wiring.element.place, _why(failing, course))
+
     def _again_after(self, place: Node, failing: Failing, course: Course, steps: list[Element]) -> Branch:
+        """Return a retry around the node and the course, which is done after each failure."""
         element = place.wiring.element
-        words = [plain(one.name) for one in course.steps]
-        tree = another("_and_".join("_".join(one.split()) for one in words), self._subject.files.trees)
+        tree, words = self._tree(course), _words(course)
         begin = opening(*self._guard(course.steps[0], steps[0]), "@degraded := true")
-        top = node("Sequence", begin, *steps, name=" and ".join(words))
-        use = node("SubTree", ID=tree, name=" and ".join(words), _autoremap="true")
-        name = f"{node_name(element)}, or {words[-1]} first"
+        top = node("Sequence", begin, *steps, name=words)
+        use = node("SubTree", ID=tree, name=words, _autoremap="true")
+        name = f"{node_name(element)}, or {plain(course.steps[-1].name)} first"
         fallback = node("Fallback", node(HOLE, name=node_name(element)), node("ForceFailure", use, name="then again"), name=name)
         last = course.steps[-1]
         needed = _needed(last)
@@ -154,10 +172,10 @@ class Remedies:
             retry = node("RetryAfter", fallback, name=again, attempts=str(self._attempts), wait=AGAIN_S, if_=needed)
         else:
             retry = node("RetryUntilSuccessful", fallback, name=again, num_attempts=str(self._attempts))
-        names = ", then ".join(one.skill.name for one in course.steps)
-        brings = "brings" if len(course.steps) == 1 else "bring"
-        why = (f"{failing.situation}: {names} {brings} about what it needs, and it gets another chance.", *_told(course.steps))
-        return Branch(retry, top, element.place, why, around=True)
+        return Branch(retry, top, element.place, _why(failing, course), around=True)
+
+    def _tree(self, course: Course) -> str:
+        return another("_and_".join("_".join(plain(one.name).split()) for one in course.steps), self._subject.files.trees)
 
     def _guard(self, purpose: Purpose, step: Element) -> tuple[str, str]:
         """Return when a course is begun, and what that is called; one whose first skill is started at once is refused by itself."""
@@ -180,6 +198,23 @@ class Remedies:
 
 def _needed(purpose: Purpose) -> str:
     return " && ".join(f"{purpose.skillset.name}.{resource.name} == {state}" for resource, state in asked_of_others(purpose))
+
+
+def _begins_again(place: Node) -> bool:
+    """Tell whether a node is in a Fallback that is ticked again when another of its children succeeds."""
+    outer = place.parent
+    loop = None if outer is None else outer.parent
+    return outer is not None and loop is not None and outer.wiring.element.tag in FALLBACKS and loop.wiring.element.tag == LOOP
+
+
+def _words(course: Course) -> str:
+    return " and ".join(plain(one.name) for one in course.steps)
+
+
+def _why(failing: Failing, course: Course) -> tuple[str, ...]:
+    names = ", then ".join(one.skill.name for one in course.steps)
+    brings = "brings" if len(course.steps) == 1 else "bring"
+    return (f"{failing.situation}: {names} {brings} about what it needs, and it gets another chance.", *_told(course.steps))
 
 
 def _told(steps: tuple[Purpose, ...]) -> list[str]:

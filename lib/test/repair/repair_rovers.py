@@ -103,6 +103,30 @@ ROUNDS = """<root BTCPP_format="4" main_tree_to_execute="rounds">
   </BehaviorTree>
 </root>
 """
+LOOP = """<root BTCPP_format="4" main_tree_to_execute="loop">
+  <BehaviorTree ID="loop">
+    <Fallback name="loop">
+      <Sequence name="all rounds">
+        <Script name="none yet" code="done := 0; supplied := ''"/>
+        <Until name="until one is done" if="done &gt;= 1">
+          <Fallback name="work, or mend">
+            <Parallel name="work" success_count="1" failure_count="1">
+              <power.supply name="watch the battery" outcome="{supplied}"/>
+              <eyes.scan name="scan"/>
+              <Sequence name="round">
+                <base.drive name="drive" to="1"/>
+                <Script name="one more" code="done += 1"/>
+              </Sequence>
+            </Parallel>
+            <AlwaysFailure name="nothing mends it"/>
+          </Fallback>
+        </Until>
+      </Sequence>
+      <AlwaysFailure name="given up"/>
+    </Fallback>
+  </BehaviorTree>
+</root>
+"""
 
 
 def rover(folder: Path, mission: str) -> Path:

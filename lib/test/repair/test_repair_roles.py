@@ -10,7 +10,7 @@ import pytest
 pytest.importorskip("z3")
 pytest.importorskip("py_trees")
 
-from repair_rovers import ERRAND, MODELS, ROUNDS, rover
+from repair_rovers import ERRAND, LOOP, MODELS, ROUNDS, rover
 from repair_worlds import GOOD
 
 from alula.common.faults import FaultRequest
@@ -175,6 +175,19 @@ def test_what_a_skill_needs_is_brought_about_before_it_has_another_chance(tmp_pa
     assert '<Awaits name="the charger is on" if="power.charger == ON" within="5"/>' in xml
     runs = fly(subject, answer.repair.text, "battery")
     assert any("power.charge" in run for run in runs)
+
+
+def test_a_loop_that_goes_on_needs_no_other_chances(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    """Behind the node that failed, for its failure alone: the loop ticks it again when the skills have brought about what it needs."""
+    subject, answer = repaired(LOOP, "battery", tmp_path, monkeypatch)
+    assert answer.repair is not None
+    branch = answer.repair.branch
+    assert (branch.around, branch.wraps) == (False, False)
+    assert branch.tree is not None
+    assert branch.tree.children[0].get("code") == "(supplied == 'EMPTY') && base.pose == GOOD"
+    assert skills_in(branch.as_xml()) == ["eyes.scan", "base.dock", "power.charge"]
+    assert any("power.charge" in run for run in fly(subject, answer.repair.text, "battery"))
+    assert any(run.count("base.drive") > 1 for run in fly(subject, answer.repair.text, "battery"))
 
 
 def test_a_fault_refuses_requests_no_more_often_than_it_ends_skills(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
