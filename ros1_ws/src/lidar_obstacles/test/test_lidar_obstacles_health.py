@@ -73,7 +73,7 @@ BREAKS = {
     "noise of 0.3 m": (lambda points, _: scattered(points, 0.3), FaultKind.RANGE, "m where they are smoothest"),
     "noise of 0.2 m": (lambda points, _: scattered(points, 0.2), FaultKind.RANGE, "m where they are smoothest"),
     "half as far": (lambda points, _: points * 0.5, FaultKind.RANGE, "all ranges became at least"),
-    "millimetres": (lambda points, _: points * 1000, FaultKind.RANGE, "are the coordinates in millimetres?"),
+    "millimetres": (lambda points, _: points * 1000, FaultKind.RANGE, ": the coordinates are in millimetres or centimetres"),
     "bytes in the other order": (lambda points, _: points.astype(np.float32).byteswap(), FaultKind.RANGE, "order of the bytes"),
     "frozen but for a value": (frozen, FaultKind.FROZEN, "the sweep is the same as the one before"),
 }
@@ -329,7 +329,7 @@ def test_a_sensor_that_saw_near_things_only_can_not_be_judged_when_they_are_gone
     near = landing(np.full(5, 1.2))
     findings = judge_all([*(points[np.linalg.norm(points, axis=1) < 1.4] for points in near), near[0][:0]])
     assert (findings[-1].verdict, findings[-1].fault) == (Verdict.UNKNOWN, FaultKind.RETURNS)
-    assert findings[-1].reason == "0 returns: what was around came nearer than 1.5 m"
+    assert findings[-1].reason == "0 returns: what was around came nearer than 1.5 m, or the sensor is covered"
 
 
 def test_a_mirror_of_5_centimetre_steps_is_not_frozen() -> None:

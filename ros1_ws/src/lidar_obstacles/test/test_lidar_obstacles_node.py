@@ -104,7 +104,7 @@ FAULTS = (
     Expected("blind", "sector", "no returns any more from -40 to 40 degrees"),
     Expected("thinned", "returns", "only 12 returns"),
     Expected("biased", "range", "all ranges became at least 0."),
-    Expected("millimetres", "range", "are the coordinates in millimetres?"),
+    Expected("millimetres", "range", ": the coordinates are in millimetres or centimetres"),
     Expected("future", "stamp", "the stamp is 10."),
     Expected("late", "stamp", "old when it arrives"),
     Expected("cut short", "format", "can't be decoded"),

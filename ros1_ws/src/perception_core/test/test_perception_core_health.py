@@ -2,7 +2,9 @@
 
 from __future__ import annotations
 
+import ast
 from itertools import pairwise
+from pathlib import Path
 
 import numpy as np
 import pytest
@@ -11,7 +13,11 @@ from hypothesis import strategies as st
 
 from perception_core import FINE, NS, FaultKind, HealthLimits, HealthWatch, StampJudge, StampLimits, Verdict, broken, unsure
 
+SOURCES = Path(__file__).resolve().parents[2]
 TICK = NS // 50
+SILENCE = ": the driver has stopped, or its connection is lost"
+CLOCKS = ": the sensor's clock is not that of this computer, or the driver stamps wrongly"
+SLOW = ": the computer or the connection is too slow, or the sensor's clock is behind"
 
 
 class Run:
@@ -61,7 +67,7 @@ def test_a_driver_that_goes_away_after_it_delivered_is_a_broken_sensor() -> None
     assert watch.tick(TICK) is Verdict.OK
     verdicts = [watch.tick(k * TICK, missing="no images on /left") for k in range(2, 30)]
     assert verdicts[-1] is Verdict.BROKEN
-    assert watch.reason == "no measurement for 0.35 s"
+    assert watch.reason == f"no measurement for 0.35 s{SILENCE}"
 
 
 @pytest.mark.parametrize("fault", [None, "image is black"])
@@ -139,7 +145,7 @@ def test_reasons_rate_and_age() -> None:
 def test_what_can_not_be_judged_is_unknown_and_silence_after_it_is_broken() -> None:
     run = Run(lambda t: True if t < 1 else "no texture?" if t < 3 else None).go(5)
     assert [verdict for _, verdict in run.changes] == [Verdict.OK, Verdict.UNKNOWN, Verdict.BROKEN]
-    assert (run.watch.fault, run.watch.reason) == (FaultKind.SILENT, "no measurement for 0.35 s")
+    assert (run.watch.fault, run.watch.reason) == (FaultKind.SILENT, f"no measurement for 0.35 s{SILENCE}")
     again = Run(lambda t: True if t < 1 or t > 4 else "no texture?").go(6)
     assert [verdict for _, verdict in again.changes] == [Verdict.OK, Verdict.UNKNOWN, Verdict.OK]
     assert 5.0 <= again.changes[2][0] <= 5.2
@@ -154,12 +160,12 @@ def test_from_the_start_not_to_be_judged_stays_unknown() -> None:
     [
         (0.1, StampLimits(), ""),
         (-0.05, StampLimits(), ""),
-        (-10.0, StampLimits(), "the stamp is 10.00 s in the future"),
-        (0.5, StampLimits(), "the measurement is 0.50 s old when it arrives"),
-        (1.7e9, StampLimits(), "the measurement is 1700000000.00 s old when it arrives"),
+        (-10.0, StampLimits(), f"the stamp is 10.00 s in the future{CLOCKS}"),
+        (0.5, StampLimits(), f"the measurement is 0.50 s old when it arrives{SLOW}"),
+        (1.7e9, StampLimits(), f"the measurement is 1700000000.00 s old when it arrives{SLOW}"),
         (0.5, StampLimits(latency_s=0.4), ""),
         (0.0, StampLimits(latency_s=0.4), ""),
-        (0.9, StampLimits(latency_s=0.4), "the measurement is 0.90 s old when it arrives, 0.4 s of which are its known latency"),
+        (0.9, StampLimits(latency_s=0.4), f"the measurement is 0.90 s old when it arrives, 0.4 s of which are its known latency{SLOW}"),
     ],
 )
 def test_stamps_against_their_arrival(delay_s, limits, sentence) -> None:
@@ -168,10 +174,34 @@ def test_stamps_against_their_arrival(delay_s, limits, sentence) -> None:
     assert (finding.reason, finding.fault) == (sentence, FaultKind.STAMP if sentence else FaultKind.NONE)
 
 
+def test_a_finding_says_what_was_measured_and_then_its_likeliest_causes() -> None:
+    told = "left image is dark (mean 3)", "too little light", "a covered lens"
+    assert broken(FaultKind.EXPOSURE, *told).reason == "left image is dark (mean 3): too little light, or a covered lens"
+    assert unsure(FaultKind.EXPOSURE, *told[:2]).reason == "left image is dark (mean 3): too little light"
+    assert unsure(FaultKind.EXPOSURE, told[0]).reason == told[0]
+
+
+SAYS_WHAT_IS_WRONG = {"INFO", "FORMAT"}  # a message that contradicts itself has no other cause
+
+
+def test_each_finding_of_the_sensors_names_two_causes() -> None:
+    without = []
+    for package in ("perception_core", "zed_depth", "lidar_obstacles"):
+        for path in sorted((SOURCES / package / "src" / package).glob("*.py")):
+            for call in ast.walk(ast.parse(path.read_text())):
+                if not (isinstance(call, ast.Call) and isinstance(call.func, ast.Name) and call.func.id in {"broken", "unsure"}):
+                    continue
+                fault, _, *causes = call.args
+                listed = any(isinstance(cause, ast.Starred) for cause in causes)
+                if not (listed or len(causes) == 2 or (isinstance(fault, ast.Attribute) and fault.attr in SAYS_WHAT_IS_WRONG)):
+                    without.append(f"{path.name}:{call.lineno}")
+    assert without == []
+
+
 def test_a_stamp_that_does_not_advance() -> None:
     judge = StampJudge(StampLimits())
     assert judge.finding(NS, NS).ok
-    assert judge.finding(NS, NS + NS // 10).reason == "the stamp does not advance"
+    assert judge.finding(NS, NS + NS // 10).reason == ("the stamp does not advance: the driver repeats a measurement, or its clock stands")
     assert [judge.finding(NS - k * NS // 50, NS + NS // 10).fault for k in range(1, 6)] == [FaultKind.STAMP] * 5  # it goes back
     assert judge.finding(NS, NS + NS // 10).ok
 

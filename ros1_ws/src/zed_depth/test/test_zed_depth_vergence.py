@@ -43,7 +43,7 @@ def test_a_camera_turned_inwards_from_the_start_is_known_within_6_s_of_flight(sh
     first = next(k for k, finding in enumerate(found) if not finding.ok)
     assert first * PERIOD_S <= 6.0
     assert {finding.verdict for finding in found[first:]} == {Verdict.BROKEN}
-    words = ("turned inwards against each other: by the vehicle's own motion", "too short by the vehicle's own motion")
+    words = ("turned inwards against each other, by the vehicle's own motion", "too short by the vehicle's own motion")
     assert any(each in found[first].reason for each in words)
 
 
@@ -53,7 +53,7 @@ def test_a_knock_in_flight_is_known_at_the_next_view(shift_px, poses) -> None:
     found = in_flight(shift_px, knocked=5, poses=poses)
     assert all(finding.ok for finding in found[:5])
     assert {(finding.verdict, finding.fault) for finding in found[5:]} == {(Verdict.BROKEN, FaultKind.CALIBRATION)}
-    told = "inwards against each other: all disparities changed by" if shift_px > 0 else "turned aside against each other"
+    told = "inwards against each other, all disparities changed by" if shift_px > 0 else "turned aside against each other"
     assert told in found[5].reason
 
 

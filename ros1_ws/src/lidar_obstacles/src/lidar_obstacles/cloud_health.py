@@ -30,6 +30,8 @@ NEAR = 1.5  # of the vehicle's radius: what comes nearer soon is taken for the v
 LEFT_BEHIND_M = 5.0  # from where returns were lost: what was seen there tells nothing of what is to be seen here
 BLIND_RETURNS = 5  # of the sample: with as many, a sector is not blind
 NO_UNIT_M = 1e7  # a range beyond is none in millimetres either
+UNITS = "the coordinates are in millimetres or centimetres", "the fields are at other places"
+BYTES = "the order of the bytes (is_bigendian) is another one", "the fields are at other places"
 FROZEN_SHARE = 0.9  # of the points, at the same place to the last bit
 
 
@@ -109,32 +111,38 @@ class CloudJudge:
         if count < self._limits.min_returns:
             return self._too_few(count, before, self_m)
         far = self._far(outside.ranges_m)
-        if far:
-            return broken(FaultKind.RANGE, far)
+        if far is not None:
+            return far
         if _frozen(sample, previous, returned):
-            return broken(FaultKind.FROZEN, "the sweep is the same as the one before")
+            return broken(FaultKind.FROZEN, "the sweep is the same as the one before", "the driver repeats it", "the sensor hangs")
         self._looks += 1
         neighbours = Neighbours.of(sweep, self._looks, self_m=self_m)
         noise_m = self._noise.risen_m(neighbours)
         if noise_m:
             self._lost_at_m = position_m if self._lost_at_m is None else self._lost_at_m
-            return broken(FaultKind.RANGE, f"the ranges scatter by {noise_m:.2f} m where they are smoothest")
+            told = f"the ranges scatter by {noise_m:.2f} m where they are smoothest"
+            return broken(FaultKind.RANGE, told, "the sensor is failing", "dust or fog is around it")
         least_m = NEAR * self_m
         off_m = self._steps.offset_m(outside, sweep.stamp_ns, least_m=least_m, position_m=position_m)
         if off_m:
             became = f"{abs(off_m):.1f} m {'longer' if off_m > 0 else 'shorter'}"
-            return broken(FaultKind.RANGE, f"all ranges became at least {became} from one sweep to the next")
+            told = f"all ranges became at least {became} from one sweep to the next"
+            return broken(FaultKind.RANGE, told, "the driver has changed their unit or offset", "the vehicle's position has jumped")
         lost = self._gates.lost(outside.ranges_m, stride, least_m=least_m, moved_m=moved_m)
         finding = self._against_the_past(sectors, before, stride, sweep.stamp_ns)
         if lost and finding.ok:
-            finding = broken(FaultKind.RANGE, f"no returns any more {lost}")
+            finding = broken(
+                FaultKind.RANGE, f"no returns any more {lost}", "the driver cuts these ranges off", "fog, dirt or light takes them"
+            )
         if finding.ok:
             self._lost_at_m = None
         elif self._lost_at_m is None:
             self._lost_at_m = position_m
         specks = self._specks.share(neighbours)
         if finding.ok and specks:
-            return unsure(FaultKind.RANGE, f"{specks:.1%} of the returns stand alone in the air: rain, dust or snow")
+            return unsure(
+                FaultKind.RANGE, f"{specks:.1%} of the returns stand alone in the air", "rain, dust or snow", "the light of another LiDAR"
+            )
         return finding
 
     def _moved_m(self, stamp_ns: int, position_m: Floats | None) -> float:
@@ -184,19 +192,20 @@ class CloudJudge:
     def _too_few(self, count: int, before: Floats, self_m: float) -> Finding:
         told = f"{'only ' if count else ''}{count} returns"
         if self._recent and before.sum() < self._limits.min_returns:
-            return unsure(FaultKind.RETURNS, f"{told}: what was around came nearer than {NEAR * self_m:g} m")
-        return broken(FaultKind.RETURNS, told)
+            return unsure(FaultKind.RETURNS, told, f"what was around came nearer than {NEAR * self_m:g} m", "the sensor is covered")
+        return broken(FaultKind.RETURNS, told, "the sensor is covered or has no power", "the coordinates are in another unit")
 
-    def _far(self, ranges: NDArray[np.float32]) -> str:
+    def _far(self, ranges: NDArray[np.float32]) -> Finding | None:
         share = np.count_nonzero(ranges > self._limits.max_range_m) / len(ranges)
         if share <= self._limits.far_share:
-            return ""
+            return None
         middle = float(np.median(ranges))
-        cause = ": are the coordinates in millimetres?" if middle > self._limits.max_range_m else ""
+        causes = UNITS if middle > self._limits.max_range_m else ("max_range_m is not that of this sensor", UNITS[0])
         size = f"{middle:.1e}" if middle > NO_UNIT_M else f"{middle:.0f}"
         if float(ranges.max()) > NO_UNIT_M:
-            cause = ": is the order of the bytes (is_bigendian) right, or are the fields at other places?"
-        return f"{share:.0%} of the returns are beyond {self._limits.max_range_m:g} m, half of all beyond {size} m{cause}"
+            causes = BYTES
+        told = f"{share:.0%} of the returns are beyond {self._limits.max_range_m:g} m, half of all beyond {size} m"
+        return broken(FaultKind.RANGE, told, *causes)
 
     def _against_the_past(self, sectors: _Sectors, before: Floats, stride: int, stamp_ns: int) -> Finding:
         counts, expected = sectors.counts, self._expected(before)
@@ -205,9 +214,11 @@ class CloudJudge:
         self._lost = (self._lost & gone) | _together(missed)
         thin = counts.sum() < self._limits.thin_share * expected.sum()
         if thin and (not self._lost.any() or self._lost[before > 0].all()):
-            return broken(FaultKind.RETURNS, f"returns fell from {before.sum():.0f} to {counts.sum():.0f}")
+            told = f"returns fell from {before.sum():.0f} to {counts.sum():.0f}"
+            return broken(FaultKind.RETURNS, told, "packets or rings are lost", "the sensor is dirty")
         if self._lost.any():
-            return broken(FaultKind.SECTOR, f"no returns any more from {_angles(self._of_sensor(self._lost))} around the sensor's z axis")
+            told = f"no returns any more from {_angles(self._of_sensor(self._lost))} around the sensor's z axis"
+            return broken(FaultKind.SECTOR, told, "something covers the sensor", "the driver cuts these directions off")
         self._recent.append(sectors)
         self._gone_ns[counts >= SECTOR_RETURNS * stride] = LONG_AGO_NS
         self._gone_ns[gone] = stamp_ns

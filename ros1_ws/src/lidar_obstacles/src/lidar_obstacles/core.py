@@ -31,6 +31,7 @@ if TYPE_CHECKING:
 CLOUD = "/lidar/points"
 CLOUD_BYTES = 1 << 23
 POSE_LATE_S = 0.05  # behind a sweep, at which a pose still tells where it was made: 0.1 m at 2 m/s
+NO_MOUNT = "the driver has another frame_id than /tf_static", "nobody publishes /tf_static"
 OBSTACLE = Output("~obstacle", Obstacle, tcp_nodelay=True)
 OUTPUTS = (OBSTACLE, HEALTH)
 
@@ -127,7 +128,7 @@ class LidarObstacles:
         try:
             mount = self.vehicle.mount(frame)
         except LookupError as error:
-            return unsure(FaultKind.CALIBRATION, f"it is not known how the LiDAR is mounted: {error}: check the driver's frame_id")
+            return unsure(FaultKind.CALIBRATION, f"it is not known how the LiDAR is mounted: {error}", *NO_MOUNT)
         return self._mounting.finding(sweep, mount, self.vehicle.poses, self_m=self_m)
 
     def _turned_rad(self, pose: NDArray[np.float64] | None, frame: str) -> float:

@@ -122,10 +122,15 @@ class MountCheck:
         if self._times >= LOOKS:
             return self._found()
         if self._overturned:
-            return unsure(FaultKind.CALIBRATION, "level surfaces above the LiDAR and none below: is it upside down?")
+            return unsure(
+                FaultKind.CALIBRATION,
+                "level surfaces above the LiDAR and none below",
+                "it is upside down",
+                "there is a ceiling, and nothing below",
+            )
         if not self._as_told and self._unjudged_ns > UNJUDGED_S * NS:
             told = "by the vehicle's own motion it can't be judged how the LiDAR is mounted"
-            return unsure(FaultKind.CALIBRATION, f"{told}: too few walls and posts within {FARTHEST_M:g} m")
+            return unsure(FaultKind.CALIBRATION, told, f"too few walls and posts within {FARTHEST_M:g} m", "ranges or poses that scatter")
         return FINE
 
     @property
@@ -189,9 +194,11 @@ class MountCheck:
     def _found(self) -> Finding:
         """Return what the walls tell, once they have said it often enough: all that it may be, where the motion does not tell it apart."""
         if self._suspected == {FROZEN}:
-            return broken(FaultKind.FROZEN, "the sweeps do not change with the vehicle's own motion: the LiDAR repeats what it saw")
+            told = "the sweeps do not change with the vehicle's own motion"
+            return broken(FaultKind.FROZEN, told, "the LiDAR repeats what it saw", "the vehicle stands and its poses move")
         names = [name for name in (*OTHERS, FROZEN) if name in self._suspected]
-        return broken(FaultKind.CALIBRATION, f"by the vehicle's own motion the LiDAR is {' or '.join(names)}")
+        told = f"by the vehicle's own motion the LiDAR is {' or '.join(names)}"
+        return broken(FaultKind.CALIBRATION, told, "/tf_static does not tell how it is mounted", "its driver has other axes")
 
 
 def _fitting(before: _Look, now: _Look, turn: Floats) -> float | None:

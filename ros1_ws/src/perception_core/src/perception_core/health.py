@@ -59,14 +59,19 @@ class Finding:
 FINE = Finding()
 
 
-def broken(fault: FaultKind, reason: str) -> Finding:
-    """Return the finding of a broken sensor."""
-    return Finding(Verdict.BROKEN, fault, reason)
+def broken(fault: FaultKind, measured: str, *causes: str) -> Finding:
+    """Return the finding of a broken sensor: what was measured, and its likeliest causes, two at most, the likelier one first."""
+    return Finding(Verdict.BROKEN, fault, sentence(measured, *causes))
 
 
-def unsure(fault: FaultKind, reason: str) -> Finding:
-    """Return the finding of a sensor that can't be judged by this measurement."""
-    return Finding(Verdict.UNKNOWN, fault, reason)
+def unsure(fault: FaultKind, measured: str, *causes: str) -> Finding:
+    """Return the finding of a sensor that can't be judged by this measurement, in words as those of ``broken``."""
+    return Finding(Verdict.UNKNOWN, fault, sentence(measured, *causes))
+
+
+def sentence(measured: str, *causes: str) -> str:
+    """Return a finding in words: what was measured, then what may be the cause."""
+    return f"{measured}: {', or '.join(causes)}" if causes else measured
 
 
 def first_trouble(*findings: Finding) -> Finding:
@@ -202,5 +207,6 @@ class HealthWatch:
         if self._last_good_ns is None:
             return FaultKind.SILENT, self._missing or "nothing received yet"
         if self._overdue(now_ns):
-            return FaultKind.SILENT, f"no measurement for {self._timeout_ns() / NS:.2g} s"
+            silent = f"no measurement for {self._timeout_ns() / NS:.2g} s"
+            return FaultKind.SILENT, sentence(silent, "the driver has stopped", "its connection is lost")
         return self.fault, "recovering"

@@ -21,6 +21,8 @@ class StampLimits:
     future_s: float = 0.1
 
 
+CLOCKS = "the sensor's clock is not that of this computer", "the driver stamps wrongly"
+SLOW = "the computer or the connection is too slow", "the sensor's clock is behind"
 MEND_SHARE = 0.8  # of max_delay_s: once too late, a sensor must be clearly in time again, or its health would flap at the limit
 
 
@@ -39,10 +41,10 @@ class StampJudge:
         share = MEND_SHARE if self._late else 1.0
         self._late = delay_s > share * self.limits.max_delay_s
         if delay_s < -self.limits.future_s - self.limits.latency_s:
-            return broken(FaultKind.STAMP, f"the stamp is {-delay_s - self.limits.latency_s:.2f} s in the future")
+            return broken(FaultKind.STAMP, f"the stamp is {-delay_s - self.limits.latency_s:.2f} s in the future", *CLOCKS)
         if self._late:
             told = f", {self.limits.latency_s:g} s of which are its known latency" if self.limits.latency_s else ""
-            return broken(FaultKind.STAMP, f"the measurement is {delay_s + self.limits.latency_s:.2f} s old when it arrives{told}")
+            return broken(FaultKind.STAMP, f"the measurement is {delay_s + self.limits.latency_s:.2f} s old when it arrives{told}", *SLOW)
         if stamp_ns <= previous_ns:
-            return broken(FaultKind.STAMP, "the stamp does not advance")
+            return broken(FaultKind.STAMP, "the stamp does not advance", "the driver repeats a measurement", "its clock stands")
         return FINE

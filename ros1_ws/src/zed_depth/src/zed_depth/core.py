@@ -32,6 +32,7 @@ if TYPE_CHECKING:
     from node_core.core import Host
     from zed_depth.settings import ZedSettings
 
+APART = "the cameras are not triggered together", "images of one side are lost"
 IMAGE_BYTES = 1 << 22
 INFO_BYTES = 1 << 16
 SIDES = ("left", "right")
@@ -123,7 +124,7 @@ class ZedDepth:
             finding = self.finding(pair) if pair is not None else None
         if pair is None or finding is None:
             if apart_s > self._settings.sync_tolerance_s:
-                self._trouble(broken(FaultKind.STAMP, f"left and right images are {apart_s:.2f} s apart"), stamp_ns)
+                self._trouble(broken(FaultKind.STAMP, f"left and right images are {apart_s:.2f} s apart", *APART), stamp_ns)
         elif not finding.ok:
             self._trouble(finding, pair.stamp_ns)
             self._host.done(pair.stamp_ns)

@@ -52,12 +52,12 @@ def covered_finding(left: Gray, right: Gray, offset_px: float, gain: float) -> F
         mine_is_brighter = other.light < _in_reach(darkest, starts, beyond=-np.inf).min(axis=0) - borne
         without_content = float(np.mean(nothing))
         if without_content > COVERED:
-            told = f"the {side} camera sees nothing where the other one does: {without_content:.0%} of its view is covered"
-            return broken(FaultKind.VIEW, told)
+            told = f"the {side} camera sees nothing where the other one does, {without_content:.0%} of its view"
+            return broken(FaultKind.VIEW, told, "its lens is covered or dirty", "its exposure or focus is wrong there")
         other_light = max(other_light, float(np.mean(mine_is_darker | mine_is_brighter)))
     if other_light > COVERED_LIGHT:
         told = f"{other_light:.0%} of the view is much darker or brighter in one image"
-        return broken(FaultKind.VIEW, f"{told}: a lens is partly covered, or the cameras expose or convert the light differently")
+        return broken(FaultKind.VIEW, told, "a lens is partly covered", "the cameras expose or convert the light differently")
     return None
 
 

@@ -80,7 +80,9 @@ class ScaleJudge:
             self.finding = FINE
             return
         told = f"the depths are about {abs(error):.0%} too {'long' if error > 0 else 'short'} by the vehicle's own motion"
-        self.finding = broken(FaultKind.CALIBRATION, f"{told}: check the focal length and the baseline")
+        self.finding = broken(
+            FaultKind.CALIBRATION, told, "focal length or baseline of camera_info is wrong", "the autopilot's velocity is wrong"
+        )
 
 
 def scale_of(

@@ -46,7 +46,7 @@ def fixed_columns_finding(left: Gray, right: Gray) -> Finding:
         return FINE
     column = suspects[np.argmax(share[suspects])]
     told = f"both images have a step in column {column + 1}, in {share[column]:.0%} of the rows"
-    return broken(FaultKind.FORMAT, f"{told}: bytes are lost, columns dead or the compression is too strong")
+    return broken(FaultKind.FORMAT, told, "bytes are lost or columns are dead", "the compression is too strong")
 
 
 def _is_edge(column: int, image: Gray, steps: Shares, other: Gray, steps_there: Shares, *, mirrored: bool = False) -> bool:

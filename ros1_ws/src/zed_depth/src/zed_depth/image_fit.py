@@ -32,6 +32,7 @@ NEAR_PATCH = (41, 21)  # around what is nearer than the range, where the matcher
 MOST_NEAR = 0.25  # of the image; with more that is near there is too little else
 LEAST_TEXTURE = 0.03  # of the image, or of a half of it
 FIT, KNOWN_FIT = 0.55, 0.77  # of what has texture, and of what has a depth, too; good pairs have 0.62 and 0.84 at least
+UNFIT = "parts are lost, old or compressed in the transfer", "exposure, noise or blur of one camera"
 HALF_FIT, HALF_KNOWN_FIT = 0.3, 0.6  # of the upper or lower half both must be less: beside what is near, much of a half has no depth
 
 
@@ -62,8 +63,7 @@ def fit_of(disparity_px: Pixels, left: Gray, right: Gray, *, last_px: float, noi
     share, known_share = _shares(textured, known, alike)
     if share < FIT or known_share < KNOWN_FIT:
         told = f"{share:.0%} of what has texture looks alike in both, {known_share:.0%} of what has a depth"
-        causes = "look at the exposure of both cameras, and at the transfer (compression, lost or old parts)"
-        return Fit(broken(FaultKind.VIEW, f"the images do not fit each other: {told}: {causes}"))
+        return Fit(broken(FaultKind.VIEW, f"the images do not fit each other, {told}", *UNFIT))
     half = len(pixels) // 2
     for name, rows in (("upper", slice(None, half)), ("lower", slice(half, None))):
         share, known_share = _shares(textured[rows], known[rows], alike[rows])

@@ -55,7 +55,7 @@ class ImageJudge:
         self._blank.clear()
         findings = [self._one(side, image) for side, image in sides]
         if len(self._blank) == len(sides):
-            return unsure(FaultKind.EXPOSURE, "both images are blank: a surface without texture, or covered lenses")
+            return unsure(FaultKind.EXPOSURE, "both images are blank", "a surface without texture", "covered lenses")
         return next((finding for finding in findings if not finding.ok), FINE)
 
     def _one(self, side: str, image: Gray) -> Finding:
@@ -70,19 +70,22 @@ class ImageJudge:
         empty = float(np.mean((sample.max(axis=1) == sample.min(axis=1)) & (sample[:, 0] < SATURATED)))
         told = f"mean {mean:.0f}, contrast {contrast:.1f} of 255"
         if saturated > limits.max_saturated:
-            return broken(FaultKind.EXPOSURE, f"{side} image is overexposed: {saturated:.0%} of it is white")
+            return broken(
+                FaultKind.EXPOSURE, f"{side} image is overexposed, {saturated:.0%} of it is white", "too much light", "exposure too long"
+            )
         if mean < limits.dark_mean and contrast < 2.0 * limits.min_contrast:
-            return broken(FaultKind.EXPOSURE, f"{side} image is dark ({told})")
+            return broken(FaultKind.EXPOSURE, f"{side} image is dark ({told})", "too little light", "a covered lens")
         if previous is not None and previous.shape == sample.shape:
             changed = np.count_nonzero(previous != sample) / sample.size
             if changed < limits.min_changed:
-                causes = "the driver repeats it, or its encoding is another one than it says"
-                return broken(FaultKind.FROZEN, f"{side} image is frozen, {changed:.2%} of its pixels have changed: {causes}")
+                told = f"{side} image is frozen, {changed:.2%} of its pixels have changed"
+                return broken(FaultKind.FROZEN, told, "the driver repeats it", "its encoding is another one than it says")
         if contrast < limits.min_contrast:
             self._blank.add(side)
-            return broken(FaultKind.EXPOSURE, f"{side} image is blank ({told})")
+            return broken(FaultKind.EXPOSURE, f"{side} image is blank ({told})", "a covered lens", "wrong exposure or encoding")
         if empty > EMPTY_ROWS:
-            return broken(FaultKind.FORMAT, f"a part of the {side} image is missing: {empty:.0%} of its rows have one grey level only")
+            told = f"a part of the {side} image is missing, {empty:.0%} of its rows have one grey level only"
+            return broken(FaultKind.FORMAT, told, "rows are lost in the transfer", "the driver cuts the image")
         return FINE
 
 

@@ -33,6 +33,7 @@ if TYPE_CHECKING:
 
 MEND_SHARE = 0.6  # of max_vertical_px
 JUMPED_PX = 0.7  # the middle change of the disparities from pair to pair; with more, it is in doubt
+NO_DEPTH = "what is in view has too little texture", "the images do not fit each other"
 JUMP_STRIDE = 4
 LEAST_COMPARED = 0.05  # of the pixels
 SHARE_FELL = 0.92  # of the pixels that had a depth, or a parallax, in the pair before; with less, it is in doubt
@@ -198,7 +199,7 @@ class StereoRig:
     def _valid_finding(self, disparity: NDArray[np.float32]) -> Finding:
         share = np.count_nonzero(np.isfinite(disparity)) / disparity.size
         enough = share >= self._settings.min_valid
-        return FINE if enough else unsure(FaultKind.VIEW, f"only {share:.1%} of the image has a depth")
+        return FINE if enough else unsure(FaultKind.VIEW, f"only {share:.1%} of the image has a depth", *NO_DEPTH)
 
     def _matched(self, calibration: StereoCalibration, pair: StereoPair) -> Depth:
         """Match a pair, and judge whether its images fit; raise CalibrationError."""

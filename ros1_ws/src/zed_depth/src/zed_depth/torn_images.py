@@ -30,6 +30,7 @@ if TYPE_CHECKING:
 ROWS_APART = 8  # of the rows that are held against earlier ones
 PAIRS = 8  # that are remembered
 LEAST_DEVIATION = 3.0  # grey levels along a row; with less it is white, black, or a surface without texture
+LOST = "rows are lost in the transfer", "the driver overwrites an image while it is sent"
 CHANGED = 4.0  # grey levels, on the average of the other rows: what stands still may look the same twice after a compression
 LEAST_SAME = 0.1  # of the rows that have texture: so many are those of one earlier image
 COLUMNS_APART = 4  # of the columns that are compared from row to row
@@ -60,9 +61,11 @@ class TornJudge:
         for side, image, row in zip(images, images.values(), repeated, strict=True):
             if row is not None:
                 self._prove(image, row)
-                return broken(FaultKind.VIEW, f"a part of the {side} image is that of an earlier one, from row {row} on or up to it")
+                return broken(FaultKind.VIEW, f"a part of the {side} image is that of an earlier one, from row {row} on or up to it", *LOST)
         row = self._seam(pair)
-        return FINE if row is None else broken(FaultKind.VIEW, f"a part of the images is old: what they show breaks off at row {row}")
+        return (
+            FINE if row is None else broken(FaultKind.VIEW, f"a part of the images is old, what they show breaks off at row {row}", *LOST)
+        )
 
     def _repeated(self, side: str, image: Gray) -> int | None:
         """Return the first row from which on, or the last one up to which, an image is an earlier one, or None."""

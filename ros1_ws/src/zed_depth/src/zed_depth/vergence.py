@@ -115,8 +115,9 @@ class VergenceJudge:
 
     def _judged(self, offset_px: float, most_px: float, told: str) -> None:
         way = "inwards" if offset_px > 0.0 else "outwards"
-        told = f"the cameras are turned {way} against each other: {told.format(abs(offset_px))}: calibrate the pair"
-        self.finding = broken(FaultKind.CALIBRATION, told) if abs(offset_px) > most_px else FINE
+        told = f"the cameras are turned {way} against each other, {told.format(abs(offset_px))}"
+        found = broken(FaultKind.CALIBRATION, told, "a camera has moved (calibrate the pair)", "one image is older than the other")
+        self.finding = found if abs(offset_px) > most_px else FINE
 
 
 def _told(earlier_ns: int, later_ns: int, camera_pose: CameraPose) -> Floats | None:

@@ -33,6 +33,10 @@ AGREE_PX = 2.0
 FEW_MISTAKEN = 3  # features that may be mistaken for others in the same row
 FIRST_GUESS_SHARE = 0.03  # of the height: by as much the rows of a camera that is off may differ over the image
 FITS = 4
+MOVED = "a camera has moved (calibrate the pair)"
+MOVED_ASIDE, SWAPPED = "a camera has turned aside (calibrate the pair)", "left and right are swapped"
+NO_TEXTURE = "what is in view has none", "fog, dirt or the exposure takes it"
+NOT_THE_SAME = "one image is much older than the other or spoilt in its transfer", "one of them is mirrored, turned or covered"
 EDGE_PX = 9
 LIGHT_PX = 15  # around a feature: how bright both images are there
 STRONGEST = 99.5  # percentile of the gradient: the edges that are looked at
@@ -73,9 +77,12 @@ def view_of(left: Gray, right: Gray, *, offset_px: float, limits: ViewLimits) ->
     for side, image in (("left", left), ("right", right)):
         width_px = edge_width_px(image)
         if width_px > limits.max_edge_px:
-            return View(broken(FaultKind.BLUR, f"{side} image is blurred: its sharpest edges are {width_px:.1f} px wide"))
+            told = f"{side} image is blurred, its sharpest edges are {width_px:.1f} px wide"
+            return View(broken(FaultKind.BLUR, told, "the lens is out of focus", "dirt, drops or motion while it was exposed"))
     if np.array_equal(left, right):
-        return View(broken(FaultKind.VIEW, "both cameras deliver the same image"))
+        return View(
+            broken(FaultKind.VIEW, "both cameras deliver the same image", "one of them is sent on both topics", "the driver repeats it")
+        )
     first_guess_px = FIRST_GUESS_SHARE * left.shape[0]
     features = features_of(left), features_of(right)
     matches = match(*features)
@@ -107,13 +114,13 @@ def view_of(left: Gray, right: Gray, *, offset_px: float, limits: ViewLimits) ->
 
 def _scene_finding(matches: Matches, fit: RowFit, limits: ViewLimits) -> Finding | None:
     if matches.fewest < FEW_FEATURES:
-        return unsure(FaultKind.VIEW, f"too little texture to judge the cameras: {matches.fewest} features")
+        return unsure(FaultKind.VIEW, f"too little texture to judge the cameras, {matches.fewest} features", *NO_TEXTURE)
     agreeing = int(np.count_nonzero(fit.agree))
     if agreeing < max(ENOUGH_MATCHES, limits.min_agreeing * len(matches.vertical_px)):
         told = f"{agreeing} of {len(matches.vertical_px)} features agree"
         if matches.fewest < ENOUGH_FEATURES:
-            return unsure(FaultKind.VIEW, f"too little texture to judge the cameras: {told}")
-        return broken(FaultKind.VIEW, f"the cameras do not see the same scene: {told}")
+            return unsure(FaultKind.VIEW, f"too little texture to judge the cameras, {told}", *NO_TEXTURE)
+        return broken(FaultKind.VIEW, f"the cameras do not see the same scene, {told}", *NOT_THE_SAME)
     return None
 
 
@@ -177,8 +184,8 @@ def _rows_finding(fit: RowFit, shape: tuple[int, ...], limits: ViewLimits) -> Fi
     }
     told = max(troubles, key=lambda trouble: troubles[trouble])
     # Of a vehicle that moves, an image that is late is turned, moved and scaled, too.
-    causes = "a camera has moved (calibrate the pair), or one image is older than the other (look at the synchronisation)"
-    return broken(FaultKind.CALIBRATION, f"{told}: {causes}") if troubles[told] > limits.max_vertical_px else None
+    late = "one image is older than the other (look at the synchronisation)"
+    return broken(FaultKind.CALIBRATION, told, MOVED, late) if troubles[told] > limits.max_vertical_px else None
 
 
 def _parallax_finding(matched_px: Floats, limits: ViewLimits) -> Finding | None:
@@ -186,10 +193,13 @@ def _parallax_finding(matched_px: Floats, limits: ViewLimits) -> Finding | None:
     negative = float(np.mean(matched_px < -1.0))
     if negative > limits.max_negative:
         told = f"{negative:.0%} of the features have a negative disparity"
-        causes = "left and right are swapped, or both images are mirrored or upside down"
-        return broken(FaultKind.CALIBRATION, f"{told}: {causes}")
+        far, middle, near = np.percentile(matched_px, (5.0, 50.0, 95.0))
+        # Of a pair that is swapped the few that are near are the most negative, of cameras that are turned aside the least.
+        turned = near - middle > 2.0 * (middle - far) + 1.0
+        causes = (MOVED_ASIDE, SWAPPED) if turned else (SWAPPED, "both images are mirrored or upside down")
+        return broken(FaultKind.CALIBRATION, told, *causes)
     if float(np.percentile(np.abs(matched_px), 95.0)) < limits.min_parallax_px:
-        return unsure(FaultKind.VIEW, "no parallax: everything is far away, or both cameras show the same")
+        return unsure(FaultKind.VIEW, "no parallax", "everything is far away", "both cameras show the same")
     return None
 
 
@@ -199,7 +209,7 @@ def _beyond_finding(refined_px: Floats, limits: ViewLimits) -> Finding | None:
     if beyond <= max(FEW_MISTAKEN, limits.max_beyond * len(refined_px)):
         return None
     told = f"the cameras are turned aside against each other: {beyond} of {len(refined_px)} features seem to be beyond infinity"
-    return broken(FaultKind.CALIBRATION, f"{told}: calibrate the pair")
+    return broken(FaultKind.CALIBRATION, told, MOVED, "an image is moved to the side in its transfer")
 
 
 def _gain(left: Gray, right: Gray, matches: Matches, agree: NDArray[np.bool_]) -> float:
