@@ -119,13 +119,13 @@ def lidar(count: int) -> dict[str, Work]:
     """Measure /lidar_obstacles on the bytes of clouds with times, against numpy's bare reading of them."""
     columns = [yard_sweep(count, seed) for seed in range(4)]
     times = np.linspace(0.0, 0.1, count, dtype=np.float32)
-    return _lidar([_cloud(np.column_stack([points, times])) for points in columns])
+    return _lidar([cloud_bytes(np.column_stack([points, times])) for points in columns])
 
 
 def kitti() -> dict[str, Work]:
     """Measure /lidar_obstacles on real scans of 64 beams."""
     scans = [np.fromfile(path, np.float32).reshape(-1, 4) for path in sorted((DATA / "lidar_kitti").glob("*.bin"))]
-    return _lidar([_cloud(np.column_stack([scan[:, :3], np.linspace(0.0, 0.1, len(scan), dtype=np.float32)])) for scan in scans])
+    return _lidar([cloud_bytes(np.column_stack([scan[:, :3], np.linspace(0.0, 0.1, len(scan), dtype=np.float32)])) for scan in scans])
 
 
 def mapping() -> dict[str, Work]:
@@ -135,7 +135,7 @@ def mapping() -> dict[str, Work]:
     """
     scans = [np.fromfile(path, np.float32).reshape(-1, 4)[:, :3] for path in sorted((DATA / "lidar_kitti").glob("*.bin"))]
     places = np.loadtxt(DATA / "lidar_kitti" / "T_first_scan.txt").reshape(-1, 3, 4)[:, :, 3]
-    messages = [_cloud(np.column_stack([scan, np.full(len(scan), 0.1, dtype=np.float32)])) for scan in scans]
+    messages = [cloud_bytes(np.column_stack([scan, np.full(len(scan), 0.1, dtype=np.float32)])) for scan in scans]
     settings, lap = SlamSettings(self_m=2.5, max_range_m=80.0), [0, 1, 2, 1]
     slam, frame = [Slam(settings)], [-1]
 
@@ -191,11 +191,12 @@ def _lidar(messages: list[bytes]) -> dict[str, Work]:
     return {"node": node, "bare reading": bare}
 
 
-def _cloud(columns: NDArray[np.float32]) -> bytes:
+def cloud_bytes(columns: NDArray[np.float32], stamp_ns: int = NS) -> bytes:
+    """Return the bytes of a cloud of x, y, z and time (N, 4)."""
     fields = [PointField(name=name, offset=4 * k, datatype=PointField.FLOAT32, count=1) for k, name in enumerate(("x", "y", "z", "time"))]
     data = np.ascontiguousarray(columns, "<f4").tobytes()
     message = PointCloud2(height=1, width=len(columns), fields=fields, point_step=16, row_step=16 * len(columns), data=data, is_dense=True)
-    message.header.stamp.secs = 1
+    message.header.stamp.secs, message.header.stamp.nsecs = divmod(stamp_ns, NS)
     return _bytes(message)
 
 

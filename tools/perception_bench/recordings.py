@@ -37,6 +37,7 @@ TICK_NS = NS // 50
 WARM_UP = 6  # good measurements before a fault, and up to three more, so that it falls anywhere between two checks
 LONGEST = 12  # broken measurements until the verdict
 SHIFTED_NS = {SensorMode.LATE: -degradation.LATE_NS, SensorMode.FUTURE: degradation.FUTURE_NS}
+NOT_LOOKED = "nobody looked"
 REPEATED = (SensorMode.FROZEN, SensorMode.FLICKERING)
 
 
@@ -159,6 +160,11 @@ class Camera:
         self._rng = np.random.default_rng(0)
         self._info(1)
 
+    def inform(self, infos: dict[str, CameraInfo]) -> None:
+        """Tell other camera_infos."""
+        for side, info in infos.items():
+            self._core.take_info(side, info)
+
     def _info(self, scale: int) -> None:
         for side, info in self._recording.infos.items():
             matrices = {name: [value * scale for value in getattr(info, name)] for name in ("K", "P")}
@@ -169,17 +175,23 @@ class Camera:
 
     def take(self, k: int, mode: SensorMode, last_good: int, *, look: bool) -> tuple[Finding, str]:
         """Return the finding of a pair, and what it says."""
-        recording, core = self._recording, self._core
+        recording = self._recording
         given, shown = recording.pairs[k], recording.pairs[last_good if mode in REPEATED else k]
         left, right = degradation.pair(mode, (shown.left, shown.right), self._rng)
         pair = StereoPair(given.stamp_ns + SHIFTED_NS.get(mode, 0), left, right)
         if mode is SensorMode.WRONG_INFO and k == last_good + 1:
             self._info(2)
-        self._host.arrived_ns, core.vehicle.motion = given.stamp_ns, recording.motion(pair.stamp_ns)
+        finding, ahead = self.deliver(pair, given.stamp_ns, look=look)
+        return finding, _word(ahead)
+
+    def deliver(self, pair: StereoPair, arrived_ns: int, *, look: bool) -> tuple[Finding, Ahead]:
+        """Return the finding of a pair that arrives at a moment, and what is told of it to be ahead, if it is to ``look``."""
+        core = self._core
+        self._host.arrived_ns, core.vehicle.motion = arrived_ns, self._recording.motion(pair.stamp_ns)
         finding = core.finding(pair)
         if not finding.ok or not look:
-            return finding, "unknown"
-        return finding, _word(lambda: core.ahead(core.depth(pair), pair.stamp_ns))
+            return finding, Ahead(None, finding.reason or NOT_LOOKED)
+        return finding, _told_ahead(lambda: core.ahead(core.depth(pair), pair.stamp_ns))
 
 
 class Scanner:
@@ -199,21 +211,30 @@ class Scanner:
 
     def take(self, k: int, mode: SensorMode, last_good: int, *, look: bool) -> tuple[Finding, str]:
         """Return the finding of a sweep, and what it says."""
-        recording, core, given = self._recording, self._core, self._recording.sweeps[k]
+        recording, given = self._recording, self._recording.sweeps[k]
         sweep = _broken_sweep(mode, recording.sweeps[last_good if mode in REPEATED else k], self._rng)
         sweep = replace(sweep, stamp_ns=given.stamp_ns + SHIFTED_NS.get(mode, 0))
-        self._host.arrived_ns, core.vehicle.motion = given.end_ns, recording.motion(sweep.end_ns)
-        judged = core.judged(sweep, "lidar")
+        finding, ahead = self.deliver(sweep, given.end_ns, look=look)
+        return finding, _word(ahead)
+
+    def deliver(self, sweep: Sweep, arrived_ns: int, *, look: bool, frame: str = "lidar") -> tuple[Finding, Ahead]:
+        """Return the finding of a sweep that arrives at a moment, and what is told of it to be ahead, if it is to ``look``."""
+        core = self._core
+        self._host.arrived_ns, core.vehicle.motion = arrived_ns, self._recording.motion(sweep.end_ns)
+        judged = core.judged(sweep, frame)
         if not judged.finding.ok or not look:
-            return judged.finding, "unknown"
-        return judged.finding, _word(lambda: core.ahead(judged, "lidar"))
+            return judged.finding, Ahead(None, judged.finding.reason or NOT_LOOKED)
+        return judged.finding, _told_ahead(lambda: core.ahead(judged, frame))
 
 
-def _word(look: Callable[[], Ahead]) -> str:
+def _told_ahead(look: Callable[[], Ahead]) -> Ahead:
     try:
-        ahead = look()
-    except LookupError:
-        return "unknown"
+        return look()
+    except LookupError as error:
+        return Ahead(None, str(error))
+
+
+def _word(ahead: Ahead) -> str:
     return "obstacle" if ahead.nearest is not None else "unknown" if ahead.unknown else "free"
 
 
@@ -243,7 +264,7 @@ def on_good(sensor: Sensor) -> Good:
     result = Good((stamps[-1] - stamps[0]) / NS / 60.0, len(stamps))
     watch, before, known = HealthWatch(sensor.limits), stamps[0], False
     for k, stamp_ns in enumerate(stamps):
-        for verdict in _verdicts(watch, before, stamp_ns):
+        for verdict in verdicts(watch, before, stamp_ns):
             known |= verdict is Verdict.OK
             result.alarms += known and verdict is not Verdict.OK
             known &= verdict is Verdict.OK
@@ -255,7 +276,8 @@ def on_good(sensor: Sensor) -> Good:
     return result
 
 
-def _verdicts(watch: HealthWatch, from_ns: int, to_ns: int) -> Iterator[Verdict]:
+def verdicts(watch: HealthWatch, from_ns: int, to_ns: int) -> Iterator[Verdict]:
+    """Yield the verdicts between two measurements."""
     for now_ns in range(from_ns + TICK_NS, to_ns + 1, TICK_NS):
         yield watch.tick(now_ns)
 
@@ -288,7 +310,7 @@ def _break(sensor: Sensor, good: Good, mode: SensorMode, first: int, warm_up: in
         finding, _ = sensor.take(k, SensorMode.OK, k, look=k >= first - 2)
         watch.take(finding, stamps[k])
     for k in range(first, first + LONGEST):
-        for number, verdict in enumerate(_verdicts(watch, stamps[k - 1], stamps[k])):
+        for number, verdict in enumerate(verdicts(watch, stamps[k - 1], stamps[k])):
             if verdict is not Verdict.OK and k > first:
                 result.until_s.append((stamps[k - 1] + (number + 1) * TICK_NS - stamps[first - 1]) / NS)
                 return

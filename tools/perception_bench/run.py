@@ -98,6 +98,12 @@ def main(arguments: Sequence[str] | None = None) -> int:
         help="instead: report the nodes' judgements on flights rendered along a world's route",
     )
     parser.add_argument(
+        "--breaks",
+        choices=["pictures", "clouds"],
+        nargs="+",
+        help="instead: break recordings in all known ways, those whose names begin with --case, and report what that made of the way ahead",
+    )
+    parser.add_argument(
         "--imperfections", default="off", metavar="WORDS", help="imperfections of a rendered flight, as for `alula fly` (default off)"
     )
     parser.add_argument(
@@ -106,6 +112,8 @@ def main(arguments: Sequence[str] | None = None) -> int:
     options = parser.parse_args(arguments)
     if options.recording or options.rendered:
         return _judge_flights(options)
+    if options.breaks:
+        return _judge_breaks(options)
     chosen = [case for case in CASES if case.name.startswith(options.case)]
     if not chosen or options.frames < 1:
         sys.stderr.write(f"alula bench perception: no case begins with {options.case!r}; there are {[case.name for case in CASES]}\n")
@@ -146,6 +154,24 @@ def _judge_flights(options: argparse.Namespace) -> int:
     except ConfigError as error:
         sys.stderr.write(f"alula bench perception: {error}\n")
         return EXIT_USAGE
+    if options.json:
+        options.json.write_text(json.dumps(rows, indent=1) + "\n")
+    return EXIT_OK
+
+
+def _judge_breaks(options: argparse.Namespace) -> int:
+    """Print what the nodes make of all kinds of broken pictures and clouds."""
+    from perception_bench.consequences import Result, line, results, summed_up  # late: the simulator would count as memory of the cases
+
+    rows, summary = [], []
+    for what in options.breaks:
+        found: list[Result] = []
+        for result in results(what, options.case):
+            found.append(result)
+            rows.append({"what": what, **result.row()})
+            sys.stdout.write(line(result) + "\n")
+        summary.append(summed_up(what, found))
+    sys.stdout.write("\n".join(summary) + "\n")
     if options.json:
         options.json.write_text(json.dumps(rows, indent=1) + "\n")
     return EXIT_OK

@@ -1,4 +1,4 @@
-"""A street that was built at random, and what a LiDAR of 64 rings sees of it from a car: 122,000 points a sweep, with the true poses."""
+"""A street and a wood, built at random, and what a LiDAR sees of them: of 64 rings 122,000 points a sweep; with true poses."""
 
 from __future__ import annotations
 
@@ -16,7 +16,7 @@ from uav_simulator.world.shapes import Mesh, box, cylinder, rectangle
 Floats = NDArray[np.float64]
 Rng = np.random.Generator
 
-RINGS_DEG = np.linspace(2.0, -24.8, 64)
+RINGS_DEG = tuple(np.linspace(2.0, -24.8, 64).tolist())
 COLUMNS = 2000
 PERIOD_S = 0.1
 RANGE_M = (1.0, 80.0)
@@ -29,7 +29,12 @@ ROAD_M, KERB_M = 4.5, 0.15
 FACADE_M = 8.5
 
 
-def street(length_m: float, seed: int) -> Scene:
+def in_the_way(along_m: float) -> Part:
+    """Return a pillar of 0.6 m along x and 0.7 m across, so far along x in the middle of the way."""
+    return Part("pillar", box((along_m - 0.3, -0.35, 0.0), (along_m + 0.3, 0.35, 2.6)), 0.5)
+
+
+def street(length_m: float, seed: int, *others: Part) -> Scene:
     """Return a straight street along x from -80 m to its length and 80 m: facades with bays, parked cars, posts and trees on both sides."""
     rng = np.random.default_rng([seed, 17])
     begin, end = -80.0, length_m + 80.0
@@ -37,7 +42,19 @@ def street(length_m: float, seed: int) -> Scene:
     for side in (1.0, -1.0):
         parts += [_across(box((begin, ROAD_M, 0.0), (end, FACADE_M, KERB_M)), side, "pavement")]
         parts += [_across(mesh, side, name) for name, mesh in (*_houses(begin, end, rng), *_kerbside(begin, end, rng))]
-    return Scene(parts)
+    return Scene([*parts, *others])
+
+
+def wood(length_m: float, seed: int, *others: Part) -> Scene:
+    """Return trees, posts and boxes on a plain, beside a way along x from -40 m to its length and 40 m that is 4 m wide."""
+    rng = np.random.default_rng([seed, 18])
+    parts = [Part("ground", rectangle((-80.0, length_m + 80.0), (-60.0, 60.0)), 0.45)]
+    for along in np.arange(-40.0, length_m + 40.0, 2.5).tolist():
+        for side in (1.0, -1.0):
+            place = (along + rng.uniform(0.0, 2.0), side * rng.uniform(2.6, 14.0), 0.0)
+            meshes = tree(rng), cylinder(0.1, 4.0), box((-0.6, -0.4, 0.0), (0.6, 0.4, rng.uniform(0.8, 2.5)))
+            parts.append(Part("thing", meshes[int(rng.integers(len(meshes)))].moved(place), 0.5))
+    return Scene([*parts, *others])
 
 
 def _across(mesh: Mesh, side: float, name: str) -> Part:
@@ -75,27 +92,31 @@ def _kerbside(begin: float, end: float, rng: Rng) -> list[tuple[str, Mesh]]:
 
 @dataclass(frozen=True)
 class Drive:
-    """A drive along a street at `SPEED_M_S`: its sweeps, and the true poses (N, 4, 4) of the sensor at their ends."""
+    """A drive along x, swaying: its sweeps, and the true poses (N, 4, 4) of the sensor at their ends."""
 
     scene: Scene
     seed: int
+    speed_m_s: float = SPEED_M_S
+    rings_deg: tuple[float, ...] = RINGS_DEG
+    columns: int = COLUMNS
+    sway_m: float = SWAY_M
 
     def pose(self, at_s: float) -> Floats:
         """Return T_map_lidar (4, 4) at a moment."""
-        along, waves = SPEED_M_S * at_s, 2.0 * math.pi / SWAY_LENGTH_M
-        slope = SWAY_M * waves * math.cos(waves * along)
+        along, waves = self.speed_m_s * at_s, 2.0 * math.pi / SWAY_LENGTH_M
+        slope = self.sway_m * waves * math.cos(waves * along)
         length = math.hypot(1.0, slope)
         c, s = 1.0 / length, slope / length
         pose = np.eye(4)
-        pose[:2, :2], pose[:3, 3] = [[c, -s], [s, c]], (along, SWAY_M * math.sin(waves * along), HEIGHT_M)
+        pose[:2, :2], pose[:3, 3] = [[c, -s], [s, c]], (along, self.sway_m * math.sin(waves * along), HEIGHT_M)
         return pose
 
     def sweep(self, number: int) -> Sweep:
         """Return the sweep that ends at ``number`` periods after a second; each column is measured from the pose of its own moment."""
         begin_s = (number - 1) * PERIOD_S
-        offsets_s = np.linspace(0.0, PERIOD_S, COLUMNS + 1)[1:]
+        offsets_s = np.linspace(0.0, PERIOD_S, self.columns + 1)[1:]
         poses = np.array([self.pose(begin_s + offset_s) for offset_s in offsets_s])
-        azimuth, up = np.linspace(np.pi, -np.pi, COLUMNS, endpoint=False), np.radians(RINGS_DEG)
+        azimuth, up = np.linspace(np.pi, -np.pi, self.columns, endpoint=False), np.radians(self.rings_deg)
         directions = np.stack(
             np.broadcast_arrays(np.cos(up) * np.cos(azimuth)[:, None], np.cos(up) * np.sin(azimuth)[:, None], np.sin(up)), axis=-1
         )
