@@ -202,6 +202,12 @@ def by_trying_all(points, towards_deg, settings) -> float | None:
     ahead, left = points[:, 0] * np.cos(turn) + points[:, 1] * np.sin(turn), points[:, 1] * np.cos(turn) - points[:, 0] * np.sin(turn)
     up = points[:, 2]
     own = (np.hypot(points[:, 0], points[:, 1]) <= settings.body_radius_m) & (np.abs(up) <= settings.body_half_height_m)
+    view = (
+        (ahead >= 0.0)
+        & (np.abs(left) <= np.tan(np.radians(10.0)) * ahead)
+        & (np.abs(up) <= np.tan(np.radians(60.0)) * np.hypot(ahead, left))
+    )
+    at_1_m = 0.0165 * np.count_nonzero(view & ~own & (np.linalg.norm(points, axis=1) >= 0.05))
     inside = (ahead >= settings.near_m) & (ahead <= settings.length_m) & (np.abs(left) <= settings.half_width_m)
     inside &= (np.abs(up) <= settings.half_height_m) & ~own
     ahead, left, up = ahead[inside], left[inside], up[inside]
@@ -213,7 +219,7 @@ def by_trying_all(points, towards_deg, settings) -> float | None:
             block = np.all([(a >= b) & (a < b + 2 * cell) for a, b in zip((ahead, left, up), low, strict=True)], axis=0)
             found.append(ahead[block])
         most = max(found, key=len)
-        if len(most) >= settings.min_points:
+        if len(most) >= max(settings.min_points, at_1_m / max(settings.near_m + (row + 1) * cell, 1.0) ** 2):
             return float(np.percentile(most, 10.0))
     return None
 
@@ -257,3 +263,30 @@ def test_what_a_lost_part_of_a_real_street_hides_is_not_told_as_free(scan) -> No
             hidden += 1
             assert cut.unknown, (towards_deg, whole.nearest, cut.nearest)
     assert hidden >= 2
+
+
+def dense_street(drops: int, seed: int) -> np.ndarray:
+    """Return a sweep of 120,000 returns of ground 1.8 m below and of walls 8 m aside, but for drops between 1.5 and 15 m; sensor axes."""
+    rng = np.random.default_rng(seed)
+    azimuth, up = rng.uniform(-np.pi, np.pi, 120_000), np.radians(rng.uniform(-25.0, 2.0, 120_000))
+    ranges = np.minimum(8.0 / np.maximum(np.abs(np.sin(azimuth)), 0.1) / np.cos(up), 1.8 / np.maximum(np.sin(-up), 0.02))
+    ranges[:drops] = np.minimum(ranges[:drops], rng.uniform(1.5, 15.0, drops))
+    way = np.column_stack([np.cos(up) * np.cos(azimuth), np.cos(up) * np.sin(azimuth), np.sin(up)]) * ranges[:, None]
+    return (way @ T_BASE_LIDAR[:3, :3]).astype(np.float32)
+
+
+@pytest.mark.parametrize("drops", [600, 1_200])  # of more the health tells
+def test_rain_is_no_obstacle_to_a_dense_sensor(drops) -> None:
+    forwards = VehicleMotion(velocity_enu_m_s=(1.0, 0.0, 0.0))
+    assert [look(sweep(dense_street(drops, seed)), crab(), forwards) for seed in range(6)] == [None] * 6
+
+
+@pytest.mark.parametrize(("across_m", "away_m"), [(0.05, 4.0), (0.05, 8.0), (0.1, 10.0)])
+def test_a_post_is_an_obstacle_to_a_dense_sensor(across_m, away_m) -> None:
+    cloud = dense_street(0, 0)
+    x, y, _ = T_BASE_LIDAR[:3, :3] @ cloud.T
+    hit = (np.abs(y) < across_m / 2 / away_m * x) & (x > away_m)
+    cloud[hit] *= (away_m / x[hit])[:, None]
+    found = look(sweep(cloud), crab(), VehicleMotion(velocity_enu_m_s=(1.0, 0.0, 0.0)))
+    assert found is not None
+    assert found.distance_m == pytest.approx(away_m, abs=0.1)

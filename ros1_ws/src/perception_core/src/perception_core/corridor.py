@@ -57,13 +57,15 @@ class Support:
     """How much must be seen in one place before it is believed to be an obstacle.
 
     The corridor is cut into cells of ``cell_m``; along it they grow as ``range_error_per_m * distance**2`` where that is longer (stereo).
-    Two by two by two neighbouring cells must together hold ``min_points`` points and ``min_area_m2`` of seen surface.
+    Two by two by two neighbouring cells must together hold ``min_points`` points and ``min_area_m2`` of seen surface; of a dense sensor
+    also ``points_at_1_m`` points, by the square of the distance fewer.
     """
 
     min_points: int = 3
     min_area_m2: float = 0.0
     cell_m: float = 0.25
     range_error_per_m: float = 0.0
+    points_at_1_m: float = 0.0
     percentile: float = 10.0
 
 

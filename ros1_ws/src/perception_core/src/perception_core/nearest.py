@@ -34,7 +34,7 @@ def nearest_obstacle(
         return None
     areas = np.ones(len(index)) if areas_m2 is None else areas_m2[index]
     grid = _Grid.of(seen[index], corridor, support)
-    block = grid.nearest_block(areas, support)
+    block = grid.nearest_block(areas, support, _edges_ahead(corridor, support))
     if block is None:
         return None
     of_block = index[grid.in_block(block)]
@@ -75,12 +75,13 @@ class _Grid:
         counts = np.bincount(flat, minlength=int(np.prod(shape))).astype(np.float64).reshape(shape)
         return cls(cells=cells, flat=flat, counts=counts)
 
-    def nearest_block(self, areas_m2: NDArray[np.float64], support: Support) -> NDArray[np.intp] | None:
-        """Return the near corner of the nearest block of 2x2x2 cells with enough support."""
+    def nearest_block(self, areas_m2: NDArray[np.float64], support: Support, edges_m: NDArray[np.float64]) -> NDArray[np.intp] | None:
+        """Return the near corner of the nearest block of 2x2x2 cells with enough support; ``edges_m`` (C,) is where they begin, ahead."""
         counts = _blocks(self.counts)
         weights = np.bincount(self.flat, weights=areas_m2, minlength=self.counts.size).astype(np.float64)
         surface = _blocks(weights.reshape(self.counts.shape))
-        believed = np.argwhere((counts >= support.min_points) & (surface >= support.min_area_m2))
+        least = np.maximum(support.min_points, support.points_at_1_m / np.maximum(edges_m + support.cell_m, 1.0) ** 2)
+        believed = np.argwhere((counts >= least[:, None, None]) & (surface >= support.min_area_m2))
         if not len(believed):
             return None
         candidates = believed[believed[:, 0] == believed[0, 0]]
