@@ -202,12 +202,9 @@ def by_trying_all(points, towards_deg, settings) -> float | None:
     ahead, left = points[:, 0] * np.cos(turn) + points[:, 1] * np.sin(turn), points[:, 1] * np.cos(turn) - points[:, 0] * np.sin(turn)
     up = points[:, 2]
     own = (np.hypot(points[:, 0], points[:, 1]) <= settings.body_radius_m) & (np.abs(up) <= settings.body_half_height_m)
-    view = (
-        (ahead >= 0.0)
-        & (np.abs(left) <= np.tan(np.radians(10.0)) * ahead)
-        & (np.abs(up) <= np.tan(np.radians(60.0)) * np.hypot(ahead, left))
-    )
-    at_1_m = 0.0165 * np.count_nonzero(view & ~own & (np.linalg.norm(points, axis=1) >= 0.05))
+    flat_m = np.hypot(ahead, left)
+    level = (ahead >= 0.0) & (np.abs(left) <= np.tan(np.radians(10.0)) * ahead) & (np.abs(up) <= np.tan(np.radians(15.0)) * flat_m)
+    at_1_m = 0.02 * np.count_nonzero(level & ~own & (np.linalg.norm(points, axis=1) >= 0.05))
     inside = (ahead >= settings.near_m) & (ahead <= settings.length_m) & (np.abs(left) <= settings.half_width_m)
     inside &= (np.abs(up) <= settings.half_height_m) & ~own
     ahead, left, up = ahead[inside], left[inside], up[inside]
@@ -275,18 +272,33 @@ def dense_street(drops: int, seed: int) -> np.ndarray:
     return (way @ T_BASE_LIDAR[:3, :3]).astype(np.float32)
 
 
+def dome(cloud: np.ndarray, seed: int) -> np.ndarray:
+    """Return a sweep of a sensor that sees as densely up to 60 degrees above and below, where its own cloud ends; sensor axes."""
+    rng = np.random.default_rng(seed)
+    up = np.radians(np.concatenate([rng.uniform(2.0, 60.0, 260_000), rng.uniform(-60.0, -25.0, 155_000)]))
+    azimuth = rng.uniform(-np.pi, np.pi, len(up))
+    ranges = np.where(up > 0.0, 30.0, 1.8 / np.sin(np.abs(up)))
+    way = np.column_stack([np.cos(up) * np.cos(azimuth), np.cos(up) * np.sin(azimuth), np.sin(up)]) * ranges[:, None]
+    return np.concatenate([cloud, (way @ T_BASE_LIDAR[:3, :3]).astype(np.float32)])
+
+
+def with_post(cloud: np.ndarray, across_m: float, away_m: float) -> np.ndarray:
+    """Return a sweep with an upright post straight ahead."""
+    x, y, _ = T_BASE_LIDAR[:3, :3] @ cloud.T
+    hit = (np.abs(y) < across_m / 2 / away_m * x) & (x > away_m)
+    return np.where(hit[:, None], cloud * (away_m / np.where(hit, x, 1.0))[:, None], cloud).astype(np.float32)
+
+
 @pytest.mark.parametrize("drops", [600, 1_200])  # of more the health tells
 def test_rain_is_no_obstacle_to_a_dense_sensor(drops) -> None:
     forwards = VehicleMotion(velocity_enu_m_s=(1.0, 0.0, 0.0))
     assert [look(sweep(dense_street(drops, seed)), crab(), forwards) for seed in range(6)] == [None] * 6
 
 
-@pytest.mark.parametrize(("across_m", "away_m"), [(0.05, 4.0), (0.05, 8.0), (0.1, 10.0)])
-def test_a_post_is_an_obstacle_to_a_dense_sensor(across_m, away_m) -> None:
-    cloud = dense_street(0, 0)
-    x, y, _ = T_BASE_LIDAR[:3, :3] @ cloud.T
-    hit = (np.abs(y) < across_m / 2 / away_m * x) & (x > away_m)
-    cloud[hit] *= (away_m / x[hit])[:, None]
-    found = look(sweep(cloud), crab(), VehicleMotion(velocity_enu_m_s=(1.0, 0.0, 0.0)))
+@pytest.mark.parametrize("around", [False, True], ids=["street", "dome"])
+@pytest.mark.parametrize(("across_m", "away_m"), [(0.01, 2.0), (0.05, 4.0), (0.05, 8.0), (0.1, 10.0)])
+def test_a_post_is_an_obstacle_to_a_dense_sensor(across_m, away_m, around) -> None:
+    cloud = with_post(dense_street(0, 0), across_m, away_m)
+    found = look(sweep(dome(cloud, 0) if around else cloud), crab(), VehicleMotion(velocity_enu_m_s=(1.0, 0.0, 0.0)))
     assert found is not None
     assert found.distance_m == pytest.approx(away_m, abs=0.1)

@@ -27,7 +27,8 @@ NOTHING_M = 0.05  # from the sensor; a point that is nearer is no return
 BLUR_M = 1.0  # by as much at most a point is moved when its sweep is straightened, within the region that is looked at
 VIEW_DEG = 10.0  # the sensor sees the way ahead if it has returns from all parts within this angle of it, seen from above ...
 VIEW_PARTS = 4  # a gap of ten degrees leaves one of them empty, wherever it begins
-SOLID_SHARE = 0.0165  # of the returns in the view of the way ahead: as many at least come from half a metre of a cable 1 m away
+LEVEL_DEG = 15.0  # above and below the way: of a sensor that looks further up and down, what it sees there counts for no place ahead
+SOLID_SHARE = 0.02  # of the level returns in the view of the way ahead; half a metre of a cable of 1 cm that is 1 m away has 0.029
 STEEP_DEG = 60.0  # ... that are not below or above the vehicle
 ASIDE_DEG = 20.0  # from the way ahead to the middle of a sector that lost its returns; an obstacle at 4 m may be as far aside
 
@@ -80,7 +81,7 @@ class LidarAhead:
         position = pose[:3, 3]
         direction = direction_of_motion(position, pose[:3, 0], motion)
         around = self._around(sweep, pose, T_base_lidar, direction)
-        support = _support(settings.support, int(around.ahead.sum()))
+        support = _support(settings.support, around.level)
         nearest = self._nearest(deskew(around.near, poses, T_base_lidar, position), position, direction, support)
         if around.ahead.min() < settings.min_ahead:
             return Ahead(nearest, _not_seen(around.ahead))
@@ -118,6 +119,7 @@ class LidarAhead:
             near=sweep.select(self._others(np.flatnonzero(near), by_axis, T_base_lidar)),
             ahead=_parts_of_view(of_ahead, of_left),
             down=int(np.count_nonzero(down)),
+            level=int(np.count_nonzero(np.abs(of_up) <= np.tan(np.radians(LEVEL_DEG)) * np.hypot(of_ahead, of_left))),
         )
 
     def _others(self, chosen: NDArray[np.intp], by_axis: NDArray[np.float32], T_base_lidar: Floats) -> NDArray[np.intp]:  # noqa: N803
@@ -130,12 +132,12 @@ class LidarAhead:
         return others
 
 
-def _support(least: Support, ahead: int) -> Support:
-    """Return how many returns an obstacle has at least, of a sensor with so many in the view of the way ahead.
+def _support(least: Support, level: int) -> Support:
+    """Return how many returns an obstacle has at least, of a sensor with so many level ones in the view of the way ahead.
 
     To a dense sensor three returns in a place nearby are some drops of rain: a post of 5 cm at 4 m has sixty.
     """
-    return replace(least, points_at_1_m=SOLID_SHARE * ahead)
+    return replace(least, points_at_1_m=SOLID_SHARE * level)
 
 
 def _timed(sweep: Sweep) -> Sweep:
@@ -149,11 +151,19 @@ def _timed(sweep: Sweep) -> Sweep:
 
 @dataclass(frozen=True)
 class _Around:
-    """The returns around the way ahead; how many come from each part of its view, from right to left, (VIEW_PARTS,), and from below it."""
+    """The returns around the way ahead.
+
+    Attributes:
+        near: those that may be an obstacle.
+        ahead: how many come from each part of its view, from right to left, (VIEW_PARTS,).
+        down: how many of the view come from below the way.
+        level: how many of the view come from no more than LEVEL_DEG above or below it.
+    """
 
     near: Sweep
     ahead: NDArray[np.intp]
     down: int
+    level: int
 
 
 def _parts_of_view(ahead: NDArray[np.float32], left: NDArray[np.float32]) -> NDArray[np.intp]:
