@@ -34,7 +34,8 @@ FEW_MISTAKEN = 3  # features that may be mistaken for others in the same row
 FIRST_GUESS_SHARE = 0.03  # of the height: by as much the rows of a camera that is off may differ over the image
 FITS = 4
 MOVED = "a camera has moved (calibrate the pair)"
-MOVED_ASIDE, SWAPPED = "a camera has turned aside (calibrate the pair)", "left and right are swapped"
+MOVED_ASIDE = "a camera has turned aside (calibrate the pair)"
+SWAPPED = "left and right are swapped, as both images are when they are mirrored or upside down"
 NO_TEXTURE = "what is in view has none", "fog, dirt or the exposure takes it"
 NOT_THE_SAME = "one image is much older than the other or spoilt in its transfer", "one of them is mirrored, turned or covered"
 EDGE_PX = 9
@@ -196,7 +197,7 @@ def _parallax_finding(matched_px: Floats, limits: ViewLimits) -> Finding | None:
         far, middle, near = np.percentile(matched_px, (5.0, 50.0, 95.0))
         # Of a pair that is swapped the few that are near are the most negative, of cameras that are turned aside the least.
         turned = near - middle > 2.0 * (middle - far) + 1.0
-        causes = (MOVED_ASIDE, SWAPPED) if turned else (SWAPPED, "both images are mirrored or upside down")
+        causes = (MOVED_ASIDE, SWAPPED) if turned else (SWAPPED, MOVED_ASIDE)
         return broken(FaultKind.CALIBRATION, told, *causes)
     if float(np.percentile(np.abs(matched_px), 95.0)) < limits.min_parallax_px:
         return unsure(FaultKind.VIEW, "no parallax", "everything is far away", "both cameras show the same")
