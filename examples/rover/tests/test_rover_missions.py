@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import functools
 from pathlib import Path
 
 import pytest
@@ -103,44 +102,6 @@ def test_a_link_that_stays_away_ends_the_mission_with_that_cause():
     assert "keeps_link" in end.reason
     assert mission.state("base", "wheels") == "FREE"
     assert [one for one in ended if one[1] in {"keeps_link", "linked"}] == [("follow_corridor", "keeps_link")]
-
-
-AWAY_S, APART_S = 3.0, 0.05
-"""For so long are managers away that died, and so long after one another are those of a process missed."""
-ALL = ("base", "perception", "power", "cargo")
-
-
-def killed(scenario, at_s, names):
-    """Run a mission whose managers die at a moment of its clock, in this order, and are started again, and told anew."""
-    mission = Mission.load(scenario, ROOT).mocked()
-    world, after = mission.world, mission.world.clock.after
-
-    def again(name):
-        dead = world.managers[name]
-        world.serve(dead.skillset, mission.robot.hooks_of(dead.skillset))
-        for resource in dead.skillset.resources:
-            state = dead.engine.resources[resource.name].state
-            if state != resource.initial and any(arrow.extern for arrow in resource.transitions):
-                assert world.managers[name].transition(resource.name, state).accepted
-
-    for number, name in enumerate(names):
-        after(at_s + number * APART_S, functools.partial(world.kill, name))
-        after(at_s + AWAY_S + number * APART_S, functools.partial(again, name))
-    mission.run()
-    return mission
-
-
-@pytest.mark.parametrize(
-    "names", [ALL, ALL[1:] + ALL[:1], ("base",), ("perception",), ("power",)], ids=lambda names: names[0] + str(len(names))
-)
-@pytest.mark.parametrize(("scenario", "leg", "home"), [("deliver", 20.0, 140.0), ("patrol", 24.29, 110.0)])
-def test_managers_that_die_are_waited_for_and_the_work_goes_on(scenario, leg, home, names):
-    for at_s, outcome in ((leg, Outcome.DEGRADED), (home, Outcome.ACCOMPLISHED)):
-        mission = killed(scenario, at_s, names)
-        assert mission.outcome is outcome, (at_s, mission.reason)
-        assert outcome is Outcome.ACCOMPLISHED or "have gone" in mission.reason
-        assert mission.facts["delivered" if scenario == "deliver" else "rounds_done"] == (3 if scenario == "deliver" else 2)
-        assert mission.state("base", "base_status") == "DOCKED"
 
 
 def test_a_door_that_stays_shut_has_it_take_the_other_way(tmp_path):
