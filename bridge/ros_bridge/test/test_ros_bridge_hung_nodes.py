@@ -16,13 +16,14 @@ from ros_bridge.service_types import ServiceTypes
 
 CONFIG = ""
 ARGUMENTS = ("--all",)
-SERVICES = 20
+SERVICES = 200
+"""So many that those which are asked side by side, and again after pauses, are few of them, also where a topic takes long to be bridged."""
 
 
 @pytest.fixture
 def hung(bridge, master):
     """Give a node that takes connections and never answers: its services and topics are registered, and are its own."""
-    with socket.create_server(("127.0.0.1", 0), backlog=200) as server:
+    with socket.create_server(("127.0.0.1", 0), backlog=2 * SERVICES) as server:
         uri = f"127.0.0.1:{server.getsockname()[1]}"
         proxy = ServerProxy(master.uri)
         services = [f"/hung/service{number}" for number in range(SERVICES)] + ["/hung/get_loggers", "/hung/set_logger_level"]
