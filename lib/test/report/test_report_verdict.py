@@ -61,7 +61,7 @@ def test_a_flight_whose_nodes_all_died_names_them_and_their_logs() -> None:
     lines = verdict_lines({"outcome": None, "mission_exit": 1, "landed": None, "collisions": None}, died, OUT)
     assert lines == [
         "",
-        "the mission came to no outcome: uav_simulator, zed_depth died; /runs/one/logs tells why",
+        "the mission came to no outcome: uav_simulator, zed_depth died; /runs/one/logs has the reasons",
         "  uav_simulator died (exit code 1); it stayed dead",
         "  zed_depth died (exit code 1) at 4.0 s of mission clock; it was started again at 5.5 s of mission clock (3 times in all)",
     ]
@@ -118,7 +118,7 @@ def test_a_crash_is_no_landing() -> None:
 def test_a_flight_that_left_no_outcome_still_tells_what_flew() -> None:
     summary = {"outcome": None, "landed": False, "duration_s": 12.0, "distance_m": 9.0}
     lines = verdict_lines(summary, [Death("mission", "signal SIGKILL", 12.0)], OUT)
-    assert lines[1] == "the mission came to no outcome: mission died; /runs/one/logs tells why"
+    assert lines[1] == "the mission came to no outcome: mission died; /runs/one/logs has the reasons"
     assert lines[3].startswith("  landed: no, duration 12.0 s")
 
 
