@@ -125,6 +125,7 @@ class Console:
                 super().connection_made(transport)
                 connections.add(self)
 
+        await self._find_runs()  # before the first page is asked for: what a viewer is shown first is served, too
         looking = [
             asyncio.create_task(job)
             for job in (self._learn_options(), self._look_for_runs(), self._look_at_skills(), self._stay_connected())
@@ -239,8 +240,11 @@ class Console:
 
     async def _look_for_runs(self) -> None:
         while True:
-            self._runs, self._live = await asyncio.to_thread(self._found)
             await asyncio.sleep(LOOK_S)
+            await self._find_runs()
+
+    async def _find_runs(self) -> None:
+        self._runs, self._live = await asyncio.to_thread(self._found)
 
     def _found(self) -> tuple[list[Path], set[Path]]:
         """Return what can be shown, and what of it is under way: a deployment only while it is up, however many missions it has had."""
