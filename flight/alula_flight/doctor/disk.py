@@ -5,9 +5,9 @@ from __future__ import annotations
 import os
 import shutil
 from collections.abc import Iterator
-from pathlib import Path
 
 from alula.common.deployments import Deployment
+from alula.common.files import folder_there
 from alula.common.robots import RobotFolder
 from alula_flight.doctor.findings import DISK, Finding, ok, problem
 from alula_flight.station.disk import FREE_GB, FULL, GB, kept_of
@@ -16,7 +16,7 @@ from alula_flight.station.parts import Places
 
 def look_at_disk(deployment: Deployment, places: Places, robot: RobotFolder) -> Iterator[Finding]:
     """Yield what is to be said of the disk; removes nothing."""
-    folder = _nearest(robot.runs)
+    folder = folder_there(robot.runs)
     free_gb = shutil.disk_usage(folder).free / GB
     if not os.access(folder, os.W_OK):
         yield problem(DISK, f"{folder} can't be written", f"chown or chmod {folder}")
@@ -30,8 +30,3 @@ def look_at_disk(deployment: Deployment, places: Places, robot: RobotFolder) -> 
         yield problem(DISK, f"{words}: `disk_gb` is more than there is", f"lower `disk_gb` in {deployment.path}")
     else:
         yield ok(DISK, words)
-
-
-def _nearest(folder: Path) -> Path:
-    """Return the folder, or the first above it that is there."""
-    return next(one for one in (folder, *folder.parents) if one.is_dir())

@@ -34,6 +34,11 @@ def check_place(option: str, path: Path | None) -> None:
         raise AlulaError(f"{option} {path}: {folder} can't be written to; name a file elsewhere")
 
 
+def folder_there(folder: Path) -> Path:
+    """Return the folder, or the nearest one above it that exists: where a folder that is still to be made takes its room from."""
+    return next(one for one in (folder, *folder.absolute().parents) if one.is_dir())
+
+
 def write_text(path: Path, text: str) -> None:
     """Replace a text file (UTF-8) in one step."""
 

@@ -123,7 +123,7 @@ def test_sensors_are_recorded_where_that_is_asked_for_and_can_be():
 
 
 def test_how_much_sensors_will_take_is_said(tmp_path):
-    assert "about 4 MB a second of flight, 0.5 GB for two minutes" in sensors_words(tmp_path)
+    assert "about 4 MB a second of flight, 0.5 GB for two minutes" in sensors_words(tmp_path / "still/to/be/made")
 
 
 def test_faults_go_to_the_program_that_applies_them(tmp_path):

@@ -11,6 +11,7 @@ from pathlib import Path
 from typing import Any
 
 from alula.common.faults import parse_fault
+from alula.common.files import folder_there
 from alula.common.network import udp_ports_of
 from alula.common.scenarios import Scenario, load_scenario
 from alula.runtime.live.part import Clock, Consequence, RunPart
@@ -207,8 +208,8 @@ class DronePart(RunPart):
 
 
 def sensors_words(out: Path) -> str:
-    """Return how much the raw measurements will take, and how much there is."""
-    free_gb, minutes_gb = shutil.disk_usage(out).free / 1e9, 120 * SENSORS_MB_S / 1e3
+    """Return how much the raw measurements will take, and how much there is, also where the folder is still to be made."""
+    free_gb, minutes_gb = shutil.disk_usage(folder_there(out)).free / 1e9, 120 * SENSORS_MB_S / 1e3
     return (
         f"functional.bag will hold raw measurements: about {SENSORS_MB_S:g} MB a second of flight, {minutes_gb:.1f} GB for two minutes; "
         f"{free_gb:.0f} GB are free, and the last one is left alone"
