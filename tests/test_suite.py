@@ -145,6 +145,8 @@ PLACES = {
     "early ends and the rover": "tests/test_endings.py",
     "flights": "tests/test_flights.py",
     "missions": "lib/test/trees",
+    "proofs": "lib/test/prove/skillset",
+    "repairs and campaigns": "lib/test/repair/test_repair_words.py",
     "library": "lib/test/model",
 }
 
