@@ -13,7 +13,7 @@ import os
 import re
 import sys
 import threading
-from collections.abc import Callable, Iterator, Mapping, Sequence
+from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from contextvars import ContextVar
 from dataclasses import dataclass, field
 from pathlib import Path
@@ -166,16 +166,24 @@ def _swap_code(folders: Sequence[Path]) -> None:
     with _SWAPPING:
         for folder in folders:
             _CODE.setdefault(folder, {})
-        theirs = [folder for folder in _CODE if folder not in folders]
-        for name, module in list(sys.modules.items()) if theirs else ():
-            place = _folder_of(module)
-            package = name.partition(".")[0]
-            if place in theirs and any((folder / package).is_dir() or (folder / f"{package}.py").is_file() for folder in folders):
+        own = _packages_in(folders)
+        for name, module in list(sys.modules.items()):
+            place = _folder_of(module) if name.partition(".")[0] in own else None
+            if place is not None and place not in folders:
                 _CODE[place][name] = sys.modules.pop(name)
         for folder in folders:
             sys.modules.update(_CODE[folder])
             _CODE[folder].clear()
         importlib.invalidate_caches()
+
+
+def _packages_in(folders: Iterable[Path]) -> set[str]:
+    """Return the names of the packages and modules in folders; none of a folder that is not there."""
+    found = set()
+    for folder in folders:
+        with contextlib.suppress(OSError), os.scandir(folder) as entries:
+            found |= {entry.name.removesuffix(".py") for entry in entries if entry.is_dir() or entry.name.endswith(".py")}
+    return found
 
 
 def _folder_of(module: ModuleType) -> Path | None:
