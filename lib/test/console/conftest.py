@@ -9,8 +9,18 @@ from pathlib import Path
 
 import pytest
 from console_records import Story, failing_story, write_map, write_record
+from console_serving import WAIT_S
+
+from alula.console import server
 
 os.environ.setdefault("ALULA_ROOT", str(Path(__file__).resolve().parents[3]))
+
+
+@pytest.fixture(autouse=True)
+def _patient(monkeypatch: pytest.MonkeyPatch) -> None:
+    """Have a server of this process wait longer for slow peers: on a busy machine the tests' own clients are slow."""
+    for limit in ("OPEN_S", "HELLO_S", "STUCK_S"):
+        monkeypatch.setattr(server, limit, WAIT_S)
 
 
 @pytest.fixture

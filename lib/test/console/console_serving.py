@@ -22,7 +22,7 @@ from alula.console.link import ActError, Link, Skillsets
 from alula.console.server import FEED, Console
 from alula.runtime.live.options import RunOffer, RunOption
 
-WAIT_S = 60.0
+WAIT_S = 120.0
 
 OPTIONS = (
     RunOption("link", "where the robot is", metavar="URL"),
@@ -71,6 +71,7 @@ class Bench:
             origin=f"http://{self.base}",  # type: ignore[arg-type]
             additional_headers={"Cookie": self.cookie},
             max_size=None,
+            open_timeout=WAIT_S,
         )
         await connection.send(json.dumps({"key": key, "name": key, **hello}))
         return connection

@@ -8,6 +8,7 @@ from test_editor_server import Editor
 from alula.editor.completion import Place
 from alula.editor.missions import Missions
 from alula.language.errors import Severity
+from alula_testing.waits import HANGS_S
 from finding_pages.mission_checks import ROBOT, whole
 
 
@@ -152,7 +153,7 @@ def test_an_editing_session(folder):
         assert editor.ask("textDocument/definition", where) is None
         editor.ask("shutdown", None)
         editor.send("exit", None)
-        assert editor.process.wait(30) == 0
+        assert editor.process.wait(HANGS_S) == 0
     finally:
         editor.process.kill()
-        editor.process.wait(30)
+        editor.process.wait(HANGS_S)

@@ -10,7 +10,8 @@ import threading
 
 import pytest
 
-TIMEOUT_S = 30
+from alula_testing.waits import HANGS_S
+
 URI = "file:///tmp/does_not_exist/robot.rl"
 TEXT = """type Point
 
@@ -74,7 +75,7 @@ class Editor:
 
     def wait(self, wanted):
         while True:
-            message = self.received.get(timeout=TIMEOUT_S)
+            message = self.received.get(timeout=HANGS_S)
             if wanted(message):
                 return message
 
@@ -101,10 +102,10 @@ def editor():
         yield editor
         editor.ask("shutdown", None)
         editor.send("exit", None)
-        assert editor.process.wait(TIMEOUT_S) == 0
+        assert editor.process.wait(HANGS_S) == 0
     finally:
         editor.process.kill()
-        editor.process.wait(TIMEOUT_S)
+        editor.process.wait(HANGS_S)
 
 
 def place(line, start, end):

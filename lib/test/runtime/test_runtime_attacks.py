@@ -24,7 +24,6 @@ from alula_testing.misbehaviours import CIRCLE, MISBEHAVIOURS, Misbehaviour, Unp
 from alula_testing.runtime_models import AXES_USED, RELEASE, RESET, SDK, Bench, flying_skill, flying_skillset
 
 S = ExecutionState
-SOON_S = 30.0
 
 
 def watching() -> Skill:
@@ -207,7 +206,7 @@ class Hanging:
         self.bench.clock = lambda: 1
 
     def hang(self, _: object) -> str:
-        assert self.go_on.wait(SOON_S)
+        assert self.go_on.wait(waits.HANGS_S)
         return ""
 
     def run(self, skill: str = "takeoff"):
@@ -217,12 +216,12 @@ class Hanging:
 
     def running(self):
         execution = self.run()
-        waits.until(lambda: execution.state is S.RUNNING and self.bench.hooks["takeoff"].dispatched.is_set(), "it runs", SOON_S)
+        waits.until(lambda: execution.state is S.RUNNING and self.bench.hooks["takeoff"].dispatched.is_set(), "it runs")
         return execution
 
     def close(self) -> None:
         self.go_on.set()
-        assert self.workers.close(SOON_S)
+        assert self.workers.close(waits.HANGS_S)
 
 
 @pytest.fixture
@@ -258,26 +257,24 @@ def test_a_hook_that_does_not_return_ends_its_own_execution_and_stops_the_functi
     if hook in provoked:
         hanging.workers.submit(provoked[hook])
     other = hanging.run("watch")
-    waits.until(lambda: execution.done and f"{hook} has not returned within" in " ".join(bench.errors), f"{execution} ends", SOON_S)
+    waits.until(lambda: execution.done and f"{hook} has not returned within" in " ".join(bench.errors), f"{execution} ends")
     assert execution.state.value == outcome
     assert other.state is S.RUNNING
-    waits.until(
-        lambda: "on_emergency" in bench.hooks["takeoff"].calls or "on_emergency" not in calls, "the strongest stop is called", SOON_S
-    )
+    waits.until(lambda: "on_emergency" in bench.hooks["takeoff"].calls or "on_emergency" not in calls, "the strongest stop is called")
     hanging.go_on.set()
-    waits.until(lambda: bench.hooks["takeoff"].calls == calls, f"the function is stopped: {bench.hooks['takeoff'].calls}", SOON_S)
+    waits.until(lambda: bench.hooks["takeoff"].calls == calls, f"the function is stopped: {bench.hooks['takeoff'].calls}")
     assert len(ends(bench, execution)) == 1
     assert [reply.accepted for reply in replies] == ([False] if hook == "on_pause" else [])
-    waits.until(lambda: execution.id not in engine._context.entries, "it is forgotten", SOON_S)
+    waits.until(lambda: execution.id not in engine._context.entries, "it is forgotten")
 
 
 def test_a_pause_that_waits_for_a_hook_that_hangs_is_answered(hanging):
     hanging.bench.hooks["takeoff"].acts["on_dispatch"] = hanging.hang
     execution = hanging.run()
-    waits.until(lambda: execution.state is S.RUNNING, "it runs", SOON_S)
+    waits.until(lambda: execution.state is S.RUNNING, "it runs")
     replies: list = []
     hanging.bench.engine.set_paused(execution.id, replies.append, paused=True)
-    waits.until(lambda: replies, "the pause is answered", SOON_S)
+    waits.until(lambda: replies, "the pause is answered")
     assert "is open: it has ended, or never was" in replies[0].reason
 
 
@@ -286,10 +283,10 @@ def test_progress_that_takes_its_time_is_not_asked_again_and_holds_up_no_other_s
     hooks["takeoff"].acts["progress"] = hanging.hang
     execution, other = hanging.running(), hanging.run("watch")
     hanging.workers.submit(lambda: bench.progress(execution))
-    waits.until(lambda: "progress" in hooks["takeoff"].calls, "the hook is called", SOON_S)
+    waits.until(lambda: "progress" in hooks["takeoff"].calls, "the hook is called")
     assert bench.progress(execution) == 0.0
     assert hooks["takeoff"].calls.count("progress") == 1
-    waits.until(lambda: other.state is S.RUNNING, "the other runs", SOON_S)
+    waits.until(lambda: other.state is S.RUNNING, "the other runs")
     assert bench.progress(other) == 0.5
 
 
@@ -299,5 +296,5 @@ def test_a_question_is_answered_whatever_validate_does(hanging, value):
     answers: list[str] = []
     hooks.acts["validate"] = hanging.hang if value is None else returning(value)
     hanging.workers.submit(lambda: hanging.bench.engine.ask_validate("takeoff", {}, answers.append))
-    waits.until(lambda: answers, "the question is answered", SOON_S)
+    waits.until(lambda: answers, "the question is answered")
     assert answers == [value or "validate has not returned within 0.2 s"]

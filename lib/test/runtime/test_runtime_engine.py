@@ -17,6 +17,7 @@ from alula.runtime.core.hook_calls import LocalHooks
 from alula.runtime.hooks import SkillHooks
 from alula_testing.recorder import Recorder
 from alula_testing.runtime_models import AXES_FREE, AXES_USED, RELEASE, RESET, SDK, Bench, flying_skill, flying_skillset
+from alula_testing.waits import HANGS_S
 
 S = ExecutionState
 
@@ -371,7 +372,7 @@ def test_hooks_are_never_called_with_the_lock_held():
     def from_another_thread(_):
         other = threading.Thread(target=bench.engine.transition, args=("sdk", "NOSUCH"))
         other.start()
-        other.join(5.0)
+        other.join(HANGS_S)
         assert not other.is_alive()
         return ""
 

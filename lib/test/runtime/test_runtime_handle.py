@@ -12,9 +12,9 @@ import pytest
 from alula.model.execution_state import ExecutionState
 from alula.runtime.handle import HandleReport, SkillFailedError, SkillHandle, StillRunningError
 from alula.runtime.waiting import Moment, NoResponseError, Pending
+from alula_testing.waits import HANGS_S
 
 S = ExecutionState
-SOON_S = 10.0
 
 
 def handle() -> SkillHandle:
@@ -82,7 +82,7 @@ def test_readers_in_threads_see_every_change_and_stop_at_the_end():
         thread.start()
     follow(one)
     for thread in threads:
-        thread.join(SOON_S)
+        thread.join(HANGS_S)
     assert seen == [REPORTS, REPORTS]
     assert list(one) == REPORTS[-1:]  # a late reader
 
@@ -98,7 +98,7 @@ def test_a_listener_that_raises_keeps_no_caller_waiting():
 def test_asyncio_awaits_and_iterates():
     async def main() -> None:
         one = handle()
-        thread = threading.Thread(target=lambda: (gate.wait(SOON_S), follow(one)))
+        thread = threading.Thread(target=lambda: (gate.wait(HANGS_S), follow(one)))
         gate = threading.Event()
         thread.start()
 
@@ -108,11 +108,11 @@ def test_asyncio_awaits_and_iterates():
         reading = asyncio.create_task(read())
         await asyncio.sleep(0)  # one turn of the loop: the reader waits now
         gate.set()
-        ended = await asyncio.wait_for(one, SOON_S)
+        ended = await asyncio.wait_for(one, HANGS_S)
         assert ended.result == "DONE"
-        assert await asyncio.wait_for(reading, SOON_S) == REPORTS
+        assert await asyncio.wait_for(reading, HANGS_S) == REPORTS
         assert (await one) == ended  # at once
-        thread.join(SOON_S)
+        thread.join(HANGS_S)
 
     asyncio.run(main())
 
@@ -124,7 +124,7 @@ def test_an_await_that_is_cancelled_leaves_nothing_behind():
         with pytest.raises(asyncio.TimeoutError):
             await asyncio.wait_for(one, 0.01)
         assert one._after == []
-        waiting = asyncio.ensure_future(asyncio.wait_for(one, SOON_S))
+        waiting = asyncio.ensure_future(asyncio.wait_for(one, HANGS_S))
         await asyncio.sleep(0)  # one turn of the loop: it waits now
         waiting.cancel()
 

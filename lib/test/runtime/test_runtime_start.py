@@ -13,6 +13,7 @@ from alula.runtime.local import LocalWorld
 from alula.runtime.middleware import RESOURCE_STATES
 from alula_testing.recorder import Recorder
 from alula_testing.runtime_models import flying_skillset
+from alula_testing.waits import HANGS_S
 
 S = ExecutionState
 
@@ -92,7 +93,7 @@ def test_no_request_is_taken_before_and_a_hook_that_hangs_holds_up_its_own_skill
         assert (execution.state, execution.message) == (S.NOT_VALIDATED, "what ran before has yet to be stopped: takeoff")
         assert engine.explain("takeoff").reason.startswith("what ran before has yet to be stopped")
         hooks["takeoff"].go.set()
-    assert begun.wait(60.0)
+    assert begun.wait(HANGS_S)
     engine.transition("sdk", "AVAILABLE")
     execution = engine.request("takeoff", {})
     if limit_s is None:

@@ -11,6 +11,7 @@ from alula.model.model import Interrupt
 from alula.runtime.core.engine import DEFAULT_TIMEOUT_S
 from alula.runtime.hooks import SkillHooks
 from alula_testing.runtime_models import RELEASE, TAKE, Bench, flying_skill, flying_skillset
+from alula_testing.waits import HANGS_S
 
 S = ExecutionState
 SECOND = 10**9
@@ -97,7 +98,7 @@ def test_a_hook_that_hangs_delays_no_emergency_and_no_end(hanging):
 
     def hang(_):
         entered.set()
-        release.wait(20.0)
+        release.wait(HANGS_S)
 
     recorder = bench.hooks["takeoff"]
     if hanging != "on_dispatch":
@@ -110,14 +111,14 @@ def test_a_hook_that_hangs_delays_no_emergency_and_no_end(hanging):
     }[hanging]
     thread = threading.Thread(target=blocked, daemon=True)
     thread.start()
-    assert entered.wait(20.0)
+    assert entered.wait(HANGS_S)
     execution = bench.engine.executions[0]
     assert bench.engine.interrupt(execution.id)
     wait_until_late(bench, 1.0)
     assert execution.state is S.INTERRUPTED
     assert bench.states()["axes"] == "AVAILABLE"
     release.set()
-    thread.join(20.0)
+    thread.join(HANGS_S)
     assert recorder.calls.count("on_emergency") == 1
     assert recorder.calls.count("on_interrupt") == 1  # after the hook that hung: it may have started the function late
     recorder.acts.clear()

@@ -13,6 +13,7 @@ from alula.model.model import Assignment, Data, Effect, Invariant, Precondition,
 from alula.runtime.core.events import ExecutionEvent, event_record, read_event
 from alula.runtime.managers import services
 from alula_testing.runtime_models import AXES_FREE, RELEASE, SDK, Bench, flying_skill, flying_skillset
+from alula_testing.waits import HANGS_S
 
 S = ExecutionState
 FORBIDDEN = Effect("give_up", (Assignment("sdk", "UNAVAILABLE"),))
@@ -128,12 +129,13 @@ def test_a_hook_that_stays_silent_is_answered_for_and_its_late_answer_is_dropped
     monkeypatch.setattr(services, "HOOK_ANSWERS_S", 0.1)
     told: queue.SimpleQueue[str] = queue.SimpleQueue()
     late = services._in_time(told.put, "silent")
-    assert told.get(timeout=10.0) == "silent"
+    assert told.get(timeout=HANGS_S) == "silent"
     late("after all")
+    monkeypatch.setattr(services, "HOOK_ANSWERS_S", HANGS_S)
     quick = services._in_time(told.put, "silent")
     quick("at once")
     quick("and again")
-    assert told.get(timeout=10.0) == "at once"
+    assert told.get(timeout=HANGS_S) == "at once"
     assert told.empty()
 
 
