@@ -316,9 +316,12 @@ def test_a_way_that_is_blocked_gets_another_chance(rover: Path, capsys: pytest.C
     assert [fate["after"]["survives"] for fate in fates if fate["after"]["faults"] == ["person"]] == [True]
 
 
-@pytest.mark.parametrize("fault", ["laser", "person", "door"])
+@pytest.mark.parametrize("fault", ["laser", "person", "door", "battery"])
 def test_the_rover_survives_as_it_is(rover: Path, capsys: pytest.CaptureFixture[str], fault: str) -> None:
     assert answer(capsys, rover / "patrol.xml", "--fault", fault)["answer"] == "nothing to repair"
+    mission = Mission.load("patrol", ALULA_ROOT / "examples/rover")
+    for moment in (1, 20, 60) if fault in mission.behaviour.faults else ():
+        assert mission.run(f"{fault}@{moment}", seed=1).outcome in {Outcome.ACCOMPLISHED, Outcome.DEGRADED}, f"{fault}@{moment}"
 
 
 PATROL = "arrival then base.base_status == DOCKED"

@@ -24,7 +24,7 @@ from alula.records.causes.fault_file import effects_of
 from alula.records.mocks import behaviour_of
 from alula.records.models import members
 
-COUNTED = 100  # attempts and rounds, exactly: each has its share of the odds
+COUNTED = 100  # attempts, rounds and what scripts count, exactly: each has its share of the odds
 
 
 def ignore(_line: str) -> None:
@@ -67,7 +67,7 @@ def mission_of(
     known = figures if others is None else others
 
     def read(why_any_order: str) -> System:
-        return System.of(mission, failures, few=COUNTED, known=inputs, why_any_order=why_any_order)
+        return System.of(mission, failures, few=COUNTED, known=inputs, why_any_order=why_any_order, counted=COUNTED)
 
     return read, lambda system: MissionSteps(system, effects, brought, departure, known, at_first), known
 

@@ -208,6 +208,28 @@ def test_a_fault_refuses_requests_no_more_often_than_it_ends_skills(tmp_path: Pa
     assert found == [[True, False]] * 2
 
 
+MENDED = """
+<Sequence name="mend">
+  <ScriptCondition name="not too often" code="mended &lt; MOST"/>
+  <Script name="count" code="mended += 1"/>
+  <base.dock name="dock"/>
+  <Awaits name="the charger is on" if="power.charger == ON" within="5"/>
+  <power.charge name="charge"/>
+</Sequence>"""
+
+
+@pytest.mark.parametrize("most", [1, 2, 5])
+def test_a_mission_that_counts_its_answers_survives_as_many_strikes(most: int, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    """A count that a script keeps is the number that it is, not any one below the last that is allowed."""
+    monkeypatch.setenv("ALULA_ROBOT", str(tmp_path))
+    text = LOOP.replace('<AlwaysFailure name="nothing mends it"/>', MENDED.replace("MOST", str(most)))
+    text = text.replace("done := 0;", "done := 0; mended := 0;")
+    subject = Subject.read(rover(tmp_path, text), quiet)
+    survived = [Judge(subject, Deadline.after(TIME_S), strikes=strikes).fate(text, ["battery"]).survives for strikes in range(1, 5)]
+    assert survived == [strikes <= most for strikes in range(1, 5)]
+    assert any("power.charge" in run for run in fly(subject, text, "battery"))
+
+
 # --- plans --------------------------------------------------------------------------------------------------------------
 
 

@@ -49,6 +49,8 @@ class Read:
     numbers: dict[Key, set[float]] = field(default_factory=dict)
     texts: dict[Key, set[str]] = field(default_factory=dict)
     counted: set[Key] = field(default_factory=set)
+    exactly: int = 0
+    """Below which number entries that are counted are kept exactly, from 0 to the greatest one that they are compared with."""
     whole: set[Key] = field(default_factory=set)
     ordered: set[Key] = field(default_factory=set)
     """Entries that are compared with more than literals: of a text every letter counts."""
@@ -117,19 +119,27 @@ class Read:
         least, most = min(known, default=math.inf), max(known, default=-math.inf)
         if least <= low and high <= most:
             return value
+        if low == high and low % 1 == 0 and 0 <= low <= most and low < self.exactly:
+            return value
         wide_low = -math.inf if low < least else min(low, math.nextafter(most, math.inf))
         wide_high = math.inf if high > most else max(high, math.nextafter(least, -math.inf))
         return UnknownNumber(self.oracle, f"`{name[1]}`", wide_low, wide_high)
 
 
 def what_is_read(
-    trees: Iterable[Wiring], opaque: Iterable[str], constants: Mapping[str, float], oracle: Oracle, free: Iterable[str] = ()
+    trees: Iterable[Wiring],
+    opaque: Iterable[str],
+    constants: Mapping[str, float],
+    oracle: Oracle,
+    free: Iterable[str] = (),
+    exactly: int = 0,
 ) -> Read:
     """Return what the trees of a mission, which stand on one blackboard, decide by.
 
     ``opaque`` are types of node that decide by nothing that is known, ``free`` those that may ask for more than the file shows.
+    Entries that are counted are kept exactly below ``exactly``, up to what they are compared with.
     """
-    read = Read(oracle, unread=frozenset(opaque), free=frozenset(free))
+    read = Read(oracle, exactly=exactly, unread=frozenset(opaque), free=frozenset(free))
     for root in trees:
         read.names |= {(root.blackboard, name) for name in OUTCOME}
         for wiring in root.walk():

@@ -84,8 +84,9 @@ class System:
         few: int = FEW,
         known: Inputs | None = None,
         why_any_order: str = "",
+        counted: int = 0,
     ) -> System:
-        """Return the system of a mission; attempts and rounds are counted exactly up to ``few``.
+        """Return the system of a mission; attempts and rounds are counted exactly up to ``few``, what scripts count below ``counted``.
 
         With ``known`` inputs the robot's own leaves do what they do; without, they may answer all that they declare. Its nodes with
         children are run where their code can be, unless a reason is given (``why_any_order``).
@@ -113,7 +114,7 @@ class System:
         roots = [tree.root.wiring for tree in trees]
         if READY in files.trees:
             roots.append(wire(files, file.palette, READY, Shared(robot.clock_ns), blackboard=filed.tree.blackboard))
-        read = what_is_read(roots, unread, plan.parameters, oracle, own.free)
+        read = what_is_read(roots, unread, plan.parameters, oracle, own.free, counted)
         body = Body(robot, director, board, trees, {one.name: one for one in skillsets}, read, few)
         ticker = Ticker(body, oracle)
         board.pending = Waits(robot, [one.name for one in skillsets], ticker.leaves)
