@@ -70,6 +70,7 @@ class Fate:
         safe: it always ends, and each robot is at rest, at home or somebody else's then.
         run: what happens in a run after which it can't be accomplished any more.
         states: those of the resources then.
+        refused: what is refused on the shortest way from there to an end: ``skillset.skill``, and the precondition.
         situations: how many were looked at.
         assuming: where it does not survive, the states, ``skillset.resource STATE``, without which it would, of those that come later;
             with them it ends safely all the same. Empty: there are no such states.
@@ -83,6 +84,7 @@ class Fate:
     states: Mapping[str, str]
     situations: int
     assuming: tuple[str, ...] = ()
+    refused: tuple[tuple[str, str], ...] = ()
 
     @property
     def answered(self) -> bool:
@@ -126,9 +128,10 @@ def fate_of(
         return accomplished or (goal is not None and here.come == len(faults) and steps.holds(here.place, goal))
 
     def following(here: Here) -> list[tuple[Step[Place], Here]]:
+        deadline.check()
         return [] if steps.outcome(here.place) is not None else _following(steps, here, faults, ends, strikes)
 
-    graph = _Graph([Here(place) for place in steps.initial()], following, deadline)
+    graph = _Graph([Here(place) for place in steps.initial()], following)
     if not graph.explore(lambda here, step: steps.comes_later(here.place, step.name), most):
         return None
     lost_before = graph.first_without_way(is_good)
@@ -143,7 +146,18 @@ def fate_of(
     outcomes = frozenset("none" if one is None else one.value for one in last)
     run, states = ((), {}) if lost is None else (graph.run_to(lost), steps.resources(lost.place))
     assuming = tuple(later) if safe and lost is not None and lost_before is None else ()
-    return Fate(tuple(faults), outcomes, lost is None, safe, run, states, len(graph.ways.found), assuming)
+    refused = () if lost is None else _refused(lost, following, lambda here: steps.outcome(here.place) is not None)
+    return Fate(tuple(faults), outcomes, lost is None, safe, run, states, len(graph.ways.found), assuming, refused)
+
+
+def _refused(
+    first: Here, following: Callable[[Here], list[tuple[Step[Place], Here]]], is_end: Callable[[Here], bool]
+) -> tuple[tuple[str, str], ...]:
+    """Return the requests that are refused on the shortest way from a situation to an end of the mission."""
+    ways = ShortestWays([first], following)
+    end = next((one for one in ways if is_end(one)), None)
+    several = [] if end is None else [one for one in ways.to(end) if one.kind is Kind.NOW and one.result]
+    return tuple(dict.fromkeys((one.name, one.result) for one in several))
 
 
 class _Graph:
@@ -155,11 +169,10 @@ class _Graph:
         put_off: the names of the steps that `explore` has put off.
     """
 
-    def __init__(self, first: Sequence[Here], following: Callable[[Here], list[tuple[Step[Place], Here]]], deadline: Deadline) -> None:
+    def __init__(self, first: Sequence[Here], following: Callable[[Here], list[tuple[Step[Place], Here]]]) -> None:
         self.ways = ShortestWays(first, self._next)
         self.ends: set[Here] = set()
         self._following = following
-        self._deadline = deadline
         self._is_put_off: Callable[[Here, Step[Place]], bool] = lambda _here, _step: False
         self._leading: dict[Here, list[Here]] = {}
         self._later: list[tuple[Here, Step[Place], Here]] = []
@@ -182,7 +195,6 @@ class _Graph:
         return most is None or len(self.ways.found) <= most
 
     def _next(self, here: Here) -> Iterator[tuple[Step[Place], Here]]:
-        self._deadline.check()
         found = self._following(here)
         if not found:
             self.ends.add(here)

@@ -147,3 +147,18 @@ def asked_of_others(purpose: Purpose) -> list[tuple[Resource, str]]:
             if all(one.extern for one in resource.transitions):
                 found.setdefault(resource.name, (resource, condition.state))
     return list(found.values())
+
+
+def shows_done(purpose: Purpose) -> tuple[str, str] | None:
+    """Return the resource and its state by which a success shows that keeps the skill from being started again, until others change it.
+
+    None: after a success it can be started again, as far as its own effects go.
+    """
+    changes = [{one.resource: one.target for one in result.effect.assignments} for result in purpose.skill.successes]
+    several = changes[0].items() if changes else ()
+    everywhere = [(resource, state) for resource, state in several if all(one.get(resource) == state for one in changes)]
+    return next(((resource, state) for resource, state in everywhere if _refuses(purpose.skill, resource, state)), None)
+
+
+def _refuses(skill: Skill, resource: str, state: str) -> bool:
+    return any(judge(one.condition, {resource: state}, NO_DATA) is False for one in skill.preconditions)

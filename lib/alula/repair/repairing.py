@@ -304,8 +304,12 @@ class Search:
         return Repair(branch, written, 0, tuple(not_asked), tuple(left), assuming=assuming)
 
     def _what_is_missing(self, branch: Branch, fate: Fate) -> str:
-        """Return what skills of a branch need of the functional layer, and is not so where the mission can't be accomplished any more."""
-        return "".join(f"; {one}" for one in self._missing_in((branch.use, branch.tree), fate))
+        """Return why the mission can't be accomplished any more.
+
+        That is what skills of a branch need of the functional layer, and is not so, else what is refused then.
+        """
+        missing = self._missing_in((branch.use, branch.tree), fate)
+        return "".join(f"; {one}" for one in missing or [f"{skill} is refused then ({why})" for skill, why in fate.refused])
 
     def _missing_in(self, parts: Iterable[Element | None], fate: Fate) -> list[str]:
         asked = [one for part in parts if part is not None for one in self._patterns.asked_in(part)]

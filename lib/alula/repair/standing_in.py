@@ -13,7 +13,7 @@ from alula.repair.branches import Branch, clone, node, parent_of
 from alula.repair.composing import Sources, first_skills, opening
 from alula.repair.failing import Failing
 from alula.repair.naming import Renaming, another, assigned, told_state
-from alula.repair.purposes import Purpose, Purposes, asked_of_others, broken_by
+from alula.repair.purposes import Purpose, Purposes, asked_of_others, broken_by, shows_done
 from alula.repair.subject import Subject, texts_of
 from alula.trees.document import Element
 from alula.trees.node import Node
@@ -54,15 +54,19 @@ class StandIns:
         return [one for one in found if one not in broken and (not self._using or one.name in self._using)]
 
     def _with(self, top: Element, place: Node, instead: Mapping[str, Purpose], failing: Failing) -> Iterator[Branch]:
-        """Yield a branch with these skills instead of others; what has to be held is brought about first, where a skill does that."""
+        """Yield a branch with these skills instead of others; what has to be held is brought about first, where a skill does that.
+
+        A second one leaves out what is done already, where a skill of it can't be started again then.
+        """
         held = {name: self._purposes.holders(self._purposes.known[name], one) for name, one in instead.items()}
         if any(one is None for one in held.values()):
             return
         holders = [holder for several in held.values() for holder in several or ()]
         making = _Making(self._subject, self._sources, self._purposes, self._texts)
-        several = (making.made(top, instead, held, bringing=one) for one in ((True, False) if holders else (False,)))
-        fitting = (one for one in several if one is not None and self._has_what_it_needs(one.top, place, failing))
-        yield from (self._as_branch(one, place, instead, failing) for one in islice(fitting, 1))
+        for once in (False, True):
+            several = (making.made(top, instead, held, bringing=one, once=once) for one in ((True, False) if holders else (False,)))
+            fitting = (one for one in several if one is not None and self._has_what_it_needs(one.top, place, failing))
+            yield from (self._as_branch(one, place, instead, failing) for one in islice(fitting, 1))
 
     def _has_what_it_needs(self, top: Element, place: Node, failing: Failing) -> bool:
         """Tell whether each role that a skill needs is filled by another one, in the branch or beside it."""
@@ -138,8 +142,15 @@ class _Making:
         self._parallels: list[tuple[Element, Element]] = []
 
     def made(
-        self, original: Element, instead: Mapping[str, Purpose], held: Mapping[str, list[Purpose] | None], *, bringing: bool
+        self,
+        original: Element,
+        instead: Mapping[str, Purpose],
+        held: Mapping[str, list[Purpose] | None],
+        *,
+        bringing: bool,
+        once: bool,
     ) -> _Made | None:
+        """Return the copy; None: nothing holds what has to be held, or, of what is done ``once``, there is nothing of that kind."""
         top = node("Top", clone(original))
         self._parallels = []
         leaves: list[Element] = []
@@ -171,7 +182,22 @@ class _Making:
             holding, within = parallel.children
             parallel.set("name", f"{node_name(holding)} and {node_name(leaf)}")
             within.set("name", f"then {node_name(leaf)}")
-        return _Made(top.children[0], tuple(why))
+        if once and not self._unless_done(top):
+            return None
+        return _Made(top.children[0], (*why, "What is done already is left out.") if once else tuple(why))
+
+    def _unless_done(self, top: Element) -> bool:
+        """Have what can't be started again once it is done left out then; tell whether there is anything of that kind."""
+        found = False
+        for leaf in [one for one in top.iterate() if type_name(one) in self._purposes.known]:
+            purpose = self._purposes.known[type_name(leaf)]
+            shown = shows_done(purpose)
+            if shown is not None:
+                found = True
+                above = parent_of(top, leaf)
+                done = node("ScriptCondition", name="done already", code=f"{purpose.skillset.name}.{shown[0]} == {shown[1]}")
+                above.content[above.content.index(leaf)] = node("Fallback", done, leaf, name=f"{node_name(leaf)}, or go on")
+        return found
 
     def _hold(self, top: Element, leaf: Element, holder: Purpose, *, bringing: bool) -> list[Element] | None:
         """Have a skill hold something while a leaf runs; return the leaves that are new, None where their inputs come from nowhere."""

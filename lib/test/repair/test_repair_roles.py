@@ -124,6 +124,35 @@ def test_another_skill_of_its_role_goes_on_with_what_that_one_needs(tmp_path: Pa
     assert any("base.creep" in run for run in fly(subject, answer.repair.text, "laser"))
 
 
+GRIPPER = """
+skillset gripper {
+  resource jaws { initial OPEN  OPEN -> CLOSED  CLOSED -> OPEN }
+  skill grasp { effect { shut: jaws -> CLOSED }  precondition { open: resource = (jaws == OPEN) }
+    result { success HELD: apply = shut  failure MISSED } }
+}
+"""
+
+
+def test_what_is_done_and_can_not_be_started_again_is_left_out(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    """The laser may be lost when the thing is held already: a branch that grasps it once more is refused."""
+    monkeypatch.setenv("ALULA_ROBOT", str(tmp_path))
+    drive = '<base.drive name="drive" to="{goal}"/>'
+    path = rover(tmp_path, ERRAND.replace(drive, f'{drive}<gripper.grasp name="take it"/>'))
+    models, mocks = (path.parents[1] / "skillsets" / name for name in ("rover.skill", "mock.yaml"))
+    models.write_text(MODELS.replace("touch", "sight") + GRIPPER)
+    mocks.write_text(mocks.read_text().replace("faults:", "  gripper.grasp: {delay: 1, result: HELD}\nfaults:", 1))
+    subject = Subject.read(path, quiet)
+    told: list[str] = []
+    answer = Search(subject, Question("laser", others=False), Deadline.after(TIME_S), told.append).run()
+    assert answer.repair is not None
+    xml = answer.repair.branch.as_xml()
+    assert skills_in(xml) == ["eyes.feel", "base.drive", "gripper.grasp"]
+    assert '<ScriptCondition name="done already" code="gripper.jaws == CLOSED"/>' in xml
+    assert any("gripper.grasp is refused then (open)" in line for line in told)
+    runs = fly(subject, answer.repair.text, "laser")
+    assert any("gripper.grasp" in run[: run.index("eyes.feel")] for run in runs if "eyes.feel" in run)
+
+
 def test_a_fault_is_survived_under_the_assumption_that_nothing_comes_later(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     """Dust leaves the bumper alone at first: with it the rover goes on, until that is stuck, too; then the mission is given up at rest."""
     subject, answer = repaired(ERRAND.replace("PORTS", ""), "dust", tmp_path, monkeypatch)
