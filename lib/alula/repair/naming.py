@@ -17,6 +17,7 @@ from alula.trees.reading import node_name, type_name
 
 _WORD = re.compile(r"[A-Za-z]+")
 _TIMES = {1: "one chance", 2: "two chances", 3: "three chances"}
+_WHERE = frozenset({"to", "into", "onto", "out", "around", "along", "through", "past", "behind", "up", "down", "back", "home", "there"})
 _OFTEN = {1: "once", 2: "twice", 3: "three times"}
 
 
@@ -90,9 +91,13 @@ def told_states(several: Iterable[tuple[str, str]]) -> str:
 
 
 def chances(attempts: int, skill: str = "") -> str:
-    """Return what a node is called that gives another one so many chances; ``skill``: what that is called, where it is a skill."""
+    """Return what a node is called that gives another one so many chances; ``skill``: what that is called, where it is a skill.
+
+    One that is called by where it leads to, as ``to the valve``, gets there.
+    """
     times = _TIMES.get(attempts, f"{attempts} chances")
-    return f"{times} to {skill}" if skill else times
+    gets = "get " if skill.partition(" ")[0].lower() in _WHERE else ""
+    return f"{times} to {gets}{skill}" if skill else times
 
 
 def often_when(attempts: int, results: Iterable[str]) -> str:
