@@ -93,9 +93,9 @@ def told_states(several: Iterable[tuple[str, str]]) -> str:
 def chances(attempts: int, skill: str = "") -> str:
     """Return what a node is called that gives another one so many chances; ``skill``: what that is called, where it is a skill.
 
-    One that is called by where it leads to, as ``to the valve``, gets there.
+    One that is called by where it leads to, as ``to the valve``, gets there; ``go_to_dock`` is told in words.
     """
-    times = _TIMES.get(attempts, f"{attempts} chances")
+    times, skill = _TIMES.get(attempts, f"{attempts} chances"), skill.replace("_", " ")
     gets = "get " if skill.partition(" ")[0].lower() in _WHERE else ""
     return f"{times} to {gets}{skill}" if skill else times
 

@@ -110,7 +110,8 @@ class Answer:
     """What came of the search: a repair, or why there is none.
 
     ``impossible``: it can't be accomplished with the fault, as ``reasons`` show; a repair then brings it to a safe end. Else, without a
-    repair, nobody knows; ``stopped``: not all branches were tried, as the time was over, or somebody ended the search.
+    repair, nobody knows; ``stopped``: not all branches were tried, as the time was over, or somebody ended the search. ``strikes``: how
+    often the fault comes at most, where it is no more than bad ends of skills; 0: it comes once, and stays.
     """
 
     failing: tuple[Failing, ...]
@@ -120,6 +121,7 @@ class Answer:
     reasons: tuple[str, ...] = ()
     tried: int = 0
     stopped: bool = False
+    strikes: int = 0
 
     @property
     def survives_already(self) -> bool:
@@ -196,7 +198,8 @@ class Search:
         fault = (self._question.fault,) if self._question.fault else ()
         fate = self._judge.fate(text, fault) if fault else None
         if fate is not None and fate.answered:
-            return Answer(tuple(failing), fate)
+            ends_only = not self._subject.faults[self._question.fault].states
+            return Answer(tuple(failing), fate, strikes=self._question.most_faults if ends_only else 0)
         self._tell(f"{'; '.join(dict.fromkeys(one.words for one in failing))}: {_told(fate)}")
         reasons = next((lines for one in failing if (lines := self._why_impossible(text, one))), [])
         if reasons and (fate is None or fate.safe):

@@ -20,7 +20,8 @@ def as_text(answer: Answer, odds: Both | None) -> str:
     """Return lines for a terminal."""
     what = "; ".join(dict.fromkeys(one.words for one in answer.failing))
     if answer.survives_already:
-        return f"nothing to repair: {what}, and the mission survives it{_assuming(answer.assuming)}\n"
+        often = f", as often as it may come (`--most-faults {answer.strikes}`)" if answer.strikes else ""
+        return f"nothing to repair: {what}, and the mission survives it{often}{_assuming(answer.assuming)}\n"
     if answer.repair is None:
         when = " before the search was ended" if answer.stopped else ""
         head = "impossible" if answer.impossible else f"unknown: no branch was proved{when}"

@@ -257,6 +257,8 @@ def test_a_mission_that_counts_its_answers_survives_as_many_strikes(most: int, t
     survived = [Judge(subject, Deadline.after(TIME_S), strikes=strikes).fate(text, ["battery"]).survives for strikes in range(1, 5)]
     assert survived == [strikes <= most for strikes in range(1, 5)]
     assert any("power.charge" in run for run in fly(subject, text, "battery"))
+    answer = Search(subject, Question("battery", most_faults=1), Deadline.after(TIME_S), quiet).run()
+    assert as_text(answer, None).endswith("survives it, as often as it may come (`--most-faults 1`)\n")
 
 
 # --- plans --------------------------------------------------------------------------------------------------------------

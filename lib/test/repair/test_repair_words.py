@@ -113,6 +113,7 @@ def test_a_state_is_told_as_a_person_tells_it(resource: str, state: str, told: s
 def test_chances_are_counted_in_words() -> None:
     assert [chances(2, "dock"), chances(3), chances(4)] == ["two chances to dock", "three chances", "4 chances"]
     assert [chances(3, "to the valve"), chances(2, "Back home")] == ["three chances to get to the valve", "two chances to get Back home"]
+    assert chances(3, "go_to_dock") == "three chances to go to dock"
     assert often_when(2, ["BLOCKED", "TIMED_OUT"]) == "twice when blocked or timed out"
 
 
