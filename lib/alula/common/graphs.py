@@ -76,6 +76,11 @@ class ShortestWays(Generic[Vertex, Step]):
         origin = self._origins[vertex]
         return None if origin is None else origin[1]
 
+    def before(self, vertex: Vertex) -> Vertex | None:
+        """Return the vertex from which a vertex was found, None for a start."""
+        origin = self._origins[vertex]
+        return None if origin is None else origin[0]
+
     def to(self, vertex: Vertex) -> list[Step]:
         """Return the steps of a shortest way from a start to a vertex that was found."""
         steps: list[Step] = []

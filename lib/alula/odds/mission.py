@@ -28,6 +28,7 @@ from alula.prove.mission.own import actions, failing_among
 from alula.prove.mission.state import Event, State
 from alula.prove.mission.state import Kind as Happens
 from alula.prove.mission.system import System
+from alula.prove.mission.words import choice
 from alula.records.causes.effects import FaultEffects
 
 Brought = Mapping[str, Collection[tuple[str, str]]]
@@ -113,6 +114,12 @@ class MissionSteps:
         """Tell whether a state, ``skillset.resource STATE``, comes only of what is done about the faults that are there."""
         several = [self._faults[name] for name in state.faults]
         return any(_any(one.later, shown) for one in several) and not any(_any(one.states, shown) for one in several)
+
+    def chosen(self, before: Place, after: Place) -> tuple[str, ...]:
+        """Return, in words, what a tick that leads from one situation to another took a value for that nobody knows."""
+        steps = self._system.steps(before.state)
+        event = next((event for event, there in steps if event.kind is Happens.TICK and there == after.state), None)
+        return () if event is None else tuple(words for one in _waited(event.choices)[1] if (words := choice(one)))
 
     def only_ends(self, fault: str) -> bool:
         """Tell whether a fault is no more than bad ends of skills."""

@@ -71,6 +71,7 @@ class Fate:
         run: what happens in a run after which it can't be accomplished any more.
         states: those of the resources then.
         refused: what is refused on the shortest way from there to an end: ``skillset.skill``, and the precondition.
+        chosen: what the tick that leads there took a value for that nobody knows, in words.
         situations: how many were looked at.
         assuming: where it does not survive, the states, ``skillset.resource STATE``, without which it would, of those that come later;
             with them it ends safely all the same. Empty: there are no such states.
@@ -85,6 +86,7 @@ class Fate:
     situations: int
     assuming: tuple[str, ...] = ()
     refused: tuple[tuple[str, str], ...] = ()
+    chosen: tuple[str, ...] = ()
 
     @property
     def answered(self) -> bool:
@@ -147,7 +149,9 @@ def fate_of(
     run, states = ((), {}) if lost is None else (graph.run_to(lost), steps.resources(lost.place))
     assuming = tuple(later) if safe and lost is not None and lost_before is None else ()
     refused = () if lost is None else _refused(lost, following, lambda here: steps.outcome(here.place) is not None)
-    return Fate(tuple(faults), outcomes, lost is None, safe, run, states, len(graph.ways.found), assuming, refused)
+    before = None if lost is None else graph.ways.before(lost)
+    chosen = () if lost is None or before is None else steps.chosen(before.place, lost.place)
+    return Fate(tuple(faults), outcomes, lost is None, safe, run, states, len(graph.ways.found), assuming, refused, chosen)
 
 
 def _refused(

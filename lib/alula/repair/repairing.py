@@ -309,10 +309,11 @@ class Search:
     def _what_is_missing(self, branch: Branch, fate: Fate) -> str:
         """Return why the mission can't be accomplished any more.
 
-        That is what skills of a branch need of the functional layer, and is not so, else what is refused then.
+        That is what skills of a branch need of the functional layer, and is not so, else what is refused then, or what nobody knows.
         """
         missing = self._missing_in((branch.use, branch.tree), fate)
-        return "".join(f"; {one}" for one in missing or [f"{skill} is refused then ({why})" for skill, why in fate.refused])
+        refused = [f"{skill} is refused then ({why})" for skill, why in fate.refused]
+        return "".join(f"; {one}" for one in missing or refused or _told_chosen(fate))
 
     def _missing_in(self, parts: Iterable[Element | None], fate: Fate) -> list[str]:
         asked = [one for part in parts if part is not None for one in self._patterns.asked_in(part)]
@@ -326,7 +327,11 @@ class Search:
         except OutOfTimeError:
             return []
         missing = self._missing_in(self._subject.files.trees.values(), calm)
-        return [] if calm.survives else ["; ".join(["the mission may not be accomplished though nothing fails", *missing])]
+        return (
+            []
+            if calm.survives
+            else ["; ".join(["the mission may not be accomplished though nothing fails", *(missing or _told_chosen(calm))])]
+        )
 
     def _why_impossible(self, text: str, failing: Failing) -> list[str]:
         """Return why no tree can have done what a skill is for that the mission needs; empty where one might."""
@@ -422,6 +427,10 @@ def _told(fate: Fate | None) -> str:
     if fate is None:
         return "nothing answers"
     return "may not be accomplished" + ("" if fate.safe else ", and may end in no safe state")
+
+
+def _told_chosen(fate: Fate) -> list[str]:
+    return [f"it may be that {' and '.join(fate.chosen)}"] if fate.chosen else []
 
 
 def _above(failing: Failing) -> Iterator[Node]:

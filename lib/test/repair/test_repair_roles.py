@@ -237,6 +237,15 @@ def test_a_fault_refuses_requests_no_more_often_than_it_ends_skills(tmp_path: Pa
     assert found == [[True, False]] * 2
 
 
+def test_what_nobody_knows_and_the_mission_hangs_on_is_named(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    """Where an input may be 0, the drive may have no chance at all, and no branch for a fault mends that."""
+    drive = '<base.drive name="drive" to="{goal}"/>'
+    text = ERRAND.replace(drive, f'<RetryUntilSuccessful name="try" num_attempts="{{tries}}">{drive}</RetryUntilSuccessful>')
+    _, answer = repaired(text.replace("PORTS", '<input_port name="tries"/>'), "person", tmp_path, monkeypatch)
+    assert answer.repair is None
+    assert answer.reasons[0].startswith("the mission may not be accomplished though nothing fails; it may be that `tries` is not > 0")
+
+
 MENDED = """
 <Sequence name="mend">
   <ScriptCondition name="not too often" code="mended &lt; MOST"/>
