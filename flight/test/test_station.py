@@ -48,7 +48,7 @@ from alula_flight.station.parts import Part, Places, bridge_file, environment_of
 from alula_flight.station.state import PartState, StationState, living, start_of
 from alula_flight.station.station import Station
 from alula_testing.waits import until
-from alula_testing.wall_clock import WallClock, needs_faketime
+from alula_testing.wall_clock import WallClock
 
 ROOT = Path(__file__).resolve().parents[2]
 
@@ -312,7 +312,6 @@ def test_a_process_is_known_by_its_start_as_ids_are_used_again(tmp_path):
         assert StationState.load(tmp_path).parts == {}
 
 
-@needs_faketime
 @pytest.mark.parametrize("by_s", [3600, -3600])
 def test_a_process_is_known_to_another_one_whose_wall_clock_was_set_since(tmp_path, by_s):
     clock = WallClock(tmp_path)

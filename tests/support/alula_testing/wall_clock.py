@@ -1,33 +1,37 @@
-"""A process whose wall clock the test sets, by Debian's ``libfaketime``; its monotonic clock goes on, as when NTP sets a computer's."""
+"""Processes whose wall clock the test sets (``wall_clock.c``); their monotonic clock goes on, as when NTP sets a computer's."""
 
 from __future__ import annotations
 
 import os
+import subprocess
+import sys
 from pathlib import Path
 
-import pytest
-
-LIBRARY = next(Path("/usr/lib").glob("*/faketime/libfaketimeMT.so.1"), None)
-needs_faketime = pytest.mark.skipif(LIBRARY is None, reason="the clock of a process can't be set here: apt install faketime")
+SOURCE = Path(__file__).with_suffix(".c")
 
 
 class WallClock:
-    """The wall clock of processes that get ``environment``."""
+    """The wall clock of processes that get ``environment``; ``folder`` takes what they share."""
 
     def __init__(self, folder: Path) -> None:
-        self._file = folder / "faketime"
+        """Build the library that such processes load."""
+        self._library, self._file = folder / "wall_clock.so", folder / "wall_clock"
+        subprocess.run(["cc", "-O2", "-shared", "-fPIC", "-o", str(self._library), str(SOURCE), "-ldl"], check=True)
         self.set_s = 0
-        self.step(0)
+        self._file.write_bytes(bytes(8))
+
+    @property
+    def variables(self) -> dict[str, str]:
+        """Return the variables of the environment that a process needs."""
+        return {"LD_PRELOAD": str(self._library), "WALL_CLOCK_SHIFT": str(self._file)}
 
     @property
     def environment(self) -> dict[str, str]:
         """Return what a process needs, the environment of this one included."""
-        own = {"LD_PRELOAD": str(LIBRARY), "FAKETIME_TIMESTAMP_FILE": str(self._file), "FAKETIME_NO_CACHE": "1"}
-        return {**os.environ, **own, "FAKETIME_DONT_FAKE_MONOTONIC": "1"}
+        return {**os.environ, **self.variables}
 
     def step(self, by_s: int) -> None:
         """Set the clock forward, or back."""
         self.set_s += by_s
-        new = self._file.with_suffix(".new")
-        new.write_text(f"{self.set_s:+d}\n", encoding="ascii")
-        new.replace(self._file)
+        with self._file.open("r+b") as file:
+            file.write(self.set_s.to_bytes(8, sys.byteorder, signed=True))

@@ -4,8 +4,6 @@ An interruption is never done by the hooks: the managers end it after ``~interru
 """
 
 import sys
-import threading
-import time
 
 import navigation_interfaces.msg
 from navigation_managers.model import SKILLSET
@@ -13,9 +11,6 @@ from navigation_managers.model import SKILLSET
 from alula.runtime.hooks import SkillHooks
 from alula_testing.navigation import with_silence
 from skillset_ros1 import run_skillset
-
-# libfaketime 0.9.10 refuses to sleep until a moment of the monotonic clock, which is how Python sleeps.
-time.sleep = lambda seconds: threading.Event().wait(seconds)
 
 MODEL = with_silence(SKILLSET, "SDK_authority", 2.0)
 

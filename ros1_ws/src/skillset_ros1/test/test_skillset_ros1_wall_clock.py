@@ -18,7 +18,7 @@ from alula.common.steady_clock import STEADY_CLOCK
 from alula.model.execution_state import ExecutionState
 from alula.runtime.codecs import stamp_ns_of
 from alula_testing.waits import until
-from alula_testing.wall_clock import WallClock, needs_faketime
+from alula_testing.wall_clock import WallClock
 from skillset_ros1 import SkillsetClient
 
 HOUR_S = 3600
@@ -90,7 +90,6 @@ def stepped(ros_master, tmp_path):
         bench.close()
 
 
-@needs_faketime
 @pytest.mark.parametrize("by_s", STEPS.values(), ids=STEPS)
 def test_a_wall_clock_that_is_set_by_an_hour_ends_nothing_and_delays_nothing(stepped, by_s):
     handle = stepped.take_off()
@@ -118,7 +117,6 @@ def test_a_wall_clock_that_is_set_by_an_hour_ends_nothing_and_delays_nothing(ste
     assert stepped.client.reasons["SDK_authority"].startswith("not heard of for ")
 
 
-@needs_faketime
 @pytest.mark.parametrize("by_s", STEPS.values(), ids=STEPS)
 def test_a_silence_that_has_begun_is_noticed_when_the_clock_is_set_meanwhile(stepped, by_s):
     handle = stepped.take_off()

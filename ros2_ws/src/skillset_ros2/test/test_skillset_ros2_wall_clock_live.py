@@ -21,7 +21,7 @@ from skillset_ros2_rig import READY_S, until  # noqa: E402
 from alula.common.steady_clock import STEADY_CLOCK  # noqa: E402
 from alula.model.execution_state import ExecutionState  # noqa: E402
 from alula.runtime.codecs import stamp_ns_of  # noqa: E402
-from alula_testing.wall_clock import WallClock, needs_faketime  # noqa: E402
+from alula_testing.wall_clock import WallClock  # noqa: E402
 from skillset_ros2 import SkillsetClient  # noqa: E402
 from skillset_ros2.names import ALIVE  # noqa: E402
 
@@ -81,7 +81,6 @@ def stepped(spinning, tmp_path):
         bench.close()
 
 
-@needs_faketime
 @pytest.mark.parametrize("by_s", STEPS.values(), ids=STEPS)
 def test_a_wall_clock_that_is_set_by_an_hour_ends_nothing_and_delays_nothing(stepped, by_s):
     handle = stepped.take_off()
@@ -110,7 +109,6 @@ def test_a_wall_clock_that_is_set_by_an_hour_ends_nothing_and_delays_nothing(ste
     assert stepped.client.reasons["SDK_authority"].startswith("not heard of for ")
 
 
-@needs_faketime
 @pytest.mark.parametrize("by_s", STEPS.values(), ids=STEPS)
 def test_a_silence_that_has_begun_is_noticed_when_the_clock_is_set_meanwhile(stepped, by_s):
     handle = stepped.take_off()
