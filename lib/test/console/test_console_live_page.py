@@ -309,7 +309,7 @@ def test_the_first_screen_shows_what_matters(browser: Any, make_run: Callable[..
             "in the air": "31.0 s", "waypoints": "0 of 5", "autopilot's mode": "GUIDED",
         }  # fmt: skip
         assert page.text("#active li") == "lidar_depthmapsince 30.5 s"
-        assert page.text("#wrong li") == "zed_depthmap: invariant zed_ok violated since 30.0 s | zed_status is BROKEN since 30.0 s"
+        assert page.text("#wrong li") == "zed_depthmap: invariant zed_ok violated (since 30.0 s) | zed_status is BROKEN (since 30.0 s)"
         assert page.text("#recent li").startswith("30.50 sperception.lidar_depthmap runs")
         hold, stop = (page.run(f"getComputedStyle(document.querySelector('#acts {kind}')).backgroundColor") for kind in (".hold", ".stop"))
         assert hold != stop

@@ -13,6 +13,7 @@ from console_reports import SUMMARY, make_report, make_story_report
 
 from alula.common.record import DATA, MISSION
 from alula.report.page.embedded import REPORT
+from alula.report.page.entries import HEALTH
 from alula.report.page.writing import write_report
 
 TIMES = "[...document.querySelectorAll('.chain')].map((one) => [...one.querySelectorAll('button')].map((b) => parseFloat(b.textContent)))"
@@ -26,6 +27,16 @@ def test_a_fallback_that_ended_badly_is_told_with_how_long_it_held(browser: Any,
     assert "43.04 sThe fallback runs: hover; it held for 1.96 s, then the autopilot changed to RTL." in lines
     assert "safe" not in page.text("#lines")
     assert "the fallback ran after 3.04 s; it held for 1.96 s, then the autopilot changed to RTL" in page.text("#answers td")
+    assert page.complaints() == []
+
+
+def test_since_when_something_is_wrong_stands_apart_from_its_causes(browser: Any, tmp_path: Path) -> None:
+    reason = "left image is dark (mean 3): too little light, or a covered lens"
+    finding = (HEALTH, LIFT_OFF_S + 29.0, {"sensor": "zed", "ok": False, "fault": "exposure", "reason": reason})
+    page = Page(browser, make_report(tmp_path, recordings=[finding]))
+    page.wait(DRAWN)
+    page.choose(29.5)
+    assert page.text("#wrong li") == f"zed: {reason} (since 29.0 s)"
     assert page.complaints() == []
 
 

@@ -156,7 +156,7 @@ function nothingTold(run, t) {
 /** Shows all of that. */
 function showState(t) {
   const zero = origin(run);
-  const ago = (since) => (Number.isFinite(since) ? ` since ${seconds(since - zero)}` : "");
+  const ago = (since) => (Number.isFinite(since) ? ` (since ${seconds(since - zero)})` : ""); // apart: a sentence may end with causes
   const active = activeAt(run, t);
   rewrite(byId("active"), active.length ? active : [nothingTold(run, t)], (one) => (one.name ? el("li", { title: one.inputs }, el("b", {}, one.name), el("span", {}, `since ${seconds(one.since - zero)}`)) : el("li", { class: "hint" }, one)));
   rewrite(byId("readings"), readings(run, t), ({ label, text, tone }) => el("div", { class: tone ?? "" }, el("dt", {}, label), el("dd", {}, text)));
