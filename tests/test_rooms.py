@@ -6,6 +6,7 @@ import ast
 import contextlib
 import re
 from collections.abc import Iterator
+from graphlib import TopologicalSorter
 from pathlib import Path
 
 import pytest
@@ -180,6 +181,28 @@ def test_the_table_of_rooms_points_down() -> None:
     """Each room may import only such as stand before it: so there is no circle among rooms."""
     names = list(ROOMS)
     assert not {(name, other) for at, name in enumerate(names) for other in ROOMS[name].split() if other not in names[:at]}
+
+
+def imports_of_modules() -> dict[str, set[str]]:
+    """Return what each module of the library imports of it, anywhere in its text: for annotations, and in functions, too."""
+    paths = {
+        ".".join(path.relative_to(LIBRARY.parent).with_suffix("").parts).removesuffix(".__init__"): path for path in modules("lib/alula")
+    }
+    found: dict[str, set[str]] = {}
+    for name, path in paths.items():
+        nodes = list(ast.walk(ast.parse(path.read_text(encoding="utf-8"))))
+        plain = {alias.name for node in nodes if isinstance(node, ast.Import) for alias in node.names}
+        froms = [(node.module, alias.name) for node in nodes if isinstance(node, ast.ImportFrom) and node.module for alias in node.names]
+        named = plain | {f"{module}.{one}" if f"{module}.{one}" in paths else module for module, one in froms}
+        found[name] = named & set(paths)
+    return found
+
+
+def test_no_circle_among_the_modules_of_the_library() -> None:
+    """An import in a function, or for annotations only, hides none: so what stands below can be read without what stands on it."""
+    imports = imports_of_modules()
+    assert {"alula.trees.node_type", "alula.trees.attributes"} <= imports["alula.trees.node"]
+    TopologicalSorter(imports).prepare()  # raises CycleError with the circle
 
 
 def test_the_engine_needs_no_parser() -> None:

@@ -10,7 +10,7 @@ from pathlib import Path
 from alula.missions.part import NO_PART, MissionPart
 from alula.model.model import Skillset
 from alula.prove.mission.own import has_children
-from alula.trees.palette import name_in_files
+from alula.trees.node import name_in_files
 from mission_mutations import classes, models, trees
 
 KINDS = (

@@ -29,10 +29,11 @@ from alula.prove.mission.state import Event
 from alula.prove.mission.system import System
 from alula.prove.mission.ticking import TICK, Outcome
 from alula.trees.access import scripts_of, written_entries
+from alula.trees.attributes import type_name
 from alula.trees.document import Attribute, Element
 from alula.trees.node import Node
-from alula.trees.palette import Direction
-from alula.trees.reading import read_files, type_name
+from alula.trees.ports import Direction
+from alula.trees.reading import read_files
 from alula.trees.script import statements_of
 from alula.trees.script.syntax import Assignment, Literal, Name, walk
 

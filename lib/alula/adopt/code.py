@@ -6,7 +6,8 @@ import re
 from collections.abc import Iterator
 
 from alula.adopt.vocabulary import StandIn, Vocabulary
-from alula.trees.palette import Category, Direction
+from alula.trees.node_type import Category
+from alula.trees.ports import Direction
 
 TRIES = re.compile(r"(?i)fallback|selector|recover|try|alternative")
 """In the name of a node with children: the next one's turn comes when one has failed."""

@@ -8,10 +8,11 @@ from dataclasses import replace
 from alula.adopt.vocabulary import HOLDS, SkillOf, Vocabulary
 from alula.missions.mission_file import READY, STOP_HERE
 from alula.missions.skill_types import STATE_PORT
+from alula.trees.attributes import AUTOREMAP, is_port, type_name
 from alula.trees.document import Attribute, Element
 from alula.trees.node import pointer
-from alula.trees.palette import CATEGORIES, Category, Direction, NodeType
-from alula.trees.reading import AUTOREMAP, is_port, type_name
+from alula.trees.node_type import CATEGORIES, Category, NodeType
+from alula.trees.ports import Direction
 
 TREES = {READY: f"{READY}_tree", STOP_HERE: f"{STOP_HERE}_tree"}
 """IDs of trees that mean something in a mission, and what becomes of them."""

@@ -10,10 +10,13 @@ from alula.adopt.vocabulary import SkillOf, Vocabulary
 from alula.check.scripts import Scripts
 from alula.missions.skill_types import PORT_TYPES, STATE_PORT
 from alula.trees.access import NUMBER, TEXT, Access, Accesses, Key
+from alula.trees.attributes import type_name
 from alula.trees.blackboard import Blackboard
 from alula.trees.node import Shared, Wiring, pointer
-from alula.trees.palette import Category, Direction, NodeType, Palette, Port, node_type
-from alula.trees.reading import TreeFiles, type_name
+from alula.trees.node_type import Category, NodeType, node_type
+from alula.trees.palette import Palette
+from alula.trees.ports import Direction, Port
+from alula.trees.reading import TreeFiles
 from alula.trees.values import ANY, DOUBLE, NUMBERS, STRING, TYPES, PortType, literal
 from alula.trees.wiring import wire
 

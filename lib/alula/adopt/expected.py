@@ -5,8 +5,8 @@ from __future__ import annotations
 from collections.abc import Iterable
 
 from alula.adopt.vocabulary import FAILS, HOLDS, Vocabulary
+from alula.trees.attributes import type_name
 from alula.trees.document import Element
-from alula.trees.reading import type_name
 
 FALLBACKS = frozenset({"Fallback", "ReactiveFallback", "AsyncFallback"})
 INVERTER = "Inverter"

@@ -6,11 +6,14 @@ from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import replace
 
 from alula.trees import nav2
+from alula.trees.attributes import AUTOREMAP, is_port, type_name
 from alula.trees.document import Element
 from alula.trees.guessing import guessed_types
 from alula.trees.node import pointer
-from alula.trees.palette import Category, Direction, NodeType, Palette, Port
-from alula.trees.reading import AUTOREMAP, TreeFiles, is_port, type_name
+from alula.trees.node_type import Category, NodeType
+from alula.trees.palette import Palette
+from alula.trees.ports import Direction, Port
+from alula.trees.reading import TreeFiles
 from alula.trees.standard import standard_palette
 from alula.trees.values import ANY, DOUBLE, INT
 
@@ -52,7 +55,7 @@ def known_palette(mains: Sequence[TreeFiles]) -> Palette:
     declared = {name: one for files in mains for name, one in files.models.items()}
     palette = standard_palette()
     for one in nav2.palette():
-        if one.make is not None and one.children != (0, 0) and declared.get(one.name, one).category is one.category:
+        if one.is_tickable and one.children != (0, 0) and declared.get(one.name, one).category is one.category:
             palette.add(one)
     return palette
 

@@ -15,7 +15,9 @@ from alula.adopt.naming import Names, snake
 from alula.adopt.vocabulary import Vocabulary
 from alula.trees.document import Element, quoted, read_document
 from alula.trees.format3 import DECLARED, FORMAT
-from alula.trees.palette import Category, NodeType, Palette, Port
+from alula.trees.node_type import Category, NodeType
+from alula.trees.palette import Palette
+from alula.trees.ports import Port
 from alula.trees.reading import LIBRARY, TreeFiles
 
 SHARED = "shared"

@@ -18,7 +18,7 @@ from alula.adopt.vocabulary import Vocabulary
 from alula.check.checking import ENDLESS
 from alula.generate.scaffold.skeleton import files_of
 from alula.trees.errors import FileError, Problem, TreeError
-from alula.trees.palette import Category
+from alula.trees.node_type import Category
 from alula.trees.reading import TreeFiles
 from alula.trees.structure import verify
 

@@ -8,9 +8,10 @@ from dataclasses import dataclass, field
 from alula.adopt.foreign import nodes_of
 from alula.adopt.naming import Names
 from alula.model.ros_types import camel
+from alula.trees.attributes import is_port, type_name
 from alula.trees.document import Element
-from alula.trees.palette import Category, Direction, NodeType
-from alula.trees.reading import is_port, type_name
+from alula.trees.node_type import Category, NodeType
+from alula.trees.ports import Direction
 
 HOLDS, FAILS = "HOLDS", "FAILS"
 """The states of a resource that a condition has become."""

@@ -28,7 +28,7 @@ from alula.model.span import Span
 from alula.trees.document import read_source
 from alula.trees.errors import FileError
 from alula.trees.library import ENDINGS, Library
-from alula.trees.palette import name_in_files
+from alula.trees.node import name_in_files
 from alula.trees.source import TreeSource
 
 if TYPE_CHECKING:

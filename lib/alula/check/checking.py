@@ -17,13 +17,15 @@ from alula.check.unread import never_read
 from alula.check.whole import Rule, Whole
 from alula.trees import nav2
 from alula.trees.access import Accesses, scripts_of
+from alula.trees.attributes import type_name
 from alula.trees.blackboard import Blackboard
 from alula.trees.errors import Problem
 from alula.trees.library import Library
 from alula.trees.node import Shared
-from alula.trees.palette import Direction, Palette
+from alula.trees.palette import Palette
+from alula.trees.ports import Direction
 from alula.trees.reach import Reach
-from alula.trees.reading import TreeFiles, type_name
+from alula.trees.reading import TreeFiles
 from alula.trees.structure import verify
 from alula.trees.wiring import wire
 
@@ -130,7 +132,7 @@ def _scripts(whole: Whole) -> Iterator[Problem]:
 def _missing(whole: Whole) -> Iterator[Problem]:
     """Yield inputs that a file does not give and that have no default; of nodes that only a model tells of, nobody knows."""
     for wiring in whole.root.walk():
-        for port in wiring.type.ports.values() if wiring.type.make else ():
+        for port in wiring.type.ports.values() if wiring.type.is_tickable else ():
             if port.direction is not Direction.OUTPUT and not port.optional and wiring.ports.get(port.name) is None and not port.required:
                 message = f"'{wiring.type.name}' has no input '{port.name}', which has no default"
                 yield of_element("ALU604", wiring.element, message, f'add {port.name}="..."', warning=whole.foreign)

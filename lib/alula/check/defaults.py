@@ -7,7 +7,8 @@ from collections.abc import Iterator
 
 from alula.trees.errors import Problem
 from alula.trees.node import pointer
-from alula.trees.palette import NodeType, Port
+from alula.trees.node_type import NodeType
+from alula.trees.ports import Port
 from alula.trees.reading import TreeFiles
 from alula.trees.values import ANY, DOUBLE
 

@@ -8,9 +8,9 @@ from dataclasses import replace
 from alula.check.problems import of_access
 from alula.common.suggestions import nearest
 from alula.trees.access import NUMBER, TEXT, UNKNOWN, Access, Accesses, Key
+from alula.trees.attributes import PRECONDITIONS
 from alula.trees.errors import Problem
 from alula.trees.node import Wiring, pointer
-from alula.trees.reading import PRECONDITIONS
 from alula.trees.status import SUCCESS
 from alula.trees.values import NUMBERS, STRING, TYPES
 

@@ -28,7 +28,8 @@ from alula.trees.errors import FileError, TreeError
 from alula.trees.groot.tree_xml import model_xml
 from alula.trees.guessing import guessed_types
 from alula.trees.library import Library
-from alula.trees.palette import Category, NodeType, Palette
+from alula.trees.node_type import Category, NodeType
+from alula.trees.palette import Palette
 from alula.trees.standard import standard_palette
 
 COMMAND = "alula palette"

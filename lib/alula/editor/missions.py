@@ -21,8 +21,9 @@ from alula.missions.part import NO_PART, MissionPart
 from alula.missions.skill_types import SUCCESS_PORT
 from alula.missions.world import FUNCTIONS
 from alula.model.model import ResultKind, Skill, Skillset
-from alula.trees.palette import Category, NodeType, Palette
-from alula.trees.reading import POSTCONDITIONS, PRECONDITIONS
+from alula.trees.attributes import POSTCONDITIONS, PRECONDITIONS
+from alula.trees.node_type import Category, NodeType
+from alula.trees.palette import Palette
 
 SUFFIX = ".xml"
 UNKNOWN_NODE = "ALU601"

@@ -14,13 +14,14 @@ from pathlib import Path
 from alula.editor.names import RenameError
 from alula.missions.mission_file import READY, STOP_HERE
 from alula.model.span import Span
+from alula.trees.attributes import AUTOREMAP, POSTCONDITIONS, PRECONDITIONS, is_port, type_name
 from alula.trees.document import Attribute, Document, Element, parse_document, read_source
 from alula.trees.errors import FileError, Place
 from alula.trees.library import MANIFEST, MARKS, MODELS, Library, models_of
 from alula.trees.library import ignore as ignore_problem
 from alula.trees.node import pointer
-from alula.trees.palette import Category, NodeType
-from alula.trees.reading import AUTOREMAP, FORBIDDEN, POSTCONDITIONS, PRECONDITIONS, is_port, type_name
+from alula.trees.node_type import Category, NodeType
+from alula.trees.reading import FORBIDDEN
 from alula.trees.script import ScriptError
 from alula.trees.script.lexer import Kind, tokenize
 

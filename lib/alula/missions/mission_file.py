@@ -31,7 +31,9 @@ from alula.trees.blackboard import Blackboard as TreeBoard
 from alula.trees.errors import Report, TreeError, refuse
 from alula.trees.factory import build_tree
 from alula.trees.node import Node, Shared, Wiring
-from alula.trees.palette import Category, Direction, NodeType, Palette, Port, node_type
+from alula.trees.node_type import Category, NodeType, node_type
+from alula.trees.palette import Palette
+from alula.trees.ports import Direction, Port
 from alula.trees.reading import TreeFiles
 from alula.trees.source import TreeSource, source_of
 from alula.trees.structure import verify

@@ -9,7 +9,8 @@ from alula.missions.blackboard import Blackboard
 from alula.trees.ends import ENDS, FAILS, SUCCEEDS, Ends, Given, whole_number
 from alula.trees.errors import TickError
 from alula.trees.node import Action, Condition, Count, Decorator, Script, SyncAction, Wiring
-from alula.trees.palette import Palette, input_port, script_port
+from alula.trees.palette import Palette
+from alula.trees.ports import input_port, script_port
 from alula.trees.status import FAILURE, IDLE, RUNNING, SKIPPED, SUCCESS, Answer
 from alula.trees.ticking import AGAIN, Order, Ticking
 from alula.trees.values import DOUBLE, INT, STRING
@@ -241,5 +242,6 @@ def mission_nodes(memory: Blackboard) -> Palette:
     palette = Palette()
     for node in (WaitFor, Stays, Awaits, Until, RetryAfter, Needs):
         palette.register(node)
-    palette.register(type("NoteReason", (NoteReason,), {"memory": memory, "__doc__": NoteReason.__doc__}))
+    noting: type[NoteReason] = type("NoteReason", (NoteReason,), {"memory": memory, "__doc__": NoteReason.__doc__})
+    palette.register(noting)
     return palette

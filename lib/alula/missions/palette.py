@@ -11,10 +11,13 @@ from alula.missions.pending import PendingInterrupts
 from alula.missions.skills import Crew, robot_nodes
 from alula.model.model import Skillset
 from alula.trees import nav2
+from alula.trees.attributes import type_name
 from alula.trees.document import Element
 from alula.trees.errors import Problem
-from alula.trees.palette import Category, NodeType, Palette, name_in_files
-from alula.trees.reading import TreeFiles, type_name
+from alula.trees.node import name_in_files
+from alula.trees.node_type import Category, NodeType
+from alula.trees.palette import Palette
+from alula.trees.reading import TreeFiles
 from alula.trees.standard import standard_palette
 
 
@@ -35,7 +38,7 @@ def palette_of(
     types = {**given, **{one.name: one for one in files.declared()}}
     own = {name_in_files(node) for node in part.nodes}
     known = [one for one in nav2.palette_for(files.trees.values()) if one.name not in own and not _is_another(types.get(one.name), one)]
-    types.update({one.name: nav2.told_of(given[one.name], one) if one.name in given and one.make is None else one for one in known})
+    types.update({one.name: nav2.told_of(given[one.name], one) if one.name in given and not one.is_tickable else one for one in known})
     types.update({one.name: one for one in mission_nodes(_memory(crew)) if not _is_another(types.get(one.name), one)})
     types.update({one.name: one for one in standard_palette()})
     return _with_robot(Palette(types.values()), skillsets, part, crew)
@@ -78,7 +81,7 @@ def no_class(files: TreeFiles, palette: Palette) -> Problem | None:
     if not found:
         return None
     first, *others = found
-    library = {one.name for one in (*nav2.palette(), *mission_nodes(_memory(None))) if one.make is not None}
+    library = {one.name for one in (*nav2.palette(), *mission_nodes(_memory(None))) if one.is_tickable}
     shadowed = [name for name in found if name in library]
     which = f"'{first}'" + (f" and {len(others)} more" if others else "")
     where = "by Nav2" if first not in files.models else "in the file"

@@ -6,7 +6,8 @@ from collections.abc import Callable
 
 from alula.model.model import Parameter, Resource, ResultKind, Skill
 from alula.model.units import told_unit
-from alula.trees.palette import Category, Direction, NodeType, Port, node_type
+from alula.trees.node_type import Category, NodeType, node_type
+from alula.trees.ports import Direction, Port
 from alula.trees.values import ANY, BOOL, DOUBLE, INT, SIZED, STRING, UINT, PortType, shown
 
 SUCCESS_PORT = "success"

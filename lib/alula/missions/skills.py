@@ -13,7 +13,7 @@ from alula.missions.skillset import Client
 from alula.model.execution_state import ExecutionState
 from alula.model.model import Resource, Skill, Skillset
 from alula.trees.ends import ENDS, FAILS, Ends, Given
-from alula.trees.node import Action, Condition, Wiring
+from alula.trees.node import Action, Condition, Wiring, tickable
 from alula.trees.palette import Palette
 from alula.trees.status import FAILURE, IDLE, RUNNING, SUCCESS, Answer
 
@@ -127,8 +127,8 @@ def robot_nodes(skillsets: Sequence[Skillset], crew: Crew | None = None) -> Pale
         # No class for each: isinstance asks every subclass of a base that there is, and a campaign makes missions by the thousand.
         for skill in one.skills:
             known = replace(skill_type(one.name, skill), tells=SkillNode)
-            palette.add(known if crew is None else replace(known, make=partial(SkillNode, model=skill, skillset=one.name, crew=crew)))
+            palette.add(known if crew is None else tickable(known, partial(SkillNode, model=skill, skillset=one.name, crew=crew)))
         for resource in one.resources:
             known = replace(resource_type(one.name, resource), tells=ResourceNode)
-            palette.add(known if crew is None else replace(known, make=partial(ResourceNode, model=resource, skillset=one.name, crew=crew)))
+            palette.add(known if crew is None else tickable(known, partial(ResourceNode, model=resource, skillset=one.name, crew=crew)))
     return palette

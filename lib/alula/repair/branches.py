@@ -10,9 +10,9 @@ from enum import IntEnum
 from textwrap import wrap
 
 from alula.repair.subject import Subject, with_property, without_properties_of
+from alula.trees.attributes import node_name
 from alula.trees.document import Document, Element, quoted
 from alula.trees.errors import Place
-from alula.trees.reading import node_name
 
 WIDTH = 140
 STEP = "  "

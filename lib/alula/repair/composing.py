@@ -12,10 +12,12 @@ from alula.repair.branches import node
 from alula.repair.courses import Course, Courses, Here, Wanted
 from alula.repair.naming import Vocabulary, in_short, told_states
 from alula.repair.purposes import Purpose
+from alula.trees.attributes import node_name, type_name
 from alula.trees.document import Element
 from alula.trees.node import pointer
-from alula.trees.palette import Direction, Palette
-from alula.trees.reading import TreeFiles, node_name, type_name
+from alula.trees.palette import Palette
+from alula.trees.ports import Direction
+from alula.trees.reading import TreeFiles
 from alula.trees.values import ANY
 
 WAITING = frozenset({"WaitFor", "Awaits", "Stays"})

@@ -12,8 +12,8 @@ from collections import Counter
 from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass
 
+from alula.trees.attributes import node_name, type_name
 from alula.trees.document import Element
-from alula.trees.reading import node_name, type_name
 
 _WORD = re.compile(r"[A-Za-z]+")
 _TIMES = {1: "one chance", 2: "two chances", 3: "three chances"}

@@ -25,9 +25,9 @@ from alula.repair.purposes import Purpose, Purposes, asked_of_others
 from alula.repair.remedies import AGAIN_S, Remedies
 from alula.repair.standing_in import StandIns
 from alula.repair.subject import Subject
+from alula.trees.attributes import node_name, type_name
 from alula.trees.document import Element
 from alula.trees.node import Node, pointer
-from alula.trees.reading import node_name, type_name
 
 MOST_NODES = 15
 RETRIES = frozenset({"RetryAfter", "RetryUntilSuccessful"})

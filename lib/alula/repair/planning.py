@@ -32,9 +32,9 @@ from alula.repair.naming import another, in_short, plain, told_state
 from alula.repair.purposes import Purpose, Purposes, asked_of_others, broken_by
 from alula.repair.repairing import Question, Search, Tell, condition_of
 from alula.repair.subject import Subject, with_property
+from alula.trees.attributes import type_name
 from alula.trees.document import Element
 from alula.trees.node import pointer
-from alula.trees.reading import type_name
 
 MOST_COURSES = 12
 MOST_NODES = 15

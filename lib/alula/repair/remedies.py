@@ -14,9 +14,9 @@ from alula.repair.failing import Failing
 from alula.repair.naming import another, chances, plain, told_state
 from alula.repair.purposes import Purpose, Purposes, asked_of_others
 from alula.repair.subject import Subject
+from alula.trees.attributes import node_name, type_name
 from alula.trees.document import Element
 from alula.trees.node import Node, pointer
-from alula.trees.reading import node_name, type_name
 
 AGAIN_S = "1"
 """How long after a failure a node gets its other chance, seconds."""

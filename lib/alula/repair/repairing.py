@@ -33,9 +33,9 @@ from alula.repair.game import played
 from alula.repair.judging import Judge, Judgement, run_of
 from alula.repair.patterns import MOST_NODES, Patterns
 from alula.repair.subject import Subject, with_property, without_properties_of
+from alula.trees.attributes import node_name, type_name
 from alula.trees.document import Element
 from alula.trees.node import Node
-from alula.trees.reading import node_name, type_name
 
 Tell = Callable[[str], None]
 TOGETHER = "Parallel"

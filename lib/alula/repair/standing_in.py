@@ -15,9 +15,9 @@ from alula.repair.failing import Failing
 from alula.repair.naming import Renaming, another, assigned, told_state
 from alula.repair.purposes import Purpose, Purposes, asked_of_others, broken_by, shows_done
 from alula.repair.subject import Subject, texts_of
+from alula.trees.attributes import is_port, node_name, type_name
 from alula.trees.document import Element
 from alula.trees.node import Node
-from alula.trees.reading import is_port, node_name, type_name
 
 
 class StandIns:

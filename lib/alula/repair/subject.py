@@ -31,8 +31,9 @@ from alula.records.causes.fault_file import effects_of
 from alula.records.models import members
 from alula.repair.errors import RepairError
 from alula.repair.naming import Vocabulary
+from alula.trees.attributes import node_name
 from alula.trees.document import Document, Element, parse_document, read_source
-from alula.trees.reading import TreeFiles, node_name
+from alula.trees.reading import TreeFiles
 from alula.trees.source import TreeSource
 
 AtRest = Sequence[tuple[str, str]]

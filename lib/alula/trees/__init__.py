@@ -22,7 +22,7 @@ from alula.common.public import lazy_names
 if TYPE_CHECKING:
     from alula.trees.errors import FileError, TickError, TreeError
     from alula.trees.node import Action, Condition, Control, Decorator, Leaf, Node, Script, SyncAction, register
-    from alula.trees.palette import Port, inout_port, input_port, output_port, script_port
+    from alula.trees.ports import Port, inout_port, input_port, output_port, script_port
     from alula.trees.status import FAILURE, IDLE, RUNNING, SKIPPED, SUCCESS, Answer, Status
     from alula.trees.ticking import AGAIN, Begin, Order, Ticking
     from alula.trees.values import ANY, BOOL, DOUBLE, INT, STRING, UINT, PortType, list_of
@@ -69,7 +69,7 @@ __all__ = [
 _DEFINED_IN = {
     "alula.trees.errors": ("FileError", "TickError", "TreeError"),
     "alula.trees.node": ("Action", "Condition", "Control", "Decorator", "Leaf", "Node", "Script", "SyncAction", "register"),
-    "alula.trees.palette": ("Port", "inout_port", "input_port", "output_port", "script_port"),
+    "alula.trees.ports": ("Port", "inout_port", "input_port", "output_port", "script_port"),
     "alula.trees.status": ("FAILURE", "IDLE", "RUNNING", "SKIPPED", "SUCCESS", "Answer", "Status"),
     "alula.trees.ticking": ("AGAIN", "Begin", "Order", "Ticking"),
     "alula.trees.values": ("ANY", "BOOL", "DOUBLE", "INT", "STRING", "UINT", "PortType", "list_of"),

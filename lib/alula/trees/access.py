@@ -9,11 +9,12 @@ from collections.abc import Callable, Collection, Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
 from typing import TypeAlias
 
+from alula.trees.attributes import POSTCONDITIONS, PRECONDITIONS
 from alula.trees.blackboard import Blackboard
 from alula.trees.document import Attribute, Element
 from alula.trees.node import Node, Wiring, pointer
-from alula.trees.palette import Direction, NodeType, Port
-from alula.trees.reading import POSTCONDITIONS, PRECONDITIONS
+from alula.trees.node_type import NodeType
+from alula.trees.ports import Direction, Port
 from alula.trees.script.syntax import Assignment, Call, Chain, Comparison, Conditional, Literal, Name, Prefix, children, walk
 from alula.trees.script.syntax import Node as Part
 from alula.trees.values import ANY
@@ -163,7 +164,7 @@ def _read_by_ports(wiring: Wiring) -> Iterator[Access]:
         key = pointer(attribute.value, port.name)
         if key is not None and port.direction is not Direction.OUTPUT:
             # Of a port that is read and written, only a class is known to need what it reads.
-            needed = not port.optional and (port.direction is Direction.INPUT or wiring.type.make is not None)
+            needed = not port.optional and (port.direction is Direction.INPUT or wiring.type.is_tickable)
             unchecked = wiring.type.name if port.unchecked else ""
             yield Access(wiring.blackboard.where(key), key, False, attribute, None, _type_name(port), port.unit, unchecked, needed)
 

@@ -9,21 +9,24 @@ from __future__ import annotations
 import json
 import random
 import re
-from collections.abc import Callable, Collection, Iterator, Mapping, Sequence
+from collections.abc import Collection, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from pathlib import Path
 
 from alula.common.errors import AlulaError
 from alula.common.json_files import read_object
+from alula.trees.attributes import is_port, node_name, type_name
 from alula.trees.blackboard import Blackboard, Clock
 from alula.trees.document import Attribute, Element
 from alula.trees.enums import enums_of
 from alula.trees.errors import TickError, did_you_mean
 from alula.trees.factory import build_tree
 from alula.trees.guessing import category_of
-from alula.trees.node import Action, Control, Node, Wiring
-from alula.trees.palette import CHILDREN, Category, Direction, NodeType, Palette, Port, node_type
-from alula.trees.reading import TreeFiles, is_port, node_name, type_name
+from alula.trees.node import Action, Control, Maker, Node, TickableType, Wiring, tickable
+from alula.trees.node_type import CHILDREN, Category, NodeType, node_type
+from alula.trees.palette import Palette
+from alula.trees.ports import Direction, Port
+from alula.trees.reading import TreeFiles
 from alula.trees.standard import standard_palette
 from alula.trees.status import ANSWERS, FAILURE, IDLE, NAMES, RUNNING, SUCCESS, Answer, Status
 from alula.trees.structure import is_slip, missing_trees, verify
@@ -327,12 +330,16 @@ def _scripted(files: TreeFiles, palette: Palette, answers: Answers) -> Palette:
             continue  # a mistake, told when the tree is made
         known = types.get(name) or _guessed(name, uses)
         if known.children != NO_CHILDREN:
-            types[name] = known if known.make is not None and name not in answers.stand_ins else _standing_in(known, uses, answers)
-        elif known.make is None or any(node_name(use) in answers.script for use in uses):
-            types[name] = replace(known, make=_leaf_maker(known.make, answers))
+            types[name] = known if known.is_tickable and name not in answers.stand_ins else _standing_in(known, uses, answers)
+        elif not known.is_tickable or any(node_name(use) in answers.script for use in uses):
+            types[name] = tickable(known, _leaf_maker(known, answers))
     for name in answers.stand_ins:
         if name not in types or types[name].children == NO_CHILDREN:
-            having = [one.name for one in types.values() if one.children != NO_CHILDREN and one.make is UnknownNode]
+            having = [
+                one.name
+                for one in types.values()
+                if one.children != NO_CHILDREN and isinstance(one, TickableType) and one.make is UnknownNode
+            ]
             cure = did_you_mean(name, having) or f"those that nothing ticks are {', '.join(sorted(having)) or 'none'}"
             raise AnswersError(f"stand_ins: the tree has no node with children of the type '{name}'; {cure}")
     return Palette(types.values())
@@ -342,7 +349,7 @@ def _standing_in(known: NodeType, uses: Collection[Element], answers: Answers) -
     """Return a type with children whose nodes are ticked as the answers say, else not at all."""
     said = answers.stand_ins.get(known.name, "")
     if not said:
-        return replace(known, make=UnknownNode)
+        return tickable(known, UnknownNode)
     other = _stand_in(said)
     if other is None:
         raise AnswersError(f"stand_ins: '{said}' can't stand in for {known.name}; write {_stands()}")
@@ -352,24 +359,26 @@ def _standing_in(known: NodeType, uses: Collection[Element], answers: Answers) -
         if count < least or (most is not None and count > most):
             wanted = f"{least}" if least == most else f"{least} to {'any number' if most is None else most}"
             raise AnswersError(f"stand_ins: {said} takes {wanted} children, and {known.name} has {count} at {use.place}")
-    return replace(known, ports={**known.ports, **other.ports}, make=other.make)
+    return replace(tickable(known, other.make), ports={**known.ports, **other.ports})
 
 
-def _stand_in(said: str) -> NodeType | None:
+def _stand_in(said: str) -> TickableType | None:
     """Return the type that a stand-in names, None where it names none with children."""
     if said == PASS_THROUGH:
-        return NodeType(PASS_THROUGH, Category.DECORATOR, {}, "", PassThrough, (1, 1))
+        return TickableType(PASS_THROUGH, Category.DECORATOR, {}, "", (1, 1), make=PassThrough)
     retry = re.fullmatch(rf"{RETRY} ([1-9]\d*|-1)", said)
     other = standard_palette().get("RetryUntilSuccessful" if retry else said)
-    if other is None or other.make is None or other.children == NO_CHILDREN:
+    if not isinstance(other, TickableType) or other.children == NO_CHILDREN:
         return None
     ports = {one.name: replace(one, default=retry[1]) if retry and one.name == "num_attempts" else one for one in other.ports.values()}
     return replace(other, ports=ports)
 
 
-def _leaf_maker(make: Callable[[Wiring], Node] | None, answers: Answers) -> Callable[[Wiring], Node]:
+def _leaf_maker(known: NodeType, answers: Answers) -> Maker:
     def leaf(wiring: Wiring) -> Node:
-        return ScriptedLeaf(wiring, answers) if make is None or wiring.name in answers.script else make(wiring)
+        if isinstance(known, TickableType) and wiring.name not in answers.script:
+            return known.make(wiring)
+        return ScriptedLeaf(wiring, answers)
 
     return leaf
 

@@ -4,11 +4,12 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 
+from alula.trees.attributes import POSTCONDITIONS, PRECONDITIONS, type_name
 from alula.trees.blackboard import Blackboard, Clock
 from alula.trees.errors import FileError, Problem
-from alula.trees.node import After, Before, Node, Script, Shared, Wiring, pointer
+from alula.trees.node import After, Before, Node, Script, Shared, TickableType, Wiring, pointer
 from alula.trees.palette import Palette
-from alula.trees.reading import POSTCONDITIONS, PRECONDITIONS, TreeFiles, type_name
+from alula.trees.reading import TreeFiles
 from alula.trees.structure import verify
 from alula.trees.tree import Subtree, Tree
 from alula.trees.values import ANY, STRING
@@ -68,7 +69,7 @@ def build_tree(
 def _made(wiring: Wiring, subtree: Subtree, subtrees: list[Subtree]) -> Node:
     """Make a node with all below it; the limits on depth and number of nodes were verified."""
     element, known = wiring.element, wiring.type
-    if known.make is None:
+    if not isinstance(known, TickableType):
         raise FileError(Problem(element.place, f"'{type_name(element)}' is known from a model only", "nothing registers it"))
     _declare(wiring)
     node = known.wired(wiring)

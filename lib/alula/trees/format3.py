@@ -9,9 +9,10 @@ import re
 from collections.abc import Callable, Iterator
 from dataclasses import replace
 
+from alula.trees.attributes import AUTOREMAP
 from alula.trees.document import Attribute, Document, Element
 from alula.trees.errors import Problem
-from alula.trees.palette import CATEGORIES
+from alula.trees.node_type import CATEGORIES
 
 FORMAT, OLD = "4", "3"
 DECLARED = "BTCPP_format"
@@ -25,7 +26,7 @@ TAGS = {
 THRESHOLDS = {"success_threshold": "success_count", "failure_threshold": "failure_count", "threshold": "success_count"}
 """Ports of Parallel."""
 CHECKS = ("BlackboardCheckInt", "BlackboardCheckDouble", "BlackboardCheckBool", "BlackboardCheckString")
-SHARED, OLD_AUTOREMAP, AUTOREMAP = "__shared_blackboard", "__autoremap", "_autoremap"
+SHARED, OLD_AUTOREMAP = "__shared_blackboard", "__autoremap"
 NEW_TAGS = frozenset({"Script", "ScriptCondition", "SequenceWithMemory", "Precondition"})
 ENTRY = re.compile(r"[A-Za-z_]\w*")
 BRACES = re.compile(r"\s*\$?\{\s*(.*?)\s*\}\s*")

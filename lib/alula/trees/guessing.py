@@ -6,10 +6,12 @@ import re
 from collections.abc import Collection, Iterable, Mapping, Sequence
 from dataclasses import dataclass
 
+from alula.trees.attributes import is_port, type_name
 from alula.trees.document import Element
 from alula.trees.node import pointer
-from alula.trees.palette import CATEGORIES, Category, Direction, NodeType, Palette, Port, node_type
-from alula.trees.reading import is_port, type_name
+from alula.trees.node_type import CATEGORIES, Category, NodeType, node_type
+from alula.trees.palette import Palette
+from alula.trees.ports import Direction, Port
 from alula.trees.values import ANY, BOOL, DOUBLE, INT, STRING, PortType
 
 ASKING = re.compile(r"(?:Is|Are|Has|Have|Can|Check|Was|Should)(?=[A-Z_\d])")

@@ -11,7 +11,8 @@ from pathlib import Path
 from alula.trees.document import Document, Element, read_document, read_source
 from alula.trees.errors import FileError, Problem, Report
 from alula.trees.format3 import modernised
-from alula.trees.palette import CATEGORIES, Category, Direction, NodeType, Port, node_type
+from alula.trees.node_type import CATEGORIES, Category, NodeType, node_type
+from alula.trees.ports import Direction, Port
 from alula.trees.values import ANY, TYPES
 
 MODELS = "TreeNodesModel"

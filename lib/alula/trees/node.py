@@ -7,19 +7,20 @@ has neither answers that are no state (SKIPPED) nor BehaviorTree.CPP's halts: a 
 from __future__ import annotations
 
 from collections.abc import Callable, Iterator, Mapping, Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, fields
 from functools import cached_property
-from typing import ClassVar, Protocol, TypeAlias, TypeVar
+from typing import ClassVar, Protocol, TypeAlias, TypeGuard, TypeVar
 
 from py_trees.behaviour import Behaviour
 
 from alula.common.public import public
+from alula.trees.attributes import is_port
 from alula.trees.blackboard import Blackboard, Clock, Entry
 from alula.trees.document import Attribute, Element
 from alula.trees.ends import ANY_END, Ends, Given
 from alula.trees.errors import TickError
-from alula.trees.palette import Category, NodeType, Port
-from alula.trees.reading import is_port
+from alula.trees.node_type import CHILDREN, Category, NodeClass, NodeType
+from alula.trees.ports import Port
 from alula.trees.status import FAILURE, IDLE, RUNNING, SKIPPED, SUCCESS, Answer, Status
 from alula.trees.ticking import ANY_TICKING, Order, Ticking, never_ticked
 from alula.trees.values import StandIn
@@ -27,7 +28,6 @@ from alula.trees.values import StandIn
 NANOSECONDS_PER_MS = 1_000_000
 Watcher = Callable[["Node", Status, Status], None]
 """Told of a node, what it was, and what it is now: at each change, in their order."""
-NodeClass: TypeAlias = "type[Node]"
 
 
 @public("alula.trees")
@@ -237,6 +237,14 @@ class Node(Behaviour):  # type: ignore[misc]  # py_trees is seen untyped
         return cls.ticking if cls._does_as(frozenset({"ticking"}), (*_ANSWERS, *_HALTS)) else ANY_TICKING
 
     @classmethod
+    def as_type(cls, name: str = "") -> TickableType:
+        """Return the type of its nodes: what it declares, under a name; as it was registered unless another is given."""
+        doc = (cls.__doc__ or "").strip().partition("\n")[0]
+        ports = {port.name: port for port in cls.ports}
+        children = cls.child_count or CHILDREN[cls.category]
+        return TickableType(name or name_in_files(cls), cls.category, ports, doc, children, make=cls)
+
+    @classmethod
     def _does_as(cls, tells: frozenset[str], names: Sequence[str]) -> bool:
         """Return whether methods are those of the class that tells something."""
         teller = next(one for one in cls.__mro__ if not tells.isdisjoint(vars(one)))
@@ -404,6 +412,45 @@ class Node(Behaviour):  # type: ignore[misc]  # py_trees is seen untyped
     def place(self) -> str:
         """Return what messages call the node: its place in the file and its name."""
         return f"{self.wiring.element.place} ({self.name})"
+
+
+Maker: TypeAlias = "Callable[[Wiring], Node]"
+"""Makes a node of its wiring, as its class does."""
+
+
+@dataclass(frozen=True, kw_only=True)
+class TickableType(NodeType):
+    """A type of node that can be ticked: ``make`` makes a node of its wiring."""
+
+    is_tickable = True
+    make: Maker
+
+    @property
+    def teller(self) -> NodeClass | None:
+        """The class that tells of its nodes: the one that makes them, unless another one does."""
+        return self.tells or (self.make if _is_class(self.make) else None)
+
+    def wired(self, wiring: Wiring) -> Node:
+        """Make a node, ready to be ticked; raises FileError."""
+        node = self.make(wiring)
+        node.setup()
+        return node
+
+
+def tickable(known: NodeType, make: Maker) -> TickableType:
+    """Return a type with what makes its nodes, else as it is."""
+    described = {one.name: getattr(known, one.name) for one in fields(NodeType)}
+    return TickableType(**described, make=make)
+
+
+def _is_class(make: object) -> TypeGuard[type[Node]]:
+    return isinstance(make, type)
+
+
+def name_in_files(node: type[Node]) -> str:
+    """Return what files call a class of nodes."""
+    own = vars(node).get("registered_name", "")  # that of a base is the base's
+    return str(own) or node.__name__
 
 
 NodeT = TypeVar("NodeT", bound=Node)

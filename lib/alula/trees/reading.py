@@ -7,35 +7,18 @@ from collections.abc import Collection, Iterable, Iterator
 from dataclasses import dataclass, field
 from pathlib import Path
 
+from alula.trees.attributes import type_name
 from alula.trees.document import Document, Element, parse_document, read_document
 from alula.trees.errors import FileError, Problem, Report, did_you_mean, refuse
 from alula.trees.format3 import FORMAT, modernised
 from alula.trees.library import MODELS, PROJECT, Library, models_of
-from alula.trees.palette import CATEGORIES, Category, NodeType, Palette
+from alula.trees.node_type import Category, NodeType
+from alula.trees.palette import Palette
 
 FORBIDDEN = re.compile(r"""[\x00-\x20\x7f<>&"'/\\:*?|.]""")
 """What the ID of a tree must not have in it since BehaviorTree.CPP 4.8.4."""
-PRECONDITIONS = ("_failureIf", "_successIf", "_skipIf", "_while")
-POSTCONDITIONS = ("_onHalted", "_onFailure", "_onSuccess", "_post")
-AUTOREMAP = "_autoremap"
 LIBRARY = "library"
 """Of <root>: folders and files between semicolons, from the file on, whose trees it may use. BehaviorTree.CPP has no such thing."""
-RESERVED = frozenset({"name", "ID", AUTOREMAP, *PRECONDITIONS, *POSTCONDITIONS})
-
-
-def is_port(attribute: str) -> bool:
-    """Tell whether an attribute of a node is a port: others are its name, conditions, or what an editor has noted (``_uid``)."""
-    return attribute[0].isalpha() and attribute not in RESERVED
-
-
-def type_name(element: Element) -> str:
-    """Return the name of a node's type: the tag, or the ID of ``<Action ID=...>`` and its like."""
-    return element.get("ID") if element.tag in CATEGORIES else element.tag
-
-
-def node_name(element: Element) -> str:
-    """Return the name of a node: that of its type unless it has one of its own."""
-    return element.get("name") or type_name(element)
 
 
 @dataclass

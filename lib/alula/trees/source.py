@@ -8,7 +8,7 @@ from pathlib import Path
 
 from alula.trees.errors import Report, refuse
 from alula.trees.library import Library
-from alula.trees.palette import NodeType
+from alula.trees.node_type import NodeType
 from alula.trees.reading import TreeFiles, read_files, read_text
 
 

@@ -7,12 +7,15 @@ from collections.abc import Collection, Iterable, Iterator, Mapping, Sequence
 from dataclasses import replace
 from pathlib import Path
 
+from alula.trees.attributes import is_port, type_name
 from alula.trees.document import DEEPEST, Attribute, Element
 from alula.trees.errors import Problem, Report, did_you_mean, refuse
 from alula.trees.guessing import guessed_types
 from alula.trees.node import pointer
-from alula.trees.palette import CATEGORIES, Direction, NodeType, Palette
-from alula.trees.reading import TreeFiles, is_port, type_name
+from alula.trees.node_type import CATEGORIES, NodeType
+from alula.trees.palette import Palette
+from alula.trees.ports import Direction
+from alula.trees.reading import TreeFiles
 
 MOST_NODES = 65_535
 """A node's uid has 16 bits in Groot2's protocol."""

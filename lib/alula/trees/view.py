@@ -6,9 +6,9 @@ from collections.abc import Iterator, Mapping
 from dataclasses import dataclass, field
 from pathlib import Path
 
+from alula.trees.attributes import POSTCONDITIONS, PRECONDITIONS
 from alula.trees.node import Node
-from alula.trees.palette import Category
-from alula.trees.reading import POSTCONDITIONS, PRECONDITIONS
+from alula.trees.node_type import Category
 
 CATEGORIES: Mapping[Category, str] = {
     Category.ACTION: "action",

@@ -9,18 +9,20 @@ from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 from typing import Protocol
 
+from alula.trees.attributes import AUTOREMAP, is_port, node_name, type_name
 from alula.trees.blackboard import Blackboard
 from alula.trees.document import Element
 from alula.trees.errors import FileError, Problem, TickError
-from alula.trees.node import Script, Shared, Wiring, pointer
+from alula.trees.node import Script, Shared, TickableType, Wiring, pointer
+from alula.trees.node_type import Category, unknown_type
 from alula.trees.nodes.subtree import SubTree
-from alula.trees.palette import Category, NodeType, Palette, unknown_type
-from alula.trees.reading import AUTOREMAP, TreeFiles, is_port, node_name, type_name
+from alula.trees.palette import Palette
+from alula.trees.reading import TreeFiles
 from alula.trees.script import Program, ScriptError, parse
 from alula.trees.script.scope import Unknown
 from alula.trees.values import literal
 
-SUBTREE = NodeType("SubTree", Category.SUBTREE, {}, "Another tree of the files.", SubTree, (1, 1))
+SUBTREE = TickableType("SubTree", Category.SUBTREE, {}, "Another tree of the files.", (1, 1), make=SubTree)
 
 
 class Surroundings(Protocol):

@@ -13,7 +13,7 @@ from alula.missions.part import NO_PART, MissionPart
 from alula.missions.plan import InputError
 from alula.prove.mission.prover import prove_mission
 from alula.trees.node import SyncAction
-from alula.trees.palette import input_port
+from alula.trees.ports import input_port
 from alula.trees.status import SUCCESS
 from finding_pages.mission_checks import ROBOT
 

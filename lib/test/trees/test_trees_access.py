@@ -17,7 +17,7 @@ from alula.trees.access import (
 from alula.trees.document import Element
 from alula.trees.factory import build_tree
 from alula.trees.node import Shared
-from alula.trees.palette import NodeType
+from alula.trees.node_type import NodeType
 from alula.trees.reading import read_text
 from alula.trees.script import names_in, statements_of
 from alula.trees.standard import standard_palette

@@ -5,7 +5,8 @@ import pytest
 from alula.check.findings import findings_of
 from alula.cli.palette import main
 from alula.trees.guessing import guessed_types
-from alula.trees.palette import Category, Direction
+from alula.trees.node_type import Category
+from alula.trees.ports import Direction
 from alula.trees.reading import read_models, read_text
 from alula.trees.standard import standard_palette
 from alula.trees.values import ANY, BOOL, DOUBLE, INT, STRING

@@ -15,7 +15,7 @@ from alula.trees import nav2
 from alula.trees.answers import WORDS, Answers, StepClock, scripted_tree, ticks
 from alula.trees.errors import TreeError
 from alula.trees.nav2.plugin import TICKED, TOLD
-from alula.trees.palette import Category
+from alula.trees.node_type import Category
 from alula.trees.reading import read_text
 from alula.trees.standard import standard_palette
 
@@ -189,7 +189,7 @@ def test_releases_declare_what_they_have():
 def test_nothing_ticks_what_asks_a_robot():
     kinds: dict[bool, set[str]] = {True: set(), False: set()}
     for one in nav2.palette():
-        kinds[one.make is not None].add(one.name)
+        kinds[one.is_tickable].add(one.name)
     assert kinds[True] == {node.__name__ for node in TICKED}
     body = '<Sequence><DistanceController distance="1"><Spin spin_dist="1"/></DistanceController></Sequence>'
     with pytest.raises(TreeError, match="nothing here ticks a 'DistanceController'; say in the answers what stands in"):

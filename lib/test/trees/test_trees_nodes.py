@@ -8,7 +8,7 @@ from trees_clock import Played, palette
 from alula.trees.blackboard import Blackboard
 from alula.trees.errors import FileError, TickError
 from alula.trees.node import Decorator, SyncAction
-from alula.trees.palette import input_port, output_port
+from alula.trees.ports import input_port, output_port
 from alula.trees.standard import standard_palette
 from alula.trees.status import FAILURE, RUNNING, SUCCESS
 from alula.trees.values import DOUBLE, INT, UINT

@@ -8,7 +8,9 @@ from alula.check.checking import check
 from alula.trees.errors import FileError
 from alula.trees.factory import make_tree
 from alula.trees.node import SyncAction
-from alula.trees.palette import Category, Direction, Palette, Port, inout_port, node_type
+from alula.trees.node_type import Category, node_type
+from alula.trees.palette import Palette
+from alula.trees.ports import Direction, Port, inout_port
 from alula.trees.reading import read_text
 from alula.trees.standard import standard_palette
 from alula.trees.status import SUCCESS

@@ -15,8 +15,9 @@ from alula.model.json_form import to_json
 from alula.model.model import Skillset
 from alula.prove.mission.conditions import Faults
 from alula.trees.access import takes_script_from_entry
+from alula.trees.attributes import type_name
 from alula.trees.palette import Palette
-from alula.trees.reading import TreeFiles, type_name
+from alula.trees.reading import TreeFiles
 
 WORD = re.compile(r"\w+")
 ANYTHING = "*"

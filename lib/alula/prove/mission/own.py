@@ -15,8 +15,9 @@ from alula.prove.mission.unknown import any_value, is_unknown
 from alula.trees.access import written_entries
 from alula.trees.ends import ANY_END
 from alula.trees.errors import TickError
-from alula.trees.node import Condition, Control, Node, SyncAction, register
-from alula.trees.palette import CHILDREN, Category, Direction, NodeType, Port, name_in_files
+from alula.trees.node import Condition, Control, Node, SyncAction, name_in_files, register
+from alula.trees.node_type import CHILDREN, Category, NodeType
+from alula.trees.ports import Direction, Port
 from alula.trees.status import FAILURE, IDLE, RUNNING, SKIPPED, SUCCESS, Answer, Skipped
 
 DECLARED = "the file declares it, and no class is known"

@@ -46,9 +46,9 @@ from alula.prove.mission.ticking import ABORT, TICK, OneStop, Ticker
 from alula.prove.mission.ticking import Outcome as Ticked
 from alula.prove.mission.unknown import any_value
 from alula.prove.mission.uses import Uses
-from alula.trees.node import Node, Shared, pointer
-from alula.trees.palette import name_in_files
-from alula.trees.reading import TreeFiles, type_name
+from alula.trees.attributes import type_name
+from alula.trees.node import Node, Shared, name_in_files, pointer
+from alula.trees.reading import TreeFiles
 from alula.trees.wiring import wire
 
 T = TypeVar("T")

@@ -14,7 +14,7 @@ from alula.common.graphs import reachable_from
 from alula.trees.access import Key, scripts_of
 from alula.trees.node import Node as TreeNode
 from alula.trees.node import Wiring, pointer
-from alula.trees.palette import Port
+from alula.trees.ports import Port
 from alula.trees.script import statements_of
 from alula.trees.script.syntax import Assignment, Chain, Comparison, Conditional, Literal, Name, Node, Prefix, children
 from alula.trees.values import ANY, BOOL, DOUBLE, NUMBERS, STRING, PortType

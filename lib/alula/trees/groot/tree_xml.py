@@ -10,7 +10,7 @@ from xml.etree.ElementTree import Element, SubElement
 from xml.sax.saxutils import escape
 
 from alula.trees.node import Node
-from alula.trees.palette import Category, NodeType
+from alula.trees.node_type import Category, NodeType
 from alula.trees.standard import standard_palette
 from alula.trees.tree import Subtree, Tree
 from alula.trees.view import conditions_of

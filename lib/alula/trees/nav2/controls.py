@@ -7,7 +7,7 @@ from collections.abc import Iterator, Sequence
 from alula.trees.ends import ENDS, FAILS, NO_END, SKIPS, SUCCEEDS, Ends, Given, stops_at, together
 from alula.trees.errors import TickError
 from alula.trees.node import Control, Count, Wiring
-from alula.trees.palette import inout_port, input_port
+from alula.trees.ports import inout_port, input_port
 from alula.trees.status import FAILURE, RUNNING, SKIPPED, SUCCESS, Answer
 from alula.trees.ticking import Order, Ticking
 from alula.trees.values import BOOL, INT

@@ -9,7 +9,8 @@ from pathlib import Path
 
 from alula.trees.document import Element, read_document
 from alula.trees.library import DIRECTIONS, ignore, models_of, port_of
-from alula.trees.palette import NodeType, Port
+from alula.trees.node_type import NodeType
+from alula.trees.ports import Port
 
 RELEASES = ("humble", "jazzy", "kilted", "lyrical")
 WRITTEN = (

@@ -7,7 +7,7 @@ from collections.abc import Sequence
 
 from alula.trees.ends import FAILS, SUCCEEDS, Ends, Given
 from alula.trees.node import Decorator, Node, Wiring
-from alula.trees.palette import input_port
+from alula.trees.ports import input_port
 from alula.trees.status import FAILURE, IDLE, RUNNING, SUCCESS, Answer
 from alula.trees.values import DOUBLE
 

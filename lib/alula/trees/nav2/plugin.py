@@ -5,12 +5,13 @@ from __future__ import annotations
 from collections.abc import Iterable
 from dataclasses import replace
 
+from alula.trees.attributes import is_port, type_name
 from alula.trees.document import Element
 from alula.trees.nav2 import controls, decorators
 from alula.trees.nav2.declared import declared
 from alula.trees.node import Node
-from alula.trees.palette import CHILDREN, NodeType, Palette
-from alula.trees.reading import is_port, type_name
+from alula.trees.node_type import CHILDREN, NodeType
+from alula.trees.palette import Palette
 
 TICKED: tuple[type[Node], ...] = (
     controls.PipelineSequence,

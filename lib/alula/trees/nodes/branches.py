@@ -7,7 +7,7 @@ from collections.abc import Sequence
 from alula.trees.ends import FAILS, NO_END, Ends, Given, together
 from alula.trees.errors import TickError
 from alula.trees.node import Control, Wiring
-from alula.trees.palette import input_port
+from alula.trees.ports import input_port
 from alula.trees.status import FAILURE, IDLE, RUNNING, SKIPPED, SUCCESS, Answer
 from alula.trees.ticking import Order, Ticking
 from alula.trees.values import BOOL, STRING, StandIn

@@ -6,7 +6,7 @@ from collections.abc import Sequence
 
 from alula.trees.ends import FAILS, SKIPS, SUCCEEDS, Ends, Given, answer_in, whole_number
 from alula.trees.node import NANOSECONDS_PER_MS, Count, Decorator, Script, Wiring
-from alula.trees.palette import input_port, script_port
+from alula.trees.ports import input_port, script_port
 from alula.trees.status import FAILURE, IDLE, RUNNING, SKIPPED, SUCCESS, Answer, Status
 from alula.trees.ticking import AGAIN, Begin, Order, Steps, Ticking
 from alula.trees.values import BOOL, INT, STATUS, UINT

@@ -10,7 +10,7 @@ from alula.trees.blackboard import type_of
 from alula.trees.ends import ENDS, SUCCEEDS, Ends, Given
 from alula.trees.errors import TickError
 from alula.trees.node import Decorator, SyncAction, Wiring, pointer
-from alula.trees.palette import inout_port, input_port
+from alula.trees.ports import inout_port, input_port
 from alula.trees.status import FAILURE, RUNNING, SKIPPED, SUCCESS, Answer
 from alula.trees.ticking import Begin, Order, Ticking
 from alula.trees.values import ANY, STRING, shown

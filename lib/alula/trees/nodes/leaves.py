@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from alula.trees.ends import ENDS, FAILS, SUCCEEDS
 from alula.trees.node import NANOSECONDS_PER_MS, Action, Condition, Node, Script, SyncAction, Wiring
-from alula.trees.palette import input_port, script_port
+from alula.trees.ports import input_port, script_port
 from alula.trees.status import FAILURE, RUNNING, SUCCESS, Answer
 from alula.trees.values import UINT
 

@@ -8,7 +8,7 @@ from dataclasses import replace
 from alula.trees.ends import ANY_END, FAILS, Ends, Given, answer_in
 from alula.trees.errors import TickError
 from alula.trees.node import Decorator, Wiring, pointer
-from alula.trees.palette import inout_port, input_port, output_port
+from alula.trees.ports import inout_port, input_port, output_port
 from alula.trees.status import FAILURE, IDLE, RUNNING, SKIPPED, SUCCESS, Answer, Skipped, Status
 from alula.trees.ticking import AGAIN, Begin, Order, Ticking
 from alula.trees.values import BOOL, DOUBLE, INT, STATUS, STRING, PortType, StandIn, list_of

@@ -7,7 +7,7 @@ from collections.abc import Sequence
 from alula.trees.ends import ENDS, FAILS, NO_END, SKIPS, SUCCEEDS, Ends, Given, whole_number
 from alula.trees.errors import TickError
 from alula.trees.node import Control, Wiring
-from alula.trees.palette import input_port
+from alula.trees.ports import input_port
 from alula.trees.status import FAILURE, RUNNING, SKIPPED, SUCCESS, Answer
 from alula.trees.ticking import Order, Ticking
 from alula.trees.values import INT

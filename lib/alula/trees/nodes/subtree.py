@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from alula.trees.node import Decorator
-from alula.trees.palette import Category
+from alula.trees.node_type import Category
 from alula.trees.status import FAILURE, IDLE, RUNNING, SUCCESS, Answer
 from alula.trees.ticking import Order, Ticking
 

@@ -7,7 +7,7 @@ from typing import Any, ClassVar
 
 from alula.missions.part import MissionPart
 from alula.trees.node import Action, Control, Decorator, SyncAction, Wiring, register
-from alula.trees.palette import input_port, output_port
+from alula.trees.ports import input_port, output_port
 from alula.trees.status import FAILURE, IDLE, RUNNING, SKIPPED, SUCCESS, Answer
 from alula.trees.values import ANY, DOUBLE, INT
 

@@ -25,7 +25,7 @@ from alula.prove.mission.state import State
 from alula.prove.mission.system import System
 from alula.runtime.core.events import ExecutionEvent
 from alula.trees.node import SyncAction, register
-from alula.trees.palette import output_port
+from alula.trees.ports import output_port
 from alula.trees.status import Answer
 from alula.trees.values import INT
 from finding_pages.mission_checks import whole

@@ -42,7 +42,7 @@ from alula.runtime.core.execution import Execution
 from alula.runtime.hooks import SkillHooks
 from alula.runtime.local import LocalManagers, LocalWorld
 from alula.trees.node import Condition, SyncAction, register
-from alula.trees.palette import input_port, output_port
+from alula.trees.ports import input_port, output_port
 from alula.trees.status import FAILURE, RUNNING, SUCCESS, Answer
 from alula.trees.values import ANY, INT, STRING
 from finding_pages.examples import RUNS, examples

@@ -27,7 +27,7 @@ from alula.prove.mission.run import MissionFinding
 from alula.prove.mission.system import System
 from alula.prove.mission.unknown import UnknownNumber
 from alula.trees.node import SyncAction, register
-from alula.trees.palette import output_port
+from alula.trees.ports import output_port
 from alula.trees.status import SUCCESS, Answer
 from alula.trees.values import ANY, BOOL, INT, STRING
 from finding_pages.mission_checks import whole
