@@ -89,14 +89,14 @@ def tree(leaves: int) -> Mission:
 def ring(places: int) -> Mission:
     """Return a robot that goes round and round by so many places, each by a skill of its own."""
     states = tuple(f"P{number}" for number in range(places))
-    arrows = tuple(Transition(one, states[(number + 1) % places]) for number, one in enumerate(states))
+    transitions = tuple(Transition(one, states[(number + 1) % places]) for number, one in enumerate(states))
     skills = tuple(
-        _working(f"go{number}", "wheels", Assignment("place", arrow.target), needs=ResourceIs("place", arrow.source))
-        for number, arrow in enumerate(arrows)
+        _working(f"go{number}", "wheels", Assignment("place", transition.target), needs=ResourceIs("place", transition.source))
+        for number, transition in enumerate(transitions)
     )
     legs = "".join(f"<r.go{number}/>" for number in range(places))
     tree_ = f"<KeepRunningUntilFailure><Sequence>{legs}</Sequence></KeepRunningUntilFailure>"
-    return [Skillset("r", resources=(Resource("place", states, "P0", arrows), _free("wheels")), skills=skills)], tree_
+    return [Skillset("r", resources=(Resource("place", states, "P0", transitions), _free("wheels")), skills=skills)], tree_
 
 
 def at_once(branches: int) -> Mission:

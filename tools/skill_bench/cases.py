@@ -67,13 +67,13 @@ def make_skillset(case: Case) -> Skillset:
 
 def _resource(name: str) -> Resource:
     """Return a resource that skills take and give back, and that the functional layer can lose and find."""
-    arrows = (
+    transitions = (
         Transition(FREE, USED),
         Transition(USED, FREE),
         Transition(USED, LOST, extern=True),
         Transition(LOST, FREE, extern=True),
     )
-    return Resource(name, (FREE, USED, LOST), FREE, arrows)
+    return Resource(name, (FREE, USED, LOST), FREE, transitions)
 
 
 def _skill(index: int) -> Skill:

@@ -62,8 +62,8 @@ def in_a_line(text: str) -> str:
 
 
 def _resource(one: ResourceOf) -> Resource:
-    arrows = (Transition(FAILS, HOLDS, extern=True), Transition(HOLDS, FAILS, extern=True))
-    return Resource(one.name, (FAILS, HOLDS), FAILS, arrows)
+    transitions = (Transition(FAILS, HOLDS, extern=True), Transition(HOLDS, FAILS, extern=True))
+    return Resource(one.name, (FAILS, HOLDS), FAILS, transitions)
 
 
 def _skill(one: SkillOf, entries: Entries) -> Skill:

@@ -168,7 +168,7 @@ def _breaks(skillset: Skillset, condition: Expression, states: frozenset[str]) -
     for resource in skillset.resources:
         for target in resource.states:
             if f"{skillset.name}.{resource.name} {target}" in states:
-                arrows = [Transition(source, target, extern=True) for source in resource.states if source != target]
-                if any(can_break(skillset, condition, resource, arrow) for arrow in arrows):
+                transitions = [Transition(source, target, extern=True) for source in resource.states if source != target]
+                if any(can_break(skillset, condition, resource, transition) for transition in transitions):
                     return True
     return False

@@ -157,10 +157,14 @@ class SkillsetView:
 
     def _resource_row(self, resource: Resource) -> ResourceRow:
         state = self._states.get(resource.name, "?")
-        arrows = [arrow for arrow in resource.transitions if arrow.extern]
-        here = tuple(arrow.target for arrow in arrows if arrow.source == state)
+        transitions = [transition for transition in resource.transitions if transition.extern]
+        here = tuple(transition.target for transition in transitions if transition.source == state)
         return ResourceRow(
-            resource.name, state, here, tuple(dict.fromkeys(arrow.target for arrow in arrows)), self._reasons.get(resource.name, "")
+            resource.name,
+            state,
+            here,
+            tuple(dict.fromkeys(transition.target for transition in transitions)),
+            self._reasons.get(resource.name, ""),
         )
 
     def data_rows(self, now_ns: int) -> list[DataRow]:

@@ -87,7 +87,7 @@ def _outline(skillset: Skillset) -> Symbol:
 
 
 def description(file: ModelFile, entity: Entity) -> str:
-    """Return a resource with its states and arrows, a skill with inputs, outputs and results, a role's skills, another's definition."""
+    """Return a resource with its states and transitions, a skill with its parameters and results, a role's skills, another's definition."""
     if entity.kind == "role":
         return _role(file, entity.name)
     skillset = next((one for one in file.skillsets if entity.owner and one.name == entity.owner[0]), None)
@@ -139,17 +139,21 @@ def _resource(resource: Resource) -> str:
     lines = [f"resource {resource.name} {{", f"  state {{ {' '.join(resource.states)} }}", f"  initial {resource.initial}"]
     if resource.all_transitions:
         lines.append("  transition all")
-    arrows = [arrow for arrow in resource.transitions if arrow.extern or not resource.all_transitions]
-    return "\n".join([*lines, *(f"  {_arrow(arrow)}" for arrow in arrows), "}"])
+    transitions = [transition for transition in resource.transitions if transition.extern or not resource.all_transitions]
+    return "\n".join([*lines, *(f"  {_transition(transition)}" for transition in transitions), "}"])
 
 
 def _state(resource: Resource, state: str) -> str:
-    arrows = [arrow for arrow in resource.transitions if state in {arrow.source, arrow.target} and arrow.source != arrow.target]
-    return "\n".join([f"{resource.name} == {state}", *(f"  {_arrow(arrow)}" for arrow in arrows)])
+    transitions = [
+        transition
+        for transition in resource.transitions
+        if state in {transition.source, transition.target} and transition.source != transition.target
+    ]
+    return "\n".join([f"{resource.name} == {state}", *(f"  {_transition(transition)}" for transition in transitions)])
 
 
-def _arrow(arrow: Transition) -> str:
-    return f"{'extern ' if arrow.extern else ''}{arrow.source} -> {arrow.target}"
+def _transition(transition: Transition) -> str:
+    return f"{'extern ' if transition.extern else ''}{transition.source} -> {transition.target}"
 
 
 def _skill(skill: Skill) -> str:

@@ -23,7 +23,7 @@ class StepKind(Enum):
     INITIALLY = "initially"
     EXTERN = "extern"
     OUTSIDE = "outside"
-    """An arrow that is not extern and that nothing in the model takes (see ``outside``)."""
+    """A transition that is not extern and that nothing in the model takes (see ``outside``)."""
     EVENT = "event"
     START = "start"
     RESULT = "result"

@@ -54,8 +54,8 @@ class Source:
     text: str
     diagnostics: list[Diagnostic] = field(default_factory=list)
 
-    arrows: int = 0
-    """How many arrows of resources were read."""
+    transitions: int = 0
+    """How many transitions of resources were read."""
 
     def __post_init__(self) -> None:
         self._lines: list[str] | None = None

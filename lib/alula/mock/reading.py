@@ -193,8 +193,8 @@ class _Reader:
         for name, entry in part.entries("`set`").items():
             place, state = self._resource(name, entry.text(name), entry)
             resource = self._skillsets[place[0]].resource(place[1])
-            if not any(arrow.extern and arrow.target == state for arrow in resource.transitions):
-                targets = ", ".join(dict.fromkeys(arrow.target for arrow in resource.transitions if arrow.extern)) or "none"
+            if not any(transition.extern and transition.target == state for transition in resource.transitions):
+                targets = ", ".join(dict.fromkeys(transition.target for transition in resource.transitions if transition.extern)) or "none"
                 raise entry.wrong(f"{name} has no extern transition to {state}; there are some to {targets}")
             found[place] = state
         return found

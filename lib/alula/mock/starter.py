@@ -30,9 +30,9 @@ def _skill(skillset: str, skill: Skill) -> Iterable[str]:
 
 def _resource(skillset: str, resource: Resource) -> Iterable[str]:
     """Yield one line with the first extern transition from the initial state, if there is one."""
-    arrows = [arrow for arrow in resource.transitions if arrow.extern]
-    first = next((arrow for arrow in arrows if arrow.source == resource.initial), None)
+    transitions = [transition for transition in resource.transitions if transition.extern]
+    first = next((transition for transition in transitions if transition.source == resource.initial), None)
     if first is not None:
-        known = ", ".join(f"{arrow.source} -> {arrow.target}" for arrow in arrows)
+        known = ", ".join(f"{transition.source} -> {transition.target}" for transition in transitions)
         yield f"  # {known}"
         yield f"  - {{after: {DEFAULT_DELAY_S:g}, set: {{{skillset}.{resource.name}: {first.target}}}}}"

@@ -5,11 +5,11 @@ from __future__ import annotations
 from collections.abc import Iterator, Mapping
 from dataclasses import replace
 
-from alula.model.arrows import may_go
 from alula.model.conditions import States
 from alula.model.errors import EffectError
 from alula.model.model import Effect, Event, Skill, Skillset
 from alula.model.situation import Change, Running, Situation
+from alula.model.transitions import may_go
 
 
 def effects_of(skill: Skill) -> Iterator[Effect]:
@@ -35,7 +35,7 @@ def effect_changes(skillset: Skillset, execution: Running, effect: Effect, place
 
 def event_changes(skillset: Skillset, event: Event, states: States) -> tuple[Change, ...]:
     """Return what an event changes from these states; it may make any transition, extern ones too. Raise EffectError as above."""
-    return _changes(skillset, event.effect, states, f"event {event.name}", f"event {event.name}", any_arrow=True)
+    return _changes(skillset, event.effect, states, f"event {event.name}", f"event {event.name}", any_transition=True)
 
 
 def given_back(skillset: Skillset, execution: Running, states: States) -> tuple[Change, ...]:
@@ -46,13 +46,15 @@ def given_back(skillset: Skillset, execution: Running, states: States) -> tuple[
         return ()
 
 
-def _changes(skillset: Skillset, effect: Effect, states: States, where: str, cause: str, *, any_arrow: bool = False) -> tuple[Change, ...]:
+def _changes(
+    skillset: Skillset, effect: Effect, states: States, where: str, cause: str, *, any_transition: bool = False
+) -> tuple[Change, ...]:
     changes: list[Change] = []
     present = dict(states)
     for assignment in effect.assignments:
         resource, source, target = skillset.resource(assignment.resource), present[assignment.resource], assignment.target
-        if not may_go(resource, source, target, any_arrow=any_arrow):
-            whose = "" if any_arrow else " for skills"
+        if not may_go(resource, source, target, any_transition=any_transition):
+            whose = "" if any_transition else " for skills"
             raise EffectError(f"{where}: resource {resource.name} is {source} and has no transition {source} -> {target}{whose}")
         if source != target:
             changes.append(Change(resource.name, source, target, cause))

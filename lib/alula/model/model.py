@@ -70,7 +70,7 @@ class Resource:
     silence_s: float | None = None
     span: Span = field(default=NOWHERE, compare=False)
 
-    def has_arrow(self, source: str, target: str, *, extern: bool) -> bool:
+    def has_transition(self, source: str, target: str, *, extern: bool) -> bool:
         """Tell whether the functional layer (extern) or a skill (not extern) may go from source to target."""
         return target in self._targets.get((source, extern), ())
 
@@ -88,8 +88,8 @@ class Resource:
     def _targets(self) -> Mapping[tuple[str, bool], Mapping[str, None]]:
         """The transitions by source and kind; the targets of each in the order of the source."""
         index: dict[tuple[str, bool], dict[str, None]] = {}
-        for arrow in self.transitions:
-            index.setdefault((arrow.source, arrow.extern), {})[arrow.target] = None
+        for transition in self.transitions:
+            index.setdefault((transition.source, transition.extern), {})[transition.target] = None
         return index
 
 

@@ -111,9 +111,9 @@ def extern_refusal(skillset: Skillset, situation: Situation, resource: str, targ
     machine, source = skillset.resource(resource), situation.states[resource]
     if target not in machine.states:
         return f"resource {resource} has no state {target}; it has {', '.join(machine.states)}"
-    if machine.has_arrow(source, target, extern=True):
+    if machine.has_transition(source, target, extern=True):
         return ""
-    if machine.has_arrow(source, target, extern=False):
+    if machine.has_transition(source, target, extern=False):
         return f"resource {resource}: {source} -> {target} is for skills only"
     return f"resource {resource} is {source} and has no extern transition {source} -> {target}"
 

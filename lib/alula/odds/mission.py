@@ -5,7 +5,7 @@ The system takes each step that only an unlucky robot takes. Here a step is take
 - a state that a fault of ``faults.yaml`` shows comes with that fault alone, and goes when it is mended;
 - a state that a skill brings about (``then`` of its mock) comes with a success of that skill alone, but for one that the mocks'
   ``timeline`` has: before the mission begins that comes by itself;
-- any other arrow of the functional layer comes some time, or, if it breaks an invariant, is a fault of its own,
+- any other transition of the functional layer comes some time, or, if it breaks an invariant, is a fault of its own,
   ``skillset.resource STATE``;
 - a broken invariant over data is a fault of its own, ``skillset.skill INVARIANT``, where no fault of ``faults.yaml`` brings it about.
 """
@@ -58,7 +58,7 @@ class MissionSteps:
         faults: what each brings about, by its name.
         brought: what skills bring about.
         departure: the resource and state that the robot leaves at its departure.
-        figures: what may never happen is left out, and an arrow that has figures of its own comes as these say.
+        figures: what may never happen is left out, and a transition that has figures of its own comes as these say.
         at_first: the states that come by themselves after power-up: resource and state.
     """
 
@@ -220,7 +220,7 @@ class MissionSteps:
         yield from (Step(Kind.NOW, state.coming, there._replace(state=after)) for after in found or [state.state])
 
     def _with_brought(self, skill: str, state: State) -> State:
-        """Return a situation with what a success of the skill brings about, or achieves, where the models have an arrow for it."""
+        """Return a situation with what a success of the skill brings about, or achieves, where the models have a transition for it."""
         for resource, wanted in (*self._brought.get(skill, ()), *self._achieved.get(skill, ())):
             found = [after for event, after in self._system.steps(state) if _is_extern(event, resource, wanted)]
             state = found[0] if found else state

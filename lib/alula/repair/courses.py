@@ -125,7 +125,7 @@ class Courses:
         states |= {f"{purpose.skillset.name}.{one.resource}": one.state for one in said if isinstance(one, ResourceIs) and not one.negated}
         for name, state in self._purposes.brought.get(purpose.name, ()):
             skillset, _, resource = name.partition(".")
-            if self._models[skillset].resource(resource).has_arrow(states[name], state, extern=True):
+            if self._models[skillset].resource(resource).has_transition(states[name], state, extern=True):
                 states[name] = state
         facts = {(purpose.skillset.name, one) for one in said if isinstance(one, DataIs)}
         return Here(states, here.facts | facts)

@@ -52,7 +52,7 @@ def test_actions_are_skills_and_their_ports_typed_inputs_and_outputs(tmp_path):
 def test_conditions_are_resources_which_only_the_functional_layer_changes(tmp_path):
     resources = skillset_of(made(tmp_path, main=MAIN, door=DOOR)).resources
     assert [one.name for one in resources] == ["is_at_hall", "is_at_kitchen", "is_door_open"]
-    assert {(arrow.source, arrow.target, arrow.extern) for one in resources for arrow in one.transitions} == {
+    assert {(transition.source, transition.target, transition.extern) for one in resources for transition in one.transitions} == {
         ("FAILS", "HOLDS", True),
         ("HOLDS", "FAILS", True),
     }

@@ -126,7 +126,7 @@ def test_an_editing_session(editor):
     assert labels["take"] == "effect of goto"
     assert "Point" in {c["label"] for c in editor.at("textDocument/completion", 10, "Point")["items"]}
 
-    # Hover: the resource with its arrows, the skill's signature, an effect.
+    # Hover: the resource with its transitions, the skill's signature, an effect.
     told = editor.at("textDocument/hover", 12, "axes", 1)
     assert "state { FREE USED }" in told["contents"]["value"]
     assert "FREE -> USED" in told["contents"]["value"]

@@ -10,7 +10,7 @@ from alula.language.paper import skill as paper
 from alula.language.rl import skill as rl
 from alula.language.syntax.cursor import OPERATOR_WORDS
 from alula.language.syntax.document import MEMBERS
-from alula.language.syntax.resources import every_arrow, occurring, with_silence
+from alula.language.syntax.resources import every_transition, occurring, with_silence
 from alula.model.expressions import TRUE, And, Comparison, Constant, DataIs, Implies, Not, Or, ResourceIs, SkillRuns
 from alula.model.model import (
     NO_EFFECT,
@@ -93,17 +93,17 @@ def properties(draw):
 @st.composite
 def resources(draw):
     name, initial = draw(names), draw(names | st.just(""))
-    arrows = tuple(draw(st.lists(st.builds(Transition, names, names, st.booleans()), max_size=4)))
-    states = occurring(initial, arrows)
+    transitions = tuple(draw(st.lists(st.builds(Transition, names, names, st.booleans()), max_size=4)))
+    states = occurring(initial, transitions)
     if draw(st.booleans()):
         states = tuple(draw(st.permutations([*states, *draw(st.lists(names, max_size=2))])))
     every = draw(st.booleans())
     if every:
-        arrows = (*arrows, *(a for a in every_arrow(states) if a not in arrows))
+        transitions = (*transitions, *(a for a in every_transition(states) if a not in transitions))
     silence_s = draw(st.none() | floats)
     if silence_s is not None:
-        arrows = with_silence(arrows, states, initial)
-    return Resource(name, states, initial, arrows, all_transitions=every, silence_s=silence_s)
+        transitions = with_silence(transitions, states, initial)
+    return Resource(name, states, initial, transitions, all_transitions=every, silence_s=silence_s)
 
 
 roles = st.lists(st.builds(Role, names), max_size=2).map(tuple)

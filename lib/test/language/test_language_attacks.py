@@ -31,7 +31,7 @@ def checked(tmp_path, *texts):
     return [[(finding.code, finding.span.line) for finding in file.findings] for file in check_files(paths)]
 
 
-# --- an arrow not taken -----------------------------------------------------------------------------------------------
+# --- a transition not taken -----------------------------------------------------------------------------------------------
 
 GOTO = """
 skillset uav {
@@ -52,7 +52,7 @@ skillset uav {
 
 
 @BOTH
-def test_what_only_an_untaken_arrow_leads_to_is_an_error(most, tmp_path):
+def test_what_only_an_untaken_transition_leads_to_is_an_error(most, tmp_path):
     errors = [f for f in proved(tmp_path, GOTO, most=most) if f.severity.value == "error"]
     assert [f.code for f in errors] == ["ALU510", "ALU531"]
     assert errors[0].counterexample_lines == (
@@ -103,7 +103,7 @@ def test_a_resource_of_many_states_is_proved_in_the_time_given(states, tmp_path)
     assert unreached.message == f"`r` never gets to `S2`, `S3`, `S4`, `S5`, `S6`, `S7` and {states - 8} more"
 
 
-def test_arrows_of_a_file_are_bounded(tmp_path):
+def test_transitions_of_a_file_are_bounded(tmp_path):
     names = " ".join(f"S{number}" for number in range(250))
     resources = "\n".join(f"resource r{k} {{ state {{ {names} }} initial S0 transition all }}" for k in range(40))
     (found,) = checked(tmp_path, f"skillset big {{\n{resources}\n}}")

@@ -101,8 +101,8 @@ def wrapped(body: str):
 
 
 def test_listing_2():
-    arrows = (Transition("AVAILABLE", "USED"), Transition("USED", "AVAILABLE"))
-    assert wrapped(LISTING_2).resources == (Resource("axes_authority", ("AVAILABLE", "USED"), "AVAILABLE", arrows),)
+    transitions = (Transition("AVAILABLE", "USED"), Transition("USED", "AVAILABLE"))
+    assert wrapped(LISTING_2).resources == (Resource("axes_authority", ("AVAILABLE", "USED"), "AVAILABLE", transitions),)
 
 
 def test_listing_3():
@@ -126,12 +126,12 @@ def test_scanning_damage_is_told_where_it_is():
     assert told == [("ALU104", 8, 6), ("ALU103", 15, 9), ("ALU100", 28, 13), ("ALU103", 29, 8)]
 
 
-def test_extern_arrows_and_states_in_order():
+def test_extern_transitions_and_states_in_order():
     resource = wrapped("resource zed { initial UNKNOWN extern UNKNOWN -> OK extern OK -> BROKEN BROKEN -> OK }").resource("zed")
     assert resource.states == ("UNKNOWN", "OK", "BROKEN")
-    assert resource.has_arrow("OK", "BROKEN", extern=True)
-    assert not resource.has_arrow("OK", "BROKEN", extern=False)
-    assert resource.has_arrow("BROKEN", "OK", extern=False)
+    assert resource.has_transition("OK", "BROKEN", extern=True)
+    assert not resource.has_transition("OK", "BROKEN", extern=False)
+    assert resource.has_transition("BROKEN", "OK", extern=False)
 
 
 def test_transition_all_is_for_skills_and_extern_all_for_the_functional_layer():
@@ -139,13 +139,13 @@ def test_transition_all_is_for_skills_and_extern_all_for_the_functional_layer():
     assert resource.states == ("A", "B", "C")
     assert resource.all_transitions
     assert len(resource.transitions) == 9
-    assert not any(arrow.extern for arrow in resource.transitions)
-    assert resource.has_arrow("C", "A", extern=False)
-    assert resource.has_arrow("A", "A", extern=False)
+    assert not any(transition.extern for transition in resource.transitions)
+    assert resource.has_transition("C", "A", extern=False)
+    assert resource.has_transition("A", "A", extern=False)
     both = wrapped("resource r { state { A B C } initial B transition { all  extern all } }").resource("r")
     assert len(both.transitions) == 15
-    assert both.has_arrow("C", "A", extern=True)
-    assert not both.has_arrow("A", "A", extern=True)
+    assert both.has_transition("C", "A", extern=True)
+    assert not both.has_transition("A", "A", extern=True)
 
 
 def test_data_with_and_without_period():

@@ -27,7 +27,7 @@ RL = """skillset s {
 
 
 @pytest.mark.parametrize(("text", "name"), [(PAPER, "s.skill"), (RL, "s.rl")], ids=["paper", "rl"])
-def test_it_stands_for_an_extern_arrow_from_each_state_to_the_initial_one(text, name):
+def test_it_stands_for_an_extern_transition_from_each_state_to_the_initial_one(text, name):
     skillset = parse_skillset(text, name)
     eye = skillset.resource("eye")
     assert eye.silence_s == 2.0

@@ -206,11 +206,11 @@ def test_the_timeline_counts_from_the_start_or_from_the_first_time_of_a_state(re
     assert mocked.robot.host.notes == []
 
 
-def test_what_a_model_has_no_arrow_for_is_told(read):
+def test_what_a_model_has_no_transition_for_is_told(read):
     behaviour = read("timeline: [{after: 1, set: {flying.sdk: AVAILABLE}}, {after: 2, set: {flying.sdk: AVAILABLE}}]")
     mocked = Mocked(behaviour, authority=False)
     mocked.world.run_for(5.0)
-    assert mocked.robot.host.notes == []  # the state that it has already needs no arrow
+    assert mocked.robot.host.notes == []  # the state that it has already needs no transition
     mocked.world.kill("flying")
     mocked.robot.take({("flying", "sdk"): "UNAVAILABLE"})
     assert mocked.robot.host.notes == ["the mock can't have flying.sdk be UNAVAILABLE: the managers of flying are not there"]

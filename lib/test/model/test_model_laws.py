@@ -11,13 +11,13 @@ from model_walks import walk
 from prove_models import skillsets, sparse_skillsets
 
 from alula.model import semantics
-from alula.model.arrows import may_go
 from alula.model.conditions import judge
 from alula.model.deadlines import due_ns, waits
 from alula.model.effects import after, effect_changes
 from alula.model.errors import EffectError
 from alula.model.execution_state import ExecutionState as S
 from alula.model.situation import Entered, Situation
+from alula.model.transitions import may_go
 
 pytestmark = pytest.mark.long
 QUIET = {"deadline": None, "suppress_health_check": list(HealthCheck)}
@@ -39,14 +39,14 @@ def what_changes_is_told(skillset, taken):
     assert states == dict(taken.step.situation.states)
 
 
-def only_arrows_are_taken(skillset, taken):
-    """The functional layer takes extern arrows, skills take the others, events any."""
+def only_transitions_are_taken(skillset, taken):
+    """The functional layer takes extern transitions, skills take the others, events any."""
     for change in taken.changes:
         resource = skillset.resource(change.resource)
         if change.cause == semantics.EXTERN:
-            assert resource.has_arrow(change.source, change.target, extern=True)
+            assert resource.has_transition(change.source, change.target, extern=True)
         else:
-            assert may_go(resource, change.source, change.target, any_arrow=change.cause.startswith("event "))
+            assert may_go(resource, change.source, change.target, any_transition=change.cause.startswith("event "))
 
 
 def an_execution_ends_once(skillset, taken):
@@ -168,7 +168,7 @@ def possible(skillset, execution, effect, states):
 
 LAWS = (
     what_changes_is_told,
-    only_arrows_are_taken,
+    only_transitions_are_taken,
     an_execution_ends_once,
     a_refused_start_changes_nothing,
     a_start_is_at_once,

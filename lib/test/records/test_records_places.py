@@ -79,7 +79,7 @@ def test_a_log_is_held_against_the_models_of_its_own_robot(place: Path, tmp_path
     monkeypatch.chdir(place)
     monkeypatch.delenv(VARIABLE, raising=False)
     with meaning(DRONE if place == DRONE.root else None):
-        assert [one.skillset for one in judge(read_log(folder)).findings] == ["base"]  # a state of that model, entered by no arrow
+        assert [one.skillset for one in judge(read_log(folder)).findings] == ["base"]  # a state of that model, entered by no transition
 
 
 @pytest.mark.parametrize("place", PLACES, ids=["rover", "drone", "nowhere"])

@@ -130,7 +130,7 @@ def test_a_second_execution_is_for_the_preconditions_to_forbid():
     assert [bench.run("watch").state, bench.run("watch").state] == [S.RUNNING, S.RUNNING]
 
 
-LOSE_SDK = Effect("lose_sdk", (Assignment("sdk", "UNAVAILABLE"),))  # an extern arrow: not for skills
+LOSE_SDK = Effect("lose_sdk", (Assignment("sdk", "UNAVAILABLE"),))  # an extern transition: not for skills
 
 
 def test_a_start_effect_that_is_no_transition_refuses_and_names_all():

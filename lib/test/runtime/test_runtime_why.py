@@ -17,7 +17,7 @@ from alula_testing.waits import HANGS_S
 
 S = ExecutionState
 FORBIDDEN = Effect("give_up", (Assignment("sdk", "UNAVAILABLE"),))
-"""An arrow that is for the functional layer only."""
+"""A transition that is for the functional layer only."""
 
 
 def test_a_skill_that_is_ready_says_so_and_nothing_is_changed():

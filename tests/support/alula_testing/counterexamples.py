@@ -1,4 +1,4 @@
-"""Counterexamples of the proofs: those of its examples, a model with data and time, and one with arrows from outside."""
+"""Counterexamples of the proofs: those of its examples, a model with data and time, and one with transitions from outside."""
 
 from __future__ import annotations
 

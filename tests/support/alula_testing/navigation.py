@@ -74,8 +74,13 @@ def check_interrupt_and_violation(navigation: Navigation, soon_s: float) -> None
 
 
 def with_silence(skillset: Skillset, name: str, silence_s: float) -> Skillset:
-    """Return a skillset with a resource whose reporter may fall silent; its arrows lead both ways, as managers need them to."""
+    """Return a skillset with a resource whose reporter may fall silent; its transitions lead both ways, as managers need them to."""
     resource = skillset.resource(name)
-    arrows = {*resource.transitions, *(replace(arrow, target=resource.initial, source=arrow.target) for arrow in resource.transitions)}
-    silent = replace(resource, silence_s=silence_s, transitions=tuple(arrow for arrow in arrows if arrow.source != arrow.target))
+    transitions = {
+        *resource.transitions,
+        *(replace(transition, target=resource.initial, source=transition.target) for transition in resource.transitions),
+    }
+    silent = replace(
+        resource, silence_s=silence_s, transitions=tuple(transition for transition in transitions if transition.source != transition.target)
+    )
     return replace(skillset, resources=tuple(silent if one.name == name else one for one in skillset.resources))

@@ -29,8 +29,8 @@ FOREVER_NS = 10**12
 def machines(draw, name):
     states = ("X", "Y", "Z")[: draw(st.integers(2, 3))]
     pairs = [*permutations(states, 2), *((state, state) for state in states)]
-    arrows = draw(st.lists(st.tuples(st.sampled_from(pairs), st.booleans()), min_size=2, unique=True))
-    return Resource(name, states, draw(st.sampled_from(states)), tuple(Transition(*pair, extern=extern) for pair, extern in arrows))
+    transitions = draw(st.lists(st.tuples(st.sampled_from(pairs), st.booleans()), min_size=2, unique=True))
+    return Resource(name, states, draw(st.sampled_from(states)), tuple(Transition(*pair, extern=extern) for pair, extern in transitions))
 
 
 def conditions(resources):
@@ -161,13 +161,13 @@ def run_all(bench, programs):
 
 
 def check_resources(bench):
-    """Every change is an arrow of the right kind from the state that the resource was in; the last ones are the present."""
+    """Every change is a transition of the right kind from the state that the resource was in; the last ones are the present."""
     states = {resource.name: resource.initial for resource in bench.skillset.resources}
     for event in bench.events:
         if isinstance(event, TransitionEvent):
             assert event.from_state == states[event.resource]
             machine = bench.skillset.resource(event.resource)
-            assert machine.has_arrow(event.from_state, event.to_state, extern=event.cause == "extern")
+            assert machine.has_transition(event.from_state, event.to_state, extern=event.cause == "extern")
             states[event.resource] = event.to_state
     assert states == bench.states()
 

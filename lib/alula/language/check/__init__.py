@@ -1,6 +1,6 @@
 """What is wrong with a model that reads well, found without a search through its executions.
 
-Names that lead nowhere, effects that no arrow allows, periods, duplicates, names that ROS or generated code can't have.
+Names that lead nowhere, effects that no transition allows, periods, duplicates, names that ROS or generated code can't have.
 """
 
 from alula.language.check.findings import MAX_FINDINGS, check

@@ -91,8 +91,8 @@ def unit_findings(unit: str, span: Span) -> Iterator[Diagnostic]:
         yield error("ALU219", f"unknown unit `{unit}`", span, hint=hint)
 
 
-def effect_findings(skillset: Skillset, effect: Effect, *, any_arrow: bool) -> Iterator[Diagnostic]:
-    """Yield what is wrong with an effect; with ``any_arrow`` it may take extern arrows, too."""
+def effect_findings(skillset: Skillset, effect: Effect, *, any_transition: bool) -> Iterator[Diagnostic]:
+    """Yield what is wrong with an effect; with ``any_transition`` it may take extern transitions, too."""
     resources = skillset.resource_index
     seen: set[str] = set()
     for change in effect.assignments:
@@ -105,20 +105,20 @@ def effect_findings(skillset: Skillset, effect: Effect, *, any_arrow: bool) -> I
         elif change.target not in resource.states:
             yield unknown_state(resource, change.target, last_word(change.span, change.target))
         else:
-            yield from _arrow(effect, resource, change.target, change.span, any_arrow=any_arrow)
+            yield from _transition(effect, resource, change.target, change.span, any_transition=any_transition)
 
 
-def _arrow(effect: Effect, resource: Resource, target: str, span: Span, *, any_arrow: bool) -> Iterator[Diagnostic]:
-    arrows = [arrow for arrow in resource.transitions if arrow.target == target]
-    if any(any_arrow or not arrow.extern for arrow in arrows):
+def _transition(effect: Effect, resource: Resource, target: str, span: Span, *, any_transition: bool) -> Iterator[Diagnostic]:
+    transitions = [transition for transition in resource.transitions if transition.target == target]
+    if any(any_transition or not transition.extern for transition in transitions):
         return
     name = _called(effect)
-    if arrows:
+    if transitions:
         message = f"{name} would take `{resource.name}` to `{target}`, but only the functional layer may (every transition there is extern)"
         hint = f"add a transition without `extern` to resource `{resource.name}` if skills are to take it"
         yield error("ALU210", message, span, hint=hint)
         return
-    targets = dict.fromkeys(arrow.target for arrow in resource.transitions if not arrow.extern)
+    targets = dict.fromkeys(transition.target for transition in resource.transitions if not transition.extern)
     hint = f"skills can take it to {quoted(list(targets))}" if targets else f"add `STATE -> {target}` to resource `{resource.name}`"
     # A resource in the initial state may stay there, though the effect then never does anything.
     tell = warning if target == resource.initial else error

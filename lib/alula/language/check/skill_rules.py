@@ -144,7 +144,7 @@ def _effects(skillset: Skillset, skill: Skill) -> Iterator[Diagnostic]:
     used = _used_effects(skill)
     defined = {effect.name for effect in skill.effects}
     for effect in (*skill.effects, *(e for e in used if e.name not in defined)):
-        yield from effect_findings(skillset, effect, any_arrow=False)
+        yield from effect_findings(skillset, effect, any_transition=False)
     names = {effect.name for effect in used}
     for effect in skill.effects:
         if effect.name not in names:

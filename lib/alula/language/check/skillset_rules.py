@@ -64,19 +64,23 @@ def _states(resource: Resource) -> Iterator[Diagnostic]:
         if times > 1:
             yield error("ALU201", f"state `{state}` of `{resource.name}` is listed twice", resource.span)
     seen: set[tuple[str, str, bool]] = set()
-    for arrow in resource.transitions:
-        for state in dict.fromkeys((arrow.source, arrow.target)):
+    for transition in resource.transitions:
+        for state in dict.fromkeys((transition.source, transition.target)):
             if state not in resource.states:
-                word = first_word if state == arrow.source else last_word
-                yield unknown_state(resource, state, word(arrow.span, state))
-        key = (arrow.source, arrow.target, arrow.extern)
+                word = first_word if state == transition.source else last_word
+                yield unknown_state(resource, state, word(transition.span, state))
+        key = (transition.source, transition.target, transition.extern)
         if key in seen:
-            yield error("ALU201", f"the transition `{arrow.source} -> {arrow.target}` of `{resource.name}` is given twice", arrow.span)
+            yield error(
+                "ALU201",
+                f"the transition `{transition.source} -> {transition.target}` of `{resource.name}` is given twice",
+                transition.span,
+            )
         seen.add(key)
 
 
 def _initial(resource: Resource) -> Iterator[Diagnostic]:
-    ends = {state for arrow in resource.transitions for state in (arrow.source, arrow.target)}
+    ends = {state for transition in resource.transitions for state in (transition.source, transition.target)}
     if not resource.initial:
         hint = f"add `initial {resource.states[0]}`" if resource.states else "add `initial STATE`"
         yield error("ALU207", f"resource `{resource.name}` has no initial state", resource.span, hint=hint)
@@ -109,12 +113,12 @@ def _silence(resource: Resource) -> Iterator[Diagnostic]:
     if not silence_s >= SHORTEST_SILENCE_S:
         hint = f"reporters send a heartbeat every 0.5 s: take {SHORTEST_SILENCE_S:g} s or more"
         yield error("ALU226", f"the silence of `{resource.name}` is {silence_s:g} s", resource.span, hint=hint)
-    reported = dict.fromkeys(arrow.target for arrow in resource.transitions if arrow.extern and arrow.target != initial)
+    reported = dict.fromkeys(transition.target for transition in resource.transitions if transition.extern and transition.target != initial)
     if not reported:
         message = f"`{resource.name}` has a silence, and nobody reports it: no extern transition leads away from `{initial}`"
         yield error("ALU226", message, resource.span, hint=f"add `extern {initial} -> STATE`, or leave `silence` out")
     for state in reported:
-        if not resource.has_arrow(initial, state, extern=True):
+        if not resource.has_transition(initial, state, extern=True):
             message = f"after a silence `{resource.name}` is `{initial}`, and `{state}` could not be reported from there"
             yield error("ALU226", message, resource.span, hint=f"add `extern {initial} -> {state}`")
 
@@ -153,8 +157,8 @@ def _periods(skillset: Skillset) -> Iterator[Diagnostic]:
 def _events(skillset: Skillset) -> Iterator[Diagnostic]:
     for event in skillset.events:
         yield from condition_findings(skillset, event.guard, f"the guard of `{event.name}`", data_allowed=False)
-        # What happens by itself may take any arrow: it speaks for the functional layer.
-        yield from effect_findings(skillset, event.effect, any_arrow=True)
+        # What happens by itself may take any transition: it speaks for the functional layer.
+        yield from effect_findings(skillset, event.effect, any_transition=True)
 
 
 def _properties(skillset: Skillset) -> Iterator[Diagnostic]:

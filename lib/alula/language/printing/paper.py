@@ -111,4 +111,4 @@ def _result(result: Result) -> str:
     return f"{kind}{result.name}{colon}{' ' if outcome else ''}{outcome}{comment_text(result.comment)}"
 
 
-PAPER = Style(skill_lines, condition_text, arrows_in_block=False, types_outside=False)
+PAPER = Style(skill_lines, condition_text, transitions_in_block=False, types_outside=False)

@@ -82,4 +82,4 @@ def _result(result: Result) -> str:
     return f"{result.name} {{ {body} }}{comment_text(result.comment)}" if body else f"{result.name} {{}}{comment_text(result.comment)}"
 
 
-ROBOT_LANGUAGE = Style(skill_lines, condition_text, arrows_in_block=True, types_outside=True)
+ROBOT_LANGUAGE = Style(skill_lines, condition_text, transitions_in_block=True, types_outside=True)

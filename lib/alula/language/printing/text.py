@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Callable, Iterable, Iterator, Sequence
 from dataclasses import dataclass
 
-from alula.language.syntax.resources import every_arrow, is_of_silence, occurring
+from alula.language.syntax.resources import every_transition, is_of_silence, occurring
 from alula.model.condition_text import bare_text
 from alula.model.expressions import TRUE, Expression
 from alula.model.model import NO_EFFECT, Data, Effect, Event, Hold, Parameter, Property, PropertyKind, Resource, Role, Skill, Skillset
@@ -20,7 +20,7 @@ class Style:
 
     skill_lines: Callable[[Skill], Iterable[str]]
     condition: ConditionText
-    arrows_in_block: bool
+    transitions_in_block: bool
     types_outside: bool
 
 
@@ -31,7 +31,7 @@ def skillset_text(skillset: Skillset, style: Style, *, with_types: bool) -> str:
         [f"type {name}" for name in skillset.types] if with_types else [],
         [f"parameter {parameter_text(parameter)}" for parameter in skillset.parameters],
         [_data(data) for data in skillset.data],
-        *(list(_resource(resource, in_block=style.arrows_in_block)) for resource in skillset.resources),
+        *(list(_resource(resource, in_block=style.transitions_in_block)) for resource in skillset.resources),
         *(list(_event(event, style.condition)) for event in skillset.events),
         *(list(style.skill_lines(skill)) for skill in skillset.skills),
         [_property(prop) for prop in skillset.properties],
@@ -111,11 +111,11 @@ def _data(data: Data) -> str:
 def _resource(resource: Resource, *, in_block: bool) -> Iterator[str]:
     yield f"resource {resource.name} {{"
     silence = resource.silence_s is not None
-    listed = tuple(arrow for arrow in resource.transitions if not (silence and is_of_silence(arrow, resource.initial)))
+    listed = tuple(transition for transition in resource.transitions if not (silence and is_of_silence(transition, resource.initial)))
     if resource.all_transitions:
-        # Only the arrows that `transition all` would not give at that place need saying.
-        every = every_arrow(resource.states)
-        rest = tuple(arrow for arrow in listed if arrow.extern)
+        # Only the transitions that `transition all` would not give at that place need saying.
+        every = every_transition(resource.states)
+        rest = tuple(transition for transition in listed if transition.extern)
         listed = rest if rest + every == listed else listed
     if in_block or occurring(resource.initial, listed) != resource.states:
         yield f"  state {{ {' '.join(resource.states)} }}"
@@ -123,8 +123,8 @@ def _resource(resource: Resource, *, in_block: bool) -> Iterator[str]:
         yield f"  initial {resource.initial}"
     if silence:
         yield f"  silence = {resource.silence_s!r}"
-    arrows = [f"{'extern ' if arrow.extern else ''}{arrow.source} -> {arrow.target}" for arrow in listed]
-    yield from block("transition", arrows) if in_block else (f"  {arrow}" for arrow in arrows)
+    transitions = [f"{'extern ' if transition.extern else ''}{transition.source} -> {transition.target}" for transition in listed]
+    yield from block("transition", transitions) if in_block else (f"  {transition}" for transition in transitions)
     if resource.all_transitions:
         yield "  transition all"
     yield "}"

@@ -1,4 +1,4 @@
-"""A resource, in either notation: `state`, `initial` and the arrows, in any order.
+"""A resource, in either notation: `state`, `initial` and the transitions, in any order.
 
 The paper's: `initial S  A -> B  extern B -> C`. The Robot Language's: `state { A B C } initial A transition { A -> B } | all`.
 In both: `silence 2 s`.
@@ -14,9 +14,9 @@ from alula.language.syntax.quantities import setting
 from alula.model.model import Resource, Transition
 
 MAX_STATES = 250
-"""`transition all` of so many states has 62,500 arrows; state machines of people have a dozen states."""
+"""`transition all` of so many states has 62,500 transitions; state machines of people have a dozen states."""
 
-MAX_ARROWS = 130_000
+MAX_TRANSITIONS = 130_000
 """In a file: two such resources."""
 
 _WORDS = frozenset({"initial", "transition", "state", "extern", "silence"})
@@ -67,25 +67,25 @@ class _ResourceReader:
             self._transition()
 
     def build(self, name: Token) -> Resource:
-        """Return the resource; too many states or arrows are reported, and cut."""
-        arrows = tuple(self.transitions)
-        states = tuple(self.states) if self.states is not None else occurring(self.initial, arrows)
+        """Return the resource; too many states or transitions are reported, and cut."""
+        transitions = tuple(self.transitions)
+        states = tuple(self.states) if self.states is not None else occurring(self.initial, transitions)
         source = self.cursor.source
-        source.arrows += len(arrows) + (self.all + self.extern_all) * len(states) ** 2
-        if len(states) > MAX_STATES or source.arrows > MAX_ARROWS:
+        source.transitions += len(transitions) + (self.all + self.extern_all) * len(states) ** 2
+        if len(states) > MAX_STATES or source.transitions > MAX_TRANSITIONS:
             message = f"resource `{name.text}` has {len(states)} states; there may be {MAX_STATES}"
             if len(states) <= MAX_STATES:
-                message = f"with resource `{name.text}` the file has {source.arrows} transitions; there may be {MAX_ARROWS}"
+                message = f"with resource `{name.text}` the file has {source.transitions} transitions; there may be {MAX_TRANSITIONS}"
             hint = "numbers are data, not states: let the functional layer publish them"
             source.report("ALU109", message, self.cursor.span(name), hint=hint)
             return Resource(name.text, states[:MAX_STATES], self.initial, (), span=self.cursor.span(name))
         if self.extern_all:
-            arrows += _missing(every_arrow(states, extern=True), arrows)
+            transitions += _missing(every_transition(states, extern=True), transitions)
         if self.all:
-            arrows += _missing(every_arrow(states), arrows)
+            transitions += _missing(every_transition(states), transitions)
         if self.silence_s is not None:
-            arrows = with_silence(arrows, states, self.initial)
-        return Resource(name.text, states, self.initial, arrows, self.all, self.silence_s, span=self.cursor.span(name))
+            transitions = with_silence(transitions, states, self.initial)
+        return Resource(name.text, states, self.initial, transitions, self.all, self.silence_s, span=self.cursor.span(name))
 
     def _states(self) -> None:
         cursor = self.cursor
@@ -122,9 +122,9 @@ class _ResourceReader:
             self.all |= not extern
             self.extern_all |= extern
         else:
-            self._arrow(extern=extern)
+            self._from_to(extern=extern)
 
-    def _arrow(self, *, extern: bool) -> None:
+    def _from_to(self, *, extern: bool) -> None:
         if self.cursor.here.kind is not Kind.NAME:
             raise self.cursor.fail("a state", "`initial`", "`extern`", "`}`")
         source = self.cursor.name("a state")
@@ -138,7 +138,7 @@ class _ResourceReader:
 
 
 def occurring(initial: str, transitions: tuple[Transition, ...]) -> tuple[str, ...]:
-    """Return the states that occur, the initial one first, then in the order of the arrows."""
+    """Return the states that occur, the initial one first, then in the order of the transitions."""
     names = [initial] if initial else []
     for transition in transitions:
         names += [transition.source, transition.target]
@@ -147,21 +147,21 @@ def occurring(initial: str, transitions: tuple[Transition, ...]) -> tuple[str, .
 
 def _missing(wanted: tuple[Transition, ...], given: tuple[Transition, ...]) -> tuple[Transition, ...]:
     known = set(given)
-    return tuple(arrow for arrow in wanted if arrow not in known)
+    return tuple(transition for transition in wanted if transition not in known)
 
 
-def is_of_silence(arrow: Transition, initial: str) -> bool:
-    """Tell whether `silence` in a resource with this initial state stands for the arrow."""
-    return arrow.extern and arrow.target == initial
+def is_of_silence(transition: Transition, initial: str) -> bool:
+    """Tell whether `silence` in a resource with this initial state stands for the transition."""
+    return transition.extern and transition.target == initial
 
 
 def with_silence(transitions: tuple[Transition, ...], states: tuple[str, ...], initial: str) -> tuple[Transition, ...]:
-    """Return the arrows with those that `silence` stands for at the end: from each state back to the initial one."""
+    """Return the transitions with those that `silence` stands for at the end: from each state back to the initial one."""
     back = tuple(Transition(state, initial, extern=True) for state in states if state != initial and initial in states)
-    return (*(arrow for arrow in transitions if not is_of_silence(arrow, initial)), *back)
+    return (*(transition for transition in transitions if not is_of_silence(transition, initial)), *back)
 
 
-def every_arrow(states: tuple[str, ...], *, extern: bool = False) -> tuple[Transition, ...]:
+def every_transition(states: tuple[str, ...], *, extern: bool = False) -> tuple[Transition, ...]:
     """Return what `transition all` (or `extern all`) stands for.
 
     Skills may take the resource from each state to each, to the one that it is in as well: nothing is wrong with an effect that

@@ -43,7 +43,7 @@ class Failures:
 
 
 def searched(skillset: Skillset) -> OverApproximation:
-    """Return a skillset as it is searched: over resources alone, and with arrows that nothing in the model takes as extern ones."""
+    """Return a skillset as it is searched: over resources alone, and with transitions that nothing in the model takes as extern ones."""
     return over_approximate(opened(skillset, untaken(skillset)))
 
 
@@ -64,10 +64,10 @@ class ManagersSteps:
         self._possible = PossibleSteps(searchable)
         self._names = tuple(resource.name for resource in self.model.resources)
         self._bad = {
-            (resource.name, arrow.source, arrow.target)
+            (resource.name, transition.source, transition.target)
             for resource in self.model.resources
-            for arrow in resource.transitions
-            if arrow.extern and breaks(self.model, resource, arrow)
+            for transition in resource.transitions
+            if transition.extern and breaks(self.model, resource, transition)
         }
 
     def initial(self) -> Managers:

@@ -30,7 +30,7 @@ class Playable:
 
 @lru_cache(maxsize=32)  # many runs are played of one mission
 def playable(skillset: Skillset) -> Playable:
-    """Return a skillset without inputs, outputs and data, and with the arrows that the search counts as extern."""
+    """Return a skillset without inputs, outputs and data, and with the transitions that the search counts as extern."""
     model = searched(skillset)
     against = list(dict.fromkeys(_against(model)))
     bare = replace(model.skillset, skills=tuple(replace(one, inputs=(), outputs=()) for one in model.skillset.skills))
@@ -38,8 +38,8 @@ def playable(skillset: Skillset) -> Playable:
         return Playable(bare)
     taken = {*(one.name for one in skillset.resources), *(one.name for one in skillset.data)}
     name = next(one for one in ("data", *(f"data_{number}" for number in range(2, len(taken) + 3))) if one not in taken)
-    arrows = [Transition(*ends, extern=True) for one in against for ends in ((AS_WANTED, one), (one, AS_WANTED))]
-    data = Resource(name, (AS_WANTED, *against), AS_WANTED, tuple(arrows))
+    transitions = [Transition(*ends, extern=True) for one in against for ends in ((AS_WANTED, one), (one, AS_WANTED))]
+    data = Resource(name, (AS_WANTED, *against), AS_WANTED, tuple(transitions))
     skills = tuple(_asking(one, name, frozenset(against)) for one in bare.skills)
     return Playable(replace(bare, resources=(*bare.resources, data), skills=skills), name)
 

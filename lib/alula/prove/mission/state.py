@@ -93,7 +93,7 @@ class Event(NamedTuple):
         state: of a refused request.
         source: the state that a resource was in.
         leaf: that of the execution.
-        failure: something fails: a result that is a failure, a refusal that no resource explains, an arrow that can break an invariant.
+        failure: something fails: a result that is a failure, a refusal that no resource explains, a transition that can break an invariant.
         ended: the executions that end in the step, by ``result`` or because an invariant of theirs broke.
         changes: of resources: (resource, source, target).
         started: in a tick: the leaves whose skills the tree asks for.

@@ -13,7 +13,8 @@ steps. A tick has one step for each way in which it can go: ``Event.choices`` sa
 is large enough, what a node of the robot's own answers). A mission that is over takes no more ticks; what still runs comes to
 its end, and nothing else happens.
 
-``Failures`` says what may fail. Which arrows are failures (``Event.failure``) follows from the models: those that can break an invariant.
+``Failures`` says what may fail. Which transitions are failures (``Event.failure``)
+follows from the models: those that can break an invariant.
 """
 
 from __future__ import annotations

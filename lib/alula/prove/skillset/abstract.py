@@ -8,7 +8,7 @@ from __future__ import annotations
 from collections.abc import Callable, Iterator, Mapping
 from dataclasses import dataclass, replace
 
-from alula.language.outside import Arrow
+from alula.language.outside import NamedTransition
 from alula.model.deadlines import waits
 from alula.model.expressions import TRUE, And, Atom, Constant, DataIs, Expression, Implies, Not, Or, ResourceIs, atoms
 from alula.model.model import Invariant, Precondition, Skill, Skillset
@@ -22,15 +22,15 @@ class Abstraction(OverApproximation):
     """The over-approximation of a skillset, as exact as a solver can tell what some data fulfil.
 
     ``births`` tell when an invariant over data may be false right after the start: ``when`` is asked before it. ``outside`` are the
-    arrows (resource, source, target) that nothing in the model takes.
+    transitions (resource, source, target) that nothing in the model takes.
     """
 
     solver: Solver
     births: tuple[Breaker, ...] = ()
-    outside: frozenset[Arrow] = frozenset()
+    outside: frozenset[NamedTransition] = frozenset()
 
 
-def without_data(skillset: Skillset, deadline: Deadline, outside: frozenset[Arrow] = frozenset()) -> Abstraction:
+def without_data(skillset: Skillset, deadline: Deadline, outside: frozenset[NamedTransition] = frozenset()) -> Abstraction:
     """Return the skillset for the search; the preconditions of a skill are one."""
     solver = Solver(skillset, deadline)
     possibly = _Possibly(solver)

@@ -14,9 +14,9 @@ from collections.abc import Iterable, Mapping
 from dataclasses import dataclass, field
 from typing import Any
 
-from alula.model.arrows import origins, targets_of
 from alula.model.expressions import And, Constant, Expression, Implies, Not, Or, ResourceIs, SkillRuns
 from alula.model.model import Effect, Skillset
+from alula.model.transitions import origins, targets_of
 
 ENDED = "ended"
 """A variable to tell, where it matters, the steps that end a certain skill."""
@@ -118,7 +118,7 @@ class Encoded:
     def applies(self, effect: Effect, *, by_event: bool = False) -> Any:
         """Return the situations in which every change of an effect is possible."""
         return self.all_of(
-            self.any_of(self.is_state(name, source) for source in origins(self.skillset.resource(name), targets, any_arrow=by_event))
+            self.any_of(self.is_state(name, source) for source in origins(self.skillset.resource(name), targets, any_transition=by_event))
             for name, targets in targets_of(effect).items()
         )
 

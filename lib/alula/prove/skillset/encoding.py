@@ -49,9 +49,9 @@ def encode(abstraction: Abstraction, copies: int, deadline: Deadline) -> Encoded
 def _extern_steps(model: Encoded, resource: Resource, deadline: Deadline) -> None:
     """Add what the functional layer may do to a resource."""
     sources: dict[str, list[str]] = {}
-    for arrow in resource.transitions:
-        if arrow.extern and arrow.source != arrow.target:
-            sources.setdefault(arrow.target, []).append(arrow.source)
+    for transition in resource.transitions:
+        if transition.extern and transition.source != transition.target:
+            sources.setdefault(transition.target, []).append(transition.source)
     for target, origins in sources.items():
         deadline.check()
         guard = model.any_of(model.is_state(resource.name, source) for source in origins)

@@ -60,9 +60,9 @@ class _Function(SkillHooks):
 
 def play(skillset: Skillset, counterexample: Counterexample, make_world: MakeWorld = virtual_world) -> list[PlayedStep]:
     """Play a counterexample from its first step on; stop after the first step with a difference."""
-    arrows = _from_outside(counterexample)
-    # Managers refuse what is not extern; arrows that the counterexample has taken from outside are, in this play.
-    played_model = _without_parameters(opened(skillset, arrows) if arrows else skillset)
+    transitions = _from_outside(counterexample)
+    # Managers refuse what is not extern; transitions that the counterexample has taken from outside are, in this play.
+    played_model = _without_parameters(opened(skillset, transitions) if transitions else skillset)
     functions = {skill.name: _Function() for skill in skillset.skills}
     played: list[PlayedStep] = []
     with make_world(played_model, functions) as world:
@@ -216,6 +216,6 @@ def _without_parameters(skillset: Skillset) -> Skillset:
 
 
 def _from_outside(counterexample: Counterexample) -> frozenset[tuple[str, str, str]]:
-    """Return the arrows that nothing in the model takes and the counterexample has taken."""
+    """Return the transitions that nothing in the model takes and the counterexample has taken."""
     changes = [(step.changes[0], step.subject) for step in counterexample.steps if step.kind is Kind.OUTSIDE]
     return frozenset((change.resource, change.source, change.target) for change, _ in changes)

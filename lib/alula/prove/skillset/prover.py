@@ -6,7 +6,7 @@ from collections.abc import Callable
 from dataclasses import dataclass, replace
 
 from alula.language.errors import Diagnostic, Severity
-from alula.language.outside import Arrow, opened, untaken
+from alula.language.outside import NamedTransition, opened, untaken
 from alula.model.model import Skillset
 from alula.prove.limits import Deadline, OutOfTimeError
 from alula.prove.skillset import explicit
@@ -62,7 +62,7 @@ class _Search:
     most: int
     copies: int
 
-    def findings(self, outside: frozenset[Arrow] = frozenset()) -> list[Diagnostic]:
+    def findings(self, outside: frozenset[NamedTransition] = frozenset()) -> list[Diagnostic]:
         """Return all global findings, where these transitions are made from outside as well."""
         skillset = opened(self.skillset, outside) if outside else self.skillset
         abstraction = without_data(skillset, self.deadline, outside)
@@ -90,11 +90,11 @@ class _Search:
     def open_findings(self) -> list[Diagnostic]:
         """Return the findings of the model alone, and the errors that transitions which nothing makes lead to."""
         findings = self.findings()
-        arrows = untaken(self.skillset)
-        if not arrows:
+        transitions = untaken(self.skillset)
+        if not transitions:
             return findings
         known = {(f.code, f.span) for f in findings if f.severity is Severity.ERROR}
-        errors = [_from_outside(f) for f in self.findings(arrows) if f.severity is Severity.ERROR and (f.code, f.span) not in known]
+        errors = [_from_outside(f) for f in self.findings(transitions) if f.severity is Severity.ERROR and (f.code, f.span) not in known]
         shown = {(f.code, f.span) for f in errors}
         return [f for f in findings if (f.code, f.span) not in shown] + errors
 

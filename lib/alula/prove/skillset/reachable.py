@@ -65,8 +65,8 @@ def unreachable_states(skillset: Skillset, seen: list[set[str]]) -> list[Diagnos
     """Return ALU521 for states that a path of transitions leads to, but no execution."""
     findings = []
     for resource, states in zip(skillset.resources, seen, strict=True):
-        by_arrows = resource.reachable()
-        missing = [state for state in resource.states if state not in states and state in by_arrows]
+        by_transitions = resource.reachable()
+        missing = [state for state in resource.states if state not in states and state in by_transitions]
         if missing:
             more = f" and {len(missing) - MANY} more" if len(missing) > MANY else ""
             names = ", ".join(f"`{state}`" for state in missing[:MANY])

@@ -9,10 +9,10 @@ from typing import Any
 
 import z3
 
-from alula.model.arrows import origins, targets_of
 from alula.model.expressions import And, Comparison, Constant, DataIs, Expression, Implies, Not, Or, ResourceIs, SkillRuns
 from alula.model.model import Effect, Skillset
 from alula.model.ros_types import INTEGER_RANGES
+from alula.model.transitions import origins, targets_of
 from alula.model.units import UNIT_IN_SI
 from alula.prove.limits import Deadline, OutOfTimeError
 
@@ -114,7 +114,9 @@ class Solver:
     def applies(self, effect: Effect, *, by_event: bool = False) -> Any:
         """Return that every change of an effect is possible now."""
         possible = [
-            z3.Or(self.constant(value=False), *(self.state_is(name, source) for source in origins(resource, targets, any_arrow=by_event)))
+            z3.Or(
+                self.constant(value=False), *(self.state_is(name, source) for source in origins(resource, targets, any_transition=by_event))
+            )
             for name, targets in targets_of(effect).items()
             for resource in [self._resources[name]]
         ]

@@ -159,8 +159,8 @@ class TransitionSystem:
 
     def _kind(self, situation: Situation, stimulus: Stimulus) -> StepKind:
         if stimulus.cause is Cause.EXTERN and self.abstraction.outside:
-            arrow = stimulus.name, situation.states[stimulus.name], stimulus.target
-            return StepKind.OUTSIDE if arrow in self.abstraction.outside else StepKind.EXTERN
+            transition = stimulus.name, situation.states[stimulus.name], stimulus.target
+            return StepKind.OUTSIDE if transition in self.abstraction.outside else StepKind.EXTERN
         return _KINDS[stimulus.cause]
 
     # --- faults ---------------------------------------------------------------------------------------------------

@@ -75,7 +75,7 @@ def breaking_states(skillset: Skillset) -> Iterator[str]:
 
 def _reported(skillset: Skillset) -> Iterator[tuple[Resource, str]]:
     for resource in skillset.resources:
-        targets = dict.fromkeys(arrow.target for arrow in resource.transitions if arrow.extern)
+        targets = dict.fromkeys(transition.target for transition in resource.transitions if transition.extern)
         yield from ((resource, state) for state in targets)
 
 

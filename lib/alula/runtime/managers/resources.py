@@ -72,7 +72,7 @@ class ResourceManager:
 
     def doubt(self, reason: str) -> None:
         """Give all resources that only skills set a reason for doubting their states; "": there is none any more."""
-        owned = [one.name for one in self._engine.skillset.resources if not any(arrow.extern for arrow in one.transitions)]
+        owned = [one.name for one in self._engine.skillset.resources if not any(transition.extern for transition in one.transitions)]
         with self._lock:
             self._latest |= {name: replace(self._latest[name], reason=reason) for name in owned}
             if owned:

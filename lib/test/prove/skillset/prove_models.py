@@ -37,9 +37,9 @@ def _resources(draw, most):
     made = []
     for name in RESOURCES[: draw(st.integers(1, most))]:
         states = ("A", "B", "C")[: draw(st.integers(2, 3))]
-        arrow = st.builds(Transition, st.sampled_from(states), st.sampled_from(states), st.booleans())
-        arrows = draw(st.lists(arrow, min_size=2, max_size=6, unique_by=lambda t: (t.source, t.target, t.extern)))
-        made.append(Resource(name, states, states[0], tuple(arrows)))
+        transition = st.builds(Transition, st.sampled_from(states), st.sampled_from(states), st.booleans())
+        transitions = draw(st.lists(transition, min_size=2, max_size=6, unique_by=lambda t: (t.source, t.target, t.extern)))
+        made.append(Resource(name, states, states[0], tuple(transitions)))
     return tuple(made)
 
 
@@ -61,7 +61,7 @@ def condition(draw, leaf, depth=2):
 
 
 def _effect(draw, resources, *, possible=False):
-    """A change or two; with ``possible`` each to a state that some arrow for skills leads to."""
+    """A change or two; with ``possible`` each to a state that some transition for skills leads to."""
     aims = {r.name: [t.target for t in r.transitions if not t.extern] if possible else r.states for r in resources}
     names = sorted(name for name, states in aims.items() if states)
     chosen = draw(st.lists(st.sampled_from(names), max_size=2, unique=draw(st.booleans()))) if names else []

@@ -334,7 +334,7 @@ def fits(skillset, effect, states):
     states = dict(states)
     for change in effect.assignments:
         source = states[change.resource]
-        if source != change.target and not skillset.resource(change.resource).has_arrow(source, change.target, extern=False):
+        if source != change.target and not skillset.resource(change.resource).has_transition(source, change.target, extern=False):
             return False
         states[change.resource] = change.target
     return True

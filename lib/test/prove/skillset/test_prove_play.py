@@ -26,7 +26,7 @@ def test_every_counterexample_of_the_page_plays(code, tmp_path):
 
 
 @pytest.mark.parametrize("text", [DATA, OUTSIDE], ids=["data and time", "from outside"])
-def test_counterexamples_with_data_time_and_arrows_from_outside_play(text, tmp_path):
+def test_counterexamples_with_data_time_and_transitions_from_outside_play(text, tmp_path):
     skillset, findings = counterexamples(tmp_path / "example.rl", text)
     assert findings
     for finding in findings:
