@@ -5,7 +5,7 @@
         happens: [1 per 500 h, 0.2 % at departure]       # also `1 to 3 per 1000 h`, `0.01 per use of video.stream`, `never`
         lasts: 30 s                                     # also `10 to 60 s`, `for ever`
         source: maker's data sheet, table 3
-    arrows:                                             # of the functional layer, that are nobody's fault
+    transitions:                                        # of the functional layer, that are nobody's fault
       navigation.homepoint_status INVALID: {happens: never, source: "an autopilot that has a home keeps it"}
     skills:
       navigation.goto:
@@ -32,7 +32,7 @@ from alula.model.model import Skill, Skillset
 from alula.odds.errors import OddsError
 from alula.odds.figures import ANY_RATE, NEVER, FaultFigures, Figures, Range, SkillFigures, corners
 from alula.odds.system import DEPARTURE
-from alula.records.causes.fault_file import ARROWS, EFFECTS, FIGURES, ODDS, PARTS, SECTIONS
+from alula.records.causes.fault_file import EFFECTS, FIGURES, ODDS, PARTS, SECTIONS, TRANSITIONS
 
 SECONDS = {"ms": Fraction(1, 1000), "s": Fraction(1), "min": Fraction(60), "h": Fraction(3600), "d": Fraction(86400)}
 OF_SKILL = ("results", "lasts", "fails", "progress", "source")
@@ -64,10 +64,10 @@ def load_figures(path: Path, skillsets: Sequence[Skillset]) -> Figures:
     for section in EFFECTS:
         for name, part in sections[section].entries(f"`{section}`").items() if section in sections else ():
             faults[name] = _fault(part, name, skills)
-    arrows = {f"{of.name}.{one.name} {state}" for of in skillsets for one in of.resources for state in one.states}
-    for name, part in sections[ARROWS].entries("`arrows`").items() if ARROWS in sections else ():
-        if name not in arrows:
-            raise part.wrong(f"there is no state `{name}` of a resource; there are {choices(name, arrows)}")
+    entered = {f"{of.name}.{one.name} {state}" for of in skillsets for one in of.resources for state in one.states}
+    for name, part in sections[TRANSITIONS].entries(f"`{TRANSITIONS}`").items() if TRANSITIONS in sections else ():
+        if name not in entered:
+            raise part.wrong(f"there is no state `{name}` of a resource; there are {choices(name, entered)}")
         faults[name] = _fault(part, name, skills)
     known = sections[FIGURES].entries("`skills`") if FIGURES in sections else {}
     for name, part in known.items():

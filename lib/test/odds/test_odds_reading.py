@@ -73,7 +73,7 @@ def test_what_reads_effects_reads_the_same_file(tmp_path: Path) -> None:
     ("text", "place", "complaint"),
     [
         ("faults:\n  zed: {happens: 1 per 500 h}", "2:18", "`happens` of `zed` is a figure: say where it comes from, as `source: flights"),
-        ("arrows:\n  video.link GONE: {}", "2:20", "there is no state `video.link GONE` of a resource; there are"),
+        ("transitions:\n  video.link GONE: {}", "2:20", "there is no state `video.link GONE` of a resource; there are"),
         ("faults:\n  zed: {happens: often, source: x}", "2:18", "`often` should be as `1 per 500 h` or `1 to 3 per 1000 h`, `0.01 per use"),
         ("faults:\n  zed: {happens: 0.1, source: x}", "2:18", "`0.1` should be as `1 per 500 h`"),
         ("faults:\n  zed: {happens: 1 per 0 h, source: x}", "2:18", "`1 per 0 h`: no time has no rate"),

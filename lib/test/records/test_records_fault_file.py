@@ -53,7 +53,7 @@ def test_the_example_of_the_page_is_right(tmp_path):
 @pytest.mark.parametrize(
     ("text", "line", "complaint"),
     [
-        ("fault: {}", 1, "a file of faults has no `fault`; it may have faults, processes, arrows, skills (did you mean `faults`?)"),
+        ("fault: {}", 1, "a file of faults has no `fault`; it may have faults, processes, transitions, skills (did you mean `faults`?)"),
         (
             "faults:\n  zed: {state: {}}",
             2,

@@ -15,8 +15,8 @@ from alula.records.causes.effects import EffectsByFault, FaultEffects
 from alula.records.errors import AnalysisError
 from alula.records.models import members, robot_skillsets
 
-EFFECTS, ARROWS, FIGURES = ("faults", "processes"), "arrows", "skills"
-SECTIONS = (*EFFECTS, ARROWS, FIGURES)
+EFFECTS, TRANSITIONS, FIGURES = ("faults", "processes"), "transitions", "skills"
+SECTIONS = (*EFFECTS, TRANSITIONS, FIGURES)
 PARTS = ("states", "later", "ends", "told")
 ODDS = ("happens", "lasts", "source")
 """What an entry says besides about how often it comes: `alula.odds.reading` reads it, and the section of figures."""
