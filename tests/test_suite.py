@@ -144,8 +144,8 @@ PLACES = {
     "across the rooms": "tests/test_manifests.py",
     "early ends and the rover": "tests/test_endings.py",
     "flights": "tests/test_flights.py",
-    "missions": "lib/test/trees",
     "proofs": "lib/test/prove/skillset",
+    "missions": "lib/test/trees",
     "repairs and campaigns": "lib/test/repair/test_repair_words.py",
     "library": "lib/test/model",
 }
