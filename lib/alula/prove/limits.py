@@ -20,6 +20,10 @@ class OutOfTimeError(AlulaError):
     """The time given is over."""
 
 
+def _now_s() -> float:
+    return time.monotonic()
+
+
 @dataclass
 class Deadline:
     """A moment on the monotonic clock, seconds; ``given_s`` is what the user allowed.
@@ -31,13 +35,13 @@ class Deadline:
     given_s: float
     tell: Callable[[str], None] | None = None
     doing: str = ""
-    _begun_s: float = field(default_factory=time.monotonic)
-    _told_s: float = field(default_factory=time.monotonic)
+    _begun_s: float = field(default_factory=_now_s)
+    _told_s: float = field(default_factory=_now_s)
 
     @classmethod
     def after(cls, given_s: float, tell: Callable[[str], None] | None = None) -> Deadline:
         """Return the moment so many seconds from now."""
-        return cls(time.monotonic() + given_s, given_s, tell)
+        return cls(_now_s() + given_s, given_s, tell)
 
     def half(self, doing: str) -> Deadline:
         """Return the moment in the middle of what is left, for something else that is being done."""
@@ -45,15 +49,15 @@ class Deadline:
 
     def left_s(self) -> float:
         """Return the seconds that are left, never below zero."""
-        return max(0.0, self.at_s - time.monotonic())
+        return max(0.0, self.at_s - _now_s())
 
     def a_second(self, count: int) -> float:
         """Return how many that are in each second since the beginning."""
-        return count / max(time.monotonic() - self._begun_s, 1e-3)
+        return count / max(_now_s() - self._begun_s, 1e-3)
 
     def check(self) -> None:
         """Raise OutOfTimeError when the moment has passed."""
-        now_s = time.monotonic()
+        now_s = _now_s()
         if now_s > self.at_s:
             raise OutOfTimeError
         if self.tell is not None and now_s - self._told_s >= EVERY_S:
