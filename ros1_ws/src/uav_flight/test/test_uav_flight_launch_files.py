@@ -43,6 +43,14 @@ def test_simulated_time_waits_only_for_nodes_that_the_scenario_starts(scenario: 
 
 
 @pytest.mark.parametrize("scenario", scenario_names())
+def test_simulated_time_waits_for_no_manager_and_no_mission_that_come_and_go(scenario: str, tmp_path: Path) -> None:
+    config = launched(scenario, tmp_path, "decision:=false", "lockstep:=false")
+    paced = {word.split("/")[1] for word in config.params["/uav_simulator/pace_topics"].value.split(",")}
+    assert paced <= {node.name for node in config.nodes}
+    assert "uav_guidance" in paced
+
+
+@pytest.mark.parametrize("scenario", scenario_names())
 def test_processes_that_can_be_made_to_fail_are_nodes(scenario: str, tmp_path: Path) -> None:
     nodes = {node.name for node in launched(scenario, tmp_path).nodes}
     assert set(dict(load_scenario(scenario).processes).values()) <= nodes
