@@ -302,3 +302,30 @@ def test_a_post_is_an_obstacle_to_a_dense_sensor(across_m, away_m, around) -> No
     found = look(sweep(dome(cloud, 0) if around else cloud), crab(), VehicleMotion(velocity_enu_m_s=(1.0, 0.0, 0.0)))
     assert found is not None
     assert found.distance_m == pytest.approx(away_m, abs=0.1)
+
+
+def in_dust(cloud: np.ndarray, share: float, seed: int, *, half_deg: float = 30.0) -> np.ndarray:
+    """Return a sweep with a share of the rays ahead ended between 3 and 6 m, or before what is nearer."""
+    rng = np.random.default_rng([seed, 1])
+    way = cloud @ T_BASE_LIDAR[:3, :3].T
+    ranges, dust = np.linalg.norm(way, axis=1), rng.uniform(3.0, 6.0, len(way))
+    hit = (rng.random(len(way)) < share) & (np.abs(np.degrees(np.arctan2(way[:, 1], way[:, 0]))) < half_deg) & (dust < ranges)
+    return np.where(hit[:, None], cloud * (dust / ranges)[:, None], cloud).astype(np.float32)
+
+
+@pytest.mark.parametrize("share", [0.1, 0.3])
+@pytest.mark.parametrize("half_deg", [6.0, 30.0])
+def test_dust_ahead_is_no_obstacle_and_no_free_way(share, half_deg) -> None:
+    forwards = VehicleMotion(velocity_enu_m_s=(1.0, 0.0, 0.0))
+    for seed in range(4):
+        found = ahead(sweep(in_dust(dense_street(0, seed), share, seed, half_deg=half_deg)), crab(), forwards)
+        assert found.nearest is None
+        assert "m ahead stand alone in the air: rain, dust or snow" in found.unknown
+
+
+def test_what_is_solid_is_an_obstacle_also_in_dust() -> None:
+    forwards = VehicleMotion(velocity_enu_m_s=(1.0, 0.0, 0.0))
+    found = ahead(sweep(in_dust(with_post(dense_street(0, 0), 0.6, 5.0), 0.3, 0)), crab(), forwards)
+    assert found.nearest is not None
+    assert found.nearest.distance_m == pytest.approx(5.0, abs=0.2)
+    assert found.unknown

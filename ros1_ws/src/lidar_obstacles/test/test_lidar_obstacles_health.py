@@ -11,7 +11,7 @@ import pytest
 from scipy.spatial.transform import Rotation
 
 from lidar_obstacles import CloudJudge, LidarSettings
-from perception_core import NS, FaultKind, Sweep, TurnJoiner, Verdict
+from perception_core import NS, FaultKind, Finding, Sweep, TurnJoiner, Verdict
 
 ROOT = Path(__file__).resolve().parents[4]
 DATA = Path(os.environ.get("ALULA_DATA", ROOT.parent / "shared" / "data"))
@@ -158,13 +158,60 @@ def test_noise_stays_a_fault_until_it_ends_or_the_vehicle_has_gone_away() -> Non
     def verdicts(metres_a_sweep: float) -> list[Verdict]:
         judge, found = CloudJudge(LidarSettings().cloud), []
         for k in range(40):
-            points = room(k % 8) if k < 6 else scattered(room(k % 8), 0.3)
+            points = room(k % 8, x=metres_a_sweep * k)
+            points = points if k < 6 else scattered(points, 0.3)
             sweep = Sweep(NS + k * NS // 10, points, np.zeros(len(points), np.float32))
             found.append(judge.finding(sweep, self_m=1.0, position_m=np.array([metres_a_sweep * k, 0.0, 2.0])).verdict)
         return found
 
     assert verdicts(0.0) == [Verdict.OK] * 6 + [Verdict.BROKEN] * 34
     assert verdicts(0.3) == [Verdict.OK] * 6 + [Verdict.BROKEN] * 17 + [Verdict.OK] * 17
+
+
+def judge_drive(change, *, metres_a_sweep=0.1, until=30, begin=10, count=30) -> list[tuple[Finding, Finding]]:
+    """Return what is found of the sweeps of a drive through the hall, and whether they are changed; ``change`` breaks some of them."""
+    judge, found, before = CloudJudge(LidarSettings().cloud), [], room(begin - 1, x=metres_a_sweep * (begin - 1))
+    for k in range(count):
+        points = room(k, x=metres_a_sweep * k)
+        points = change(points, before, k) if begin <= k < until else points[: len(points) - 7 * k]
+        sweep = Sweep(NS + k * NS // 10, points.astype(np.float32), np.zeros(len(points), np.float32))
+        found.append((judge.finding(sweep, self_m=1.0, position_m=np.array([metres_a_sweep * k, 0.0, 2.0])), judge.changed))
+    return found
+
+
+SUDDEN = {
+    "mirrored": lambda points, _, k: points * [1.0, -1.0, 1.0] @ Rotation.from_euler("z", 40, degrees=True).as_matrix(),
+    "turned": lambda points, _, k: points @ Rotation.from_euler("z", 90, degrees=True).as_matrix(),
+    "pitched": lambda points, _, k: points @ Rotation.from_euler("y", 15, degrees=True).as_matrix(),
+    "axes swapped": lambda points, _, k: points[:, [1, 0, 2]],
+}
+
+
+@pytest.mark.parametrize("name", SUDDEN)
+def test_what_is_seen_elsewhere_at_once_is_told_at_the_first_sweep_and_until_it_is_back(name) -> None:
+    found = judge_drive(SUDDEN[name], until=14)
+    changed = [not (finding.ok and other.ok) for finding, other in found]
+    assert changed == [False] * 10 + [True] * 4 + [False] * 16
+    assert "of the view changed by more than 0.6 m from one sweep to the next: its mount" in found[10][1].reason
+
+
+def test_what_has_changed_at_once_is_forgotten_5_m_away() -> None:
+    found = judge_drive(SUDDEN["turned"], metres_a_sweep=0.2, until=99, count=50)
+    changed = [not other.ok for _, other in found]
+    assert changed == [False] * 10 + [True] * 24 + [False] * 16
+
+
+REPEATING = {
+    "in another order": lambda _, before, k: np.random.default_rng(k).permutation(before),
+    "two in turns": lambda _, before, k: room(8 + k % 2, x=0.1 * (8 + k % 2)),
+}
+
+
+@pytest.mark.parametrize("name", REPEATING)
+def test_sweeps_that_repeat_are_frozen(name) -> None:
+    found = judge_drive(REPEATING[name])
+    assert all(finding.ok and other.ok for finding, other in found[:10])
+    assert {finding.fault for finding, _ in found[12:]} == {FaultKind.FROZEN}
 
 
 def test_turning_at_90_degrees_a_second_and_flying_out_of_the_hall_is_no_fault() -> None:

@@ -29,6 +29,13 @@ VIEW_DEG = 10.0  # the sensor sees the way ahead if it has returns from all part
 VIEW_PARTS = 4  # a gap of ten degrees leaves one of them empty, wherever it begins
 LEVEL_DEG = 15.0  # above and below the way: of a sensor that looks further up and down, what it sees there counts for no place ahead
 SOLID_SHARE = 0.02  # of the level returns in the view of the way ahead; half a metre of a cable of 1 cm that is 1 m away has 0.029
+FILLED_SHARE = 0.25  # ... where the nearest returns stand alone: half a metre that is filled has 1.4
+SCATTERED_M = 8.0  # from the sensor; farther away a thing has few returns beside each other
+PLACE_M, BESIDE_RAD = 0.5, np.radians(1.0)  # around the nearest returns, and the directions beside these
+SOLID_S = 1.0  # for so long what was side by side counts as solid
+SEEDS, NEIGHBOURS, ALIKE_M = 24, 6, 0.25  # returns that are looked at, those next to them in direction, and how near their ranges are
+MOST_ALONE, IN_LINE_M = 0.5, 0.04  # share of returns that have none beside them; deviation from a line, as a cable's
+AIR = "rain, dust or snow, or the light of another LiDAR"
 STEEP_DEG = 60.0  # ... that are not below or above the vehicle
 ASIDE_DEG = 20.0  # from the way ahead to the middle of a sector that lost its returns; an obstacle at 4 m may be as far aside
 
@@ -61,6 +68,7 @@ class LidarAhead:
     def __init__(self, settings: LidarAheadSettings) -> None:
         self._settings = settings
         self._ground = GroundModel(settings.ground)
+        self._solid: tuple[int, Floats] | None = None  # when and where the nearest returns were side by side
 
     def look(
         self,
@@ -82,7 +90,11 @@ class LidarAhead:
         direction = direction_of_motion(position, pose[:3, 0], motion)
         around = self._around(sweep, pose, T_base_lidar, direction)
         support = _support(settings.support, around.level)
-        nearest = self._nearest(deskew(around.near, poses, T_base_lidar, position), position, direction, support)
+        near = deskew(around.near, poses, T_base_lidar, position)
+        nearest = self._nearest(near, position, direction, support)
+        if nearest is not None and not self._is_solid(nearest, around, direction, position, sweep.end_ns):
+            told = f"the returns {nearest.distance_m:.1f} m ahead stand alone in the air: {AIR}"
+            return Ahead(self._nearest(near, position, direction, replace(support, points_at_1_m=FILLED_SHARE * around.level)), told)
         if around.ahead.min() < settings.min_ahead:
             return Ahead(nearest, _not_seen(around.ahead))
         if around.down < settings.min_ahead:
@@ -90,6 +102,18 @@ class LidarAhead:
         if gone is not None and _towards(direction @ pose[:3, :3] @ T_base_lidar[:3, :3], gone):
             return Ahead(nearest, "the LiDAR has just lost its returns from where the vehicle goes")
         return Ahead(nearest)
+
+    def _is_solid(self, nearest: Nearest, around: _Around, direction: Floats, position: Floats, stamp_ns: int) -> bool:
+        """Return whether the nearest returns are side by side; what was solid a moment ago is not looked at again."""
+        place = np.array(nearest.point_enu_m)
+        if self._solid is not None:
+            then_ns, there = self._solid
+            if 0 <= stamp_ns - then_ns <= SOLID_S * NS and np.linalg.norm(place - there) < PLACE_M:
+                return True
+        if around.scattered(_along(direction) @ (place - position)):
+            return False
+        self._solid = (stamp_ns, place)
+        return True
 
     def _nearest(self, points: NDArray[np.float32], position: Floats, direction: Floats, support: Support) -> Nearest | None:
         """Return the nearest obstacle among points in the map's axes, (N, 3) metres from the vehicle."""
@@ -120,6 +144,8 @@ class LidarAhead:
             ahead=_parts_of_view(of_ahead, of_left),
             down=int(np.count_nonzero(down)),
             level=int(np.count_nonzero(np.abs(of_up) <= np.tan(np.radians(LEVEL_DEG)) * np.hypot(of_ahead, of_left))),
+            seen=seen,
+            sensor=sensor,
         )
 
     def _others(self, chosen: NDArray[np.intp], by_axis: NDArray[np.float32], T_base_lidar: Floats) -> NDArray[np.intp]:  # noqa: N803
@@ -158,12 +184,50 @@ class _Around:
         ahead: how many come from each part of its view, from right to left, (VIEW_PARTS,).
         down: how many of the view come from below the way.
         level: how many of the view come from no more than LEVEL_DEG above or below it.
+        seen: where all points of the sweep are from the vehicle, by one pose, (3, N) ahead, to the left and up.
+        sensor: where that is from the vehicle, (3,).
     """
 
     near: Sweep
     ahead: NDArray[np.intp]
     down: int
     level: int
+    seen: NDArray[np.float32]
+    sensor: Floats
+
+    def scattered(self, place: Floats) -> bool:
+        """Return whether most returns at a place (3,) are at another range than those next to them in direction, and in no line.
+
+        Rays that hit a thing end beside each other, or along it; a drop, a grain of dust or a foreign pulse ends one of them.
+        """
+        towards = place - self.sensor
+        away_m = float(np.linalg.norm(towards))
+        if away_m > SCATTERED_M:
+            return False
+        # From above first, which leaves a tenth of the sweep.
+        level_m = max(float(np.hypot(*towards[:2])), NOTHING_M)
+        ahead, left = (np.float32(value) for value in towards[:2] / level_m)
+        x, y = self.seen[0] - np.float32(self.sensor[0]), self.seen[1] - np.float32(self.sensor[1])
+        half = np.float32(PLACE_M / level_m + np.tan(BESIDE_RAD))
+        window = np.flatnonzero(np.abs(ahead * y - left * x) <= half * (ahead * x + left * y))
+        rays = self.seen.take(window, axis=1) - self.sensor.astype(np.float32)[:, None]
+        ranges = np.sqrt(np.einsum("ij,ij->j", rays, rays))
+        beside = (towards / away_m).astype(np.float32) @ rays > np.cos(np.arctan(PLACE_M / away_m) + BESIDE_RAD) * ranges
+        rays, ranges = rays[:, beside], ranges[beside]
+        of_place = np.flatnonzero(np.linalg.norm(rays - towards.astype(np.float32)[:, None], axis=0) < PLACE_M)
+        if len(of_place) <= 2 or len(ranges) <= NEIGHBOURS:
+            return False
+        across_m = np.linalg.svd((rays[:, of_place] - rays[:, of_place].mean(axis=1, keepdims=True)).astype(np.float64), compute_uv=False)[
+            1
+        ]
+        if across_m < IN_LINE_M * np.sqrt(len(of_place)):
+            return False
+        seeds = of_place[:: -(-len(of_place) // SEEDS)]
+        directions = rays / np.maximum(ranges, np.float32(NOTHING_M))
+        cosines = directions[:, seeds].T @ directions
+        nearby = np.argpartition(-cosines, NEIGHBOURS, axis=1)[:, : NEIGHBOURS + 1]
+        alike = np.abs(ranges[nearby] - ranges[seeds, None]) < ALIKE_M
+        return bool(np.mean(np.count_nonzero(alike, axis=1) <= 1) > MOST_ALONE)
 
 
 def _parts_of_view(ahead: NDArray[np.float32], left: NDArray[np.float32]) -> NDArray[np.intp]:

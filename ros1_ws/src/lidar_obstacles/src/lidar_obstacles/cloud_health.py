@@ -10,7 +10,8 @@ import numpy as np
 
 from lidar_obstacles.range_gates import RangeGates
 from lidar_obstacles.range_noise import Neighbours, RangeNoise, Specks
-from lidar_obstacles.range_steps import RangeSteps, Seen
+from lidar_obstacles.range_steps import FEW, RangeSteps, Seen
+from lidar_obstacles.sudden_changes import SuddenChange
 from perception_core import FINE, NS, FaultKind, Finding, Sweep, broken, unsure
 
 if TYPE_CHECKING:
@@ -32,6 +33,7 @@ BLIND_RETURNS = 5  # of the sample: with as many, a sector is not blind
 NO_UNIT_M = 1e7  # a range beyond is none in millimetres either
 UNITS = "the coordinates are in millimetres or centimetres", "the fields are at other places"
 BYTES = "the order of the bytes (is_bigendian) is another one", "the fields are at other places"
+REPEATED_OF, SAME = 4, 1e-9  # sweeps that may come again; metres, and share of the sums: noise changes these by millimetres at least
 FROZEN_SHARE = 0.9  # of the points, at the same place to the last bit
 
 
@@ -79,6 +81,8 @@ class CloudJudge:
         self._specks = Specks()
         self._gates = RangeGates()
         self._steps = RangeSteps(limits.max_speed_m_s)
+        self._changes = SuddenChange()
+        self._repeats = Repeats()
         self._turned_rad = 0.0
         self._gone_ns: NDArray[np.int64] = np.full(SECTORS, LONG_AGO_NS, dtype=np.int64)
         """By the sectors of a sensor that has not turned."""
@@ -87,13 +91,18 @@ class CloudJudge:
 
         Those that had lost them where the vehicle was before stay in it.
         """
+        self.changed: Finding = FINE
+        """Whether a good sweep sees its surroundings elsewhere than the one before: of less weight than what is found of the mount."""
 
-    def finding(self, sweep: Sweep, *, self_m: float, position_m: Floats | None = None, turned_rad: float = 0.0) -> Finding:
+    def finding(
+        self, sweep: Sweep, *, self_m: float, position_m: Floats | None = None, turned_rad: float = 0.0, tilted_rad: float = 0.0
+    ) -> Finding:
         """Return what the sweep tells; returns nearer than ``self_m`` are the vehicle's own. Its position (3,) is None while unknown.
 
         ``turned_rad``: by how much the sensor has turned about its z axis since the sweep before. What it saw has then moved to other
-        sectors: a vehicle that leans in a gust loses nothing.
+        sectors: a vehicle that leans in a gust loses nothing. ``tilted_rad``: by how much its z axis has turned.
         """
+        self.changed = FINE
         self._turned_rad += turned_rad
         stride = max(1, len(sweep.points) // SAMPLE) | 1  # odd: every second ring, or every 16th, is no sample of a sweep
         sample = np.ascontiguousarray(sweep.points[::stride].T)
@@ -115,6 +124,9 @@ class CloudJudge:
             return far
         if _frozen(sample, previous, returned):
             return broken(FaultKind.FROZEN, "the sweep is the same as the one before", "the driver repeats it", "the sensor hangs")
+        if self._repeats.again(sweep):
+            told = f"the sweep has the points of one of the last {REPEATED_OF}"
+            return broken(FaultKind.FROZEN, told, "the driver repeats it", "an old buffer is sent anew")
         self._looks += 1
         neighbours = Neighbours.of(sweep, self._looks, self_m=self_m)
         noise_m = self._noise.risen_m(neighbours)
@@ -138,6 +150,12 @@ class CloudJudge:
             self._lost_at_m = None
         elif self._lost_at_m is None:
             self._lost_at_m = position_m
+        if finding.ok:
+            # On the ground, and just above it, small motions change all that is seen.
+            above = np.percentile(outside.ranges_m, FEW) > least_m
+            self.changed = self._changes.finding(
+                outside, sweep.stamp_ns, position_m=position_m if above else None, turned_rad=self._turned_rad, tilted_rad=tilted_rad
+            )
         specks = self._specks.share(neighbours)
         if finding.ok and specks:
             return unsure(
@@ -281,6 +299,23 @@ def _frozen(now: NDArray[np.float32], before: NDArray[np.float32], returned: NDA
         return False
     x, y, z = now == before
     return np.count_nonzero(x & y & z & returned) > FROZEN_SHARE * np.count_nonzero(returned)
+
+
+class Repeats:
+    """Know a sweep again by the sums of its points, in whatever order these come; not thread-safe."""
+
+    def __init__(self) -> None:
+        self._lately: deque[NDArray[np.float32]] = deque(maxlen=REPEATED_OF)
+
+    def again(self, sweep: Sweep) -> bool:
+        """Return whether one of the last sweeps had the same points."""
+        alike = [points for points in self._lately if len(points) == len(sweep.points)]
+        self._lately.append(sweep.points)
+        if not alike:
+            return False
+        sums = np.nansum(sweep.points, axis=0, dtype=np.float64)
+        known = bool(np.isfinite(sums).all())
+        return known and any(np.allclose(sums, np.nansum(points, axis=0, dtype=np.float64), rtol=SAME, atol=SAME) for points in alike)
 
 
 def _angles(lost: NDArray[np.bool_]) -> str:

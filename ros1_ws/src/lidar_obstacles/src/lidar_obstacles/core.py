@@ -114,10 +114,11 @@ class LidarObstacles:
         # The moment of the last return: a sweep stamped at its beginning is not a tenth of a second old when it comes.
         stamp = self._health.stamp(sweep.end_ns)
         pose, self_m = self._pose(sweep.end_ns), self._settings.body_radius_m
-        turned_rad = self._turned_rad(pose, frame)
-        content = self._judge.finding(sweep, self_m=self_m, position_m=None if pose is None else pose[:3, 3], turned_rad=turned_rad)
+        turned_rad, tilted_rad = self._turned_rad(pose, frame)
+        position_m = None if pose is None else pose[:3, 3]
+        content = self._judge.finding(sweep, self_m=self_m, position_m=position_m, turned_rad=turned_rad, tilted_rad=tilted_rad)
         mounted = self._mounted(sweep, frame, self_m) if stamp.ok and content.ok else FINE
-        return Judged(sweep, first_trouble(stamp, content, mounted), self._judge.gone)
+        return Judged(sweep, first_trouble(stamp, content, mounted, self._judge.changed), self._judge.gone)
 
     def ahead(self, judged: Judged, frame: str) -> Ahead:
         """Return what a good sweep shows ahead of the vehicle; raise LookupError where its pose or the mount is not known."""
@@ -131,17 +132,17 @@ class LidarObstacles:
             return unsure(FaultKind.CALIBRATION, f"it is not known how the LiDAR is mounted: {error}", *NO_MOUNT)
         return self._mounting.finding(sweep, mount, self.vehicle.poses, self_m=self_m)
 
-    def _turned_rad(self, pose: NDArray[np.float64] | None, frame: str) -> float:
-        """Return by how much the LiDAR has turned about its z axis since the sweep before; 0 where that is not known."""
+    def _turned_rad(self, pose: NDArray[np.float64] | None, frame: str) -> tuple[float, float]:
+        """Return by how much the LiDAR has turned about its z axis since the sweep before, and that axis; 0 where it is not known."""
         before, self._R_map_lidar = self._R_map_lidar, None
         try:
             self._R_map_lidar = None if pose is None else pose[:3, :3] @ self.vehicle.mount(frame)[:3, :3]
         except LookupError:
-            return 0.0
+            return 0.0, 0.0
         if before is None or self._R_map_lidar is None:
-            return 0.0
+            return 0.0, 0.0
         turn = before.T @ self._R_map_lidar
-        return math.atan2(turn[1, 0], turn[0, 0])
+        return math.atan2(turn[1, 0], turn[0, 0]), math.acos(min(1.0, max(-1.0, turn[2, 2])))
 
     def _pose(self, stamp_ns: int) -> NDArray[np.float64] | None:
         try:

@@ -79,7 +79,7 @@ class RangeSteps:
         change all ranges along the rays by much: nothing new is found there. By the vehicle's position (3,) where it is known, else by
         its speed at most, ranges may change.
         """
-        now = _mean_ranges(seen)
+        now = mean_ranges(seen)
         if np.count_nonzero(np.isfinite(now)) < CELLS:
             return self._offset_m
         at_once = (stamp_ns, now, position_m)
@@ -120,9 +120,12 @@ def _step(before_m: Floats, now_m: Floats, *, most_share: float) -> float:
     return step_m if alike or max(low, -high) > most_share else 0.0
 
 
-def _mean_ranges(seen: Seen) -> Floats:
-    """Return the mean range in each cell of directions, (AROUND * UP,), NaN where returns are few."""
-    around = seen.azimuth_rad * np.float32(AROUND / (2.0 * np.pi))
+def mean_ranges(seen: Seen, turned_rad: float = 0.0) -> Floats:
+    """Return the mean range in each cell of directions, (AROUND * UP,), NaN where returns are few.
+
+    The cells are those of a sensor that has not turned by ``turned_rad`` about its z axis.
+    """
+    around = (seen.azimuth_rad + np.float32(turned_rad % (2.0 * np.pi))) * np.float32(AROUND / (2.0 * np.pi))
     up = np.arcsin(np.clip(seen.sine_up, -1.0, 1.0)) * np.float32(UP / np.pi)
     cell = np.floor(around).astype(np.intp) % AROUND * UP + np.clip(np.floor(up + UP / 2), 0, UP - 1).astype(np.intp)
     counts = np.bincount(cell, minlength=AROUND * UP)
