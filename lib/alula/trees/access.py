@@ -97,6 +97,17 @@ class Accesses:
             self._scripts[key] = [] if script is None else list(self._in(wiring.blackboard, script))
         return self._scripts[key]
 
+    def in_scripts(self, wiring: Wiring) -> Iterator[Access]:
+        """Yield those of all scripts of a node, in the order in which these run."""
+        for attribute in scripts_of(wiring.element, wiring.type):
+            yield from self.in_script(wiring, attribute.name)
+
+    def parts(self, wiring: Wiring) -> Iterator[Part]:
+        """Yield the parts of all scripts of a node, in the order in which these run; each before what it is made of."""
+        for attribute in scripts_of(wiring.element, wiring.type):
+            for statement in self._statements(attribute):
+                yield from walk(statement)
+
     def calls(self, wiring: Wiring, attribute: str) -> Iterator[Call]:
         """Yield the calls in the script in an attribute of a node."""
         script = wiring.element.attributes.get(attribute)

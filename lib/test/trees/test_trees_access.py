@@ -20,6 +20,7 @@ from alula.trees.node import Shared
 from alula.trees.node_type import NodeType
 from alula.trees.reading import read_text
 from alula.trees.script import names_in, statements_of
+from alula.trees.script.syntax import Name
 from alula.trees.standard import standard_palette
 from alula.trees.wiring import wire
 
@@ -111,3 +112,16 @@ def test_calls_name_what_they_ask_for() -> None:
     root = wire(files, standard_palette(), "a", Shared(int))
     calls = Accesses(lambda one: statements_of(one.value)).calls(root, "code")
     assert [(one.function, one.named) for one in calls] == [("f", ("b.c",)), ("g", ("d", ""))]
+
+
+def test_all_scripts_of_a_node_are_read_in_the_order_in_which_they_run() -> None:
+    line = '<Script _post="d := 1" code="a := b == c" _skipIf="e"/>'
+    root = wire(
+        read_text(f'<root BTCPP_format="4"><BehaviorTree ID="a">{line}</BehaviorTree></root>'), standard_palette(), "a", Shared(int)
+    )
+    accesses = Accesses(lambda one: statements_of(one.value), None)
+    assert [(one.name, one.write) for one in accesses.in_scripts(root)] == [(name, name in {"a", "d"}) for name in "ebcad"]
+    assert [one.name for one in accesses.parts(root) if isinstance(one, Name)] == ["e", "b", "c", "a", "d"]
+    assert [type(one).__name__ for one in accesses.parts(root) if not isinstance(one, Name)] == [
+        *("Assignment", "Comparison", "Assignment", "Literal"),
+    ]

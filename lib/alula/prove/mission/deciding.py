@@ -7,10 +7,9 @@ from collections.abc import Iterator, Mapping
 from alula.missions.skill_types import OUTCOME_PORT
 from alula.prove.mission.regions import Regions
 from alula.prove.mission.system import System
-from alula.trees.access import Key, named_entries, scripts_of, written_entries
+from alula.trees.access import Key, named_entries, written_entries
 from alula.trees.node import Node
-from alula.trees.script import statements_of
-from alula.trees.script.syntax import Call, Comparison, Literal, Name, walk
+from alula.trees.script.syntax import Call, Comparison, Literal, Name
 from alula.trees.status import Status
 
 Answers = Mapping[int, frozenset[str]]
@@ -69,19 +68,15 @@ def _ends(regions: Regions) -> Mapping[int, frozenset[str]]:
 
 
 def _asked(system: System, node: Node, ends: Mapping[int, frozenset[str]]) -> Iterator[tuple[str, str]]:
-    for attribute in scripts_of(node.wiring.element, node.wiring.type):
-        for part in (part for statement in statements_of(attribute.value) for part in walk(statement)):
-            match part:
-                case Call(function="failed", arguments=(Literal(value=str(end)) | Name(name=end),)):
-                    if not any(end in known for known in ends.values()):
-                        yield f"failed('{end}')", ""
-                case Comparison(operands=(Name(name=entry), Literal(value=str(end))), operators=("==" | "!=",)):
-                    leaves = _writers(system, node.blackboard.where(entry))
-                    if end and leaves and not any(end in ends[leaf] for leaf in leaves):
-                        yield (
-                            f"{entry} {part.operators[0]} '{end}'",
-                            ", ".join(sorted({f"'{system.leaves[leaf].name}'" for leaf in leaves})),
-                        )
+    for part in system.reads.accesses.parts(node.wiring):
+        match part:
+            case Call(function="failed", arguments=(Literal(value=str(end)) | Name(name=end),)):
+                if not any(end in known for known in ends.values()):
+                    yield f"failed('{end}')", ""
+            case Comparison(operands=(Name(name=entry), Literal(value=str(end))), operators=("==" | "!=",)):
+                leaves = _writers(system, node.blackboard.where(entry))
+                if end and leaves and not any(end in ends[leaf] for leaf in leaves):
+                    yield f"{entry} {part.operators[0]} '{end}'", ", ".join(sorted({f"'{system.leaves[leaf].name}'" for leaf in leaves}))
 
 
 def _writers(system: System, entry: Key) -> list[int]:

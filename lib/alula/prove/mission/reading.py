@@ -84,8 +84,7 @@ class Read:
 
     def _skills(self, wiring: Wiring) -> frozenset[str]:
         """Return the skills whose executions a node asks for."""
-        scripts = scripts_of(wiring.element, wiring.type)
-        calls = (call for script in scripts for call in self.accesses.calls(wiring, script.name))
+        calls = (part for part in self.accesses.parts(wiring) if isinstance(part, Call))
         return frozenset(name for call in calls if FUNCTIONS[call.function].kind == "skill" for name in call.named)
 
     def value(self, name: Key, value: object) -> object:

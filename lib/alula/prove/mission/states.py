@@ -16,10 +16,10 @@ from alula.missions.world import states_of
 from alula.model.model import Skillset
 from alula.prove.mission.oracle import Oracle
 from alula.prove.mission.unknown import Distance
-from alula.trees.access import scripts_of, takes_script_from_entry
+from alula.trees.access import Accesses, takes_script_from_entry
 from alula.trees.node import Wiring
 from alula.trees.script import statements_of
-from alula.trees.script.syntax import Call, Comparison, Name, Node, children, walk
+from alula.trees.script.syntax import Comparison, Name
 
 if TYPE_CHECKING:
     from typing import Self  # of Python 3.11
@@ -43,23 +43,14 @@ class Compared:
         nodes = [wiring for root in roots for wiring in root.walk()]
         if any(takes_script_from_entry(one.element, one.type) for one in nodes):
             return cls()
-        texts = (script.value for one in nodes for script in scripts_of(one.element, one.type))
+        accesses = Accesses(lambda script: statements_of(script.value), None)
         named: Counter[str] = Counter(one.type.name for one in nodes)
         compared: Counter[str] = Counter()
-        for program in (program for text in texts for program in statements_of(text)):
-            named.update(one.name for one in _read(program))
-            compared.update(name for one in walk(program) if isinstance(one, Comparison) for name in _compared(one, states))
+        for wiring in nodes:
+            named.update(one.name for one in accesses.in_scripts(wiring))
+            compared.update(name for one in accesses.parts(wiring) if isinstance(one, Comparison) for name in _compared(one, states))
         numbers = {number: name for name, number in states_of(several).items()}
         return cls(frozenset(name for name in states if named[name] == compared[name]), numbers)
-
-
-def _read(node: Node) -> Iterator[Name]:
-    """Yield the names whose values are needed: what a function is asked of is passed on as a name."""
-    if isinstance(node, Name):
-        yield node
-    for child in children(node):
-        if not (isinstance(node, Call) and isinstance(child, Name)):
-            yield from _read(child)
 
 
 def _compared(node: Comparison, states: Mapping[str, frozenset[str]]) -> Iterator[str]:
