@@ -64,6 +64,7 @@ class Accesses:
         self._before: dict[Wiring, list[Access]] = {}
         self._after: dict[Wiring, list[Access]] = {}
         self._scripts: dict[tuple[Wiring, str], list[Access]] = {}
+        self._read: dict[tuple[Wiring, str], Sequence[Part]] = {}
 
     def of(self, wiring: Wiring) -> Iterator[Access]:
         """Yield those of a node and all below it."""
@@ -94,7 +95,7 @@ class Accesses:
         key = (wiring, attribute)
         if key not in self._scripts:
             script = wiring.element.attributes.get(attribute)
-            self._scripts[key] = [] if script is None else list(self._in(wiring.blackboard, script))
+            self._scripts[key] = [] if script is None else list(self._in(wiring, script))
         return self._scripts[key]
 
     def in_scripts(self, wiring: Wiring) -> Iterator[Access]:
@@ -105,13 +106,13 @@ class Accesses:
     def parts(self, wiring: Wiring) -> Iterator[Part]:
         """Yield the parts of all scripts of a node, in the order in which these run; each before what it is made of."""
         for attribute in scripts_of(wiring.element, wiring.type):
-            for statement in self._statements(attribute):
+            for statement in self._statements_in(wiring, attribute):
                 yield from walk(statement)
 
     def calls(self, wiring: Wiring, attribute: str) -> Iterator[Call]:
         """Yield the calls in the script in an attribute of a node."""
         script = wiring.element.attributes.get(attribute)
-        for statement in () if script is None else self._statements(script):
+        for statement in () if script is None else self._statements_in(wiring, script):
             yield from (one for one in walk(statement) if isinstance(one, Call))
 
     def of_node(self, wiring: Wiring) -> Iterator[Access]:
@@ -130,9 +131,15 @@ class Accesses:
             yield from self.in_script(wiring, attribute.name)
         yield from _written_by_ports(wiring)
 
-    def _in(self, board: Blackboard, script: Attribute) -> Iterator[Access]:
-        for statement in self._statements(script):
-            yield from self._part(board, script, statement, sure=True)
+    def _statements_in(self, wiring: Wiring, script: Attribute) -> Sequence[Part]:
+        key = (wiring, script.name)
+        if key not in self._read:
+            self._read[key] = self._statements(script)
+        return self._read[key]
+
+    def _in(self, wiring: Wiring, script: Attribute) -> Iterator[Access]:
+        for statement in self._statements_in(wiring, script):
+            yield from self._part(wiring.blackboard, script, statement, sure=True)
 
     def _is_entry(self, name: str) -> bool:
         return self._names is None or (name not in self._names and "." not in name)
