@@ -45,7 +45,7 @@ class HeightSettings:
     tail: float = 0.8
     drift_walk_m_s: float = 0.0005
     change_m_s: float = 0.01
-    change_gain: float = 6.0
+    change_gain: float = 2.0
     jump_m: float = 0.1
     known_m: float = 0.3
     stay_s: float = 1.0

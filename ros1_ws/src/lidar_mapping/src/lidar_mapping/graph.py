@@ -56,7 +56,7 @@ class GraphSettings:
     loop_fitness: float = 0.7
     autopilot_m: float = 30.0
     tilt_rad: float = 0.012
-    upright_rad: float = 0.01
+    upright_rad: float = 0.005
     begin_rad: float = 0.002
     moved_m: float = 0.02
     submap: int = 6
