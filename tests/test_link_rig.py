@@ -1,4 +1,4 @@
-"""The rover on two computers: what its judge says of where it truly was, and a whole mission with a cut link where that is asked for."""
+"""Robots on two computers: what its judge says of where it truly was, and a whole mission with a cut link where that is asked for."""
 
 from __future__ import annotations
 
@@ -8,11 +8,12 @@ from dataclasses import replace
 import pytest
 from link_rig.__main__ import main
 from link_rig.cases import CASES, run_case
-from link_rig.verdicts import HEAD, End, Fault, Pose, Survived, driving_since, judge, judge_kills
+from link_rig.verdicts import HEAD, End, Fault, Pose, Still, Survived, driving_since, judge, judge_kills
 
 STEP_S = 0.05
 CUT = Fault("link cut for 5 s", 10.0, 15.0, ("link",))
 SURVIVED = End("accomplished", "")
+FLIES = Still(m_s=0.3, rad_s=0.2, flies=True)
 RIG = "ALULA_LINK_RIG"
 """The environment variable that has a whole mission run with a cut link."""
 
@@ -38,7 +39,7 @@ def test_a_rover_that_stops_in_time_and_goes_on_is_told_with_its_times():
     assert verdict.moved_on_s == pytest.approx(2.0, abs=STEP_S)
     assert verdict.stood_s == pytest.approx(5.5, abs=STEP_S)
     assert verdict.went_on_s == pytest.approx(2.5, abs=STEP_S)
-    assert verdict.row == "| link cut for 5 s | 2.0 | 0.5 | 0 | 5.5 | 2.5 | accomplished | - |\n"
+    assert verdict.row == "| link cut for 5 s | 2.0 | 0.5 | 0 | 5.5 | 2.5 | - | accomplished | - |\n"
     assert verdict.row.count("|") == HEAD.splitlines()[0].count("|")
 
 
@@ -83,11 +84,42 @@ def test_missions_that_are_killed_at_have_to_name_what_was_killed_and_the_last_o
     true, false = End("degraded", "the bridge died"), End("given_up", "no map")
     fine = judged(Survived(true, ("bridge",)), Survived(SURVIVED, ()))
     assert (fine.wrong, fine.end) == ((), End("1 accomplished, 1 degraded", "1: the bridge died"))
-    assert fine.row == "| 3 kills | - | 0.5 | 0 | - | - | 1 accomplished, 1 degraded | 1: the bridge died |\n"
+    assert fine.row == "| 3 kills | - | 0.5 | 0 | - | - | - | 1 accomplished, 1 degraded | 1: the bridge died |\n"
     assert judged(Survived(false, ("bridge",)), Survived(SURVIVED, ())).wrong == (
         "mission 1 ended with 'no map', which names none of: bridge",
     )
     assert len(judged(Survived(SURVIVED, ()), Survived(true, ())).wrong) == 1
+
+
+def flown(*legs):
+    """Return the poses of a drone that flies, each for so many seconds: (forwards, upwards, seconds), m/s."""
+    poses, x, z, stamp_s = [], 0.0, 0.0, 0.0
+    for forwards, upwards, lasts_s in legs:
+        for _ in range(round(lasts_s / STEP_S)):
+            poses.append(Pose(100.0 + stamp_s, stamp_s, x, 0.0, 0.0, z))
+            x, z, stamp_s = x + forwards * STEP_S, max(0.0, z + upwards * STEP_S), stamp_s + STEP_S
+    return poses
+
+
+def test_a_drone_that_hovers_and_lands_by_itself_is_supervised():
+    verdict = judged(
+        flown((0.0, 1.0, 3.0), (1.0, 0.0, 9.0), (0.1, 0.0, 8.0), (0.0, -0.5, 7.0)), still=FLIES, fault=replace(CUT, ended_s=40.0)
+    )
+    assert verdict.wrong == ()
+    assert verdict.moved_on_s == pytest.approx(2.0, abs=STEP_S)
+    assert verdict.down_s == pytest.approx(10.0 + 5.4, abs=2 * STEP_S), "at 0.3 m"
+
+
+def test_a_drone_that_climbs_unheard_or_stays_in_the_air_is_wrong():
+    climbs = judged(flown((0.0, 0.0, 12.0), (0.0, 0.5, 6.0), (0.0, -1.0, 6.0)), still=FLIES, beats=[0.5 * n for n in range(21)])
+    assert climbs.moved_on_s == 0.0, "it stood on the ground when the fault came"
+    assert climbs.wrong == (
+        "it moved for 8.0 s while nothing was heard of its managers: 3 s are allowed",
+        "it moved again 3.0 s before the fault's end",
+    )
+    hangs = judged(flown((0.0, 1.0, 3.0), (1.0, 0.0, 9.0), (0.0, 0.0, 9.0)), still=FLIES)
+    assert hangs.wrong == ("it is in the air still",)
+    assert hangs.down_s is None
 
 
 def test_turning_is_moving():

@@ -1,4 +1,4 @@
-"""`tools/link_rig`: a whole mission of the rover on two computers for each case of what goes; prints a row of a Markdown table for each.
+"""`tools/link_rig`: a whole mission of a robot on two computers for each case of what goes; prints a row of a Markdown table for each.
 
 Run it as root, after `alula setup` in examples/rover: `setup/in_ros2 python -m link_rig [--case NAME]... [--keep FOLDER]`, or with
 `--kills MINUTES --seed N`, which kills a process at random each minute. Exit code 1: something is wrong by the simulator's truth; 2: it
@@ -16,14 +16,15 @@ from pathlib import Path
 
 from alula_testing.networks import why_impossible
 from link_rig.cases import CASES, run_case
-from link_rig.computers import ROVER, RigError
+from link_rig.computers import RigError
 from link_rig.kills import run_kills
+from link_rig.robots import ROVER
 from link_rig.verdicts import HEAD, Verdict
 
 
 def main(words: Sequence[str] | None = None) -> int:
     """Run the cases; return the exit code."""
-    parser = argparse.ArgumentParser(prog="link_rig", description="What the rover on two computers does when something goes.")
+    parser = argparse.ArgumentParser(prog="link_rig", description="What a robot on two computers does when something goes.")
     parser.add_argument("--case", action="append", choices=CASES, metavar="NAME", help=f"of {', '.join(CASES)}; repeatable; default: all")
     parser.add_argument("--keep", type=Path, metavar="FOLDER", help="keep there what each case writes (default: nothing is kept)")
     parser.add_argument("--kills", type=int, metavar="MINUTES", help="no case: a process is killed at random each minute, for so long")

@@ -1,9 +1,10 @@
-"""The rover on two computers: its base by plain roslaunch on one, `alula up` and `alula run --on` on the other, and a link that is cut."""
+"""A robot on two computers: its base by plain roslaunch on one, `alula up` and `alula run --on` on the other, and a link that is cut."""
 
 from __future__ import annotations
 
 import json
 import os
+import re
 import subprocess
 from collections.abc import Iterator, Sequence
 from contextlib import contextmanager, suppress
@@ -19,17 +20,14 @@ from alula.common.processes import command_line, node_name, processes_of_run
 from alula_testing.networks import Computer, Network
 from alula_testing.ros1 import end_process
 from alula_testing.waits import until
+from alula_testing.wall_clock import WallClock
+from link_rig.robots import ALULA_ROOT, Robot
 from link_rig.verdicts import End, Pose
 
-ALULA_ROOT = Path(__file__).resolve().parents[2]
-ROVER = ALULA_ROOT / "examples/rover"
-LAUNCH = ROVER / "ros1_ws/src/rover_navigation/launch/functional.launch"
-WORLD = ROVER / "worlds/office.yaml"
-DEAD_MAN = ROVER / "ros1_ws/src/rover_navigation/config/dead_man.yaml"
-SKILLSETS = ("base", "perception", "power", "cargo")
 IN_ROS1 = str(ALULA_ROOT / "setup/in_ros1")
 MASTER_PORT = 11311
 LOOK_S = 0.1
+OFFSET = re.compile(r"master's computer is ([0-9.]+) s (ahead of|behind) ours")
 FOREIGN = ("ROS_", "ALULA_", "PYTHON", "AMENT", "CMAKE")
 """Variables of the caller that begin so are not the computers'."""
 
@@ -39,34 +37,40 @@ class RigError(Exception):
 
 
 class TwoComputers:
-    """The rover's base on one computer and its decision side on the other."""
+    """A robot's base on one computer and its decision side on the other."""
 
-    def __init__(self, network: Network, folder: Path) -> None:
+    def __init__(self, network: Network, robot: Robot, folder: Path) -> None:
         """Take two computers of a network; ``folder`` takes what they write."""
-        self.network, self.folder = network, folder
+        self.network, self.robot, self.folder = network, robot, folder
         self.base, self.decision = network.computer("base"), network.computer("decision")
         self._inside = {one.name: _namespace(_holder(one)) for one in (self.base, self.decision)}  # also told once the holder has died
         self._claim = claim_domain()  # of this machine, as shared memory is
         self._name = f"link_rig_{os.getpid()}"
-        self._deployment = ROVER / f"deployments/{self._name}.yaml"
+        self._deployment = robot.folder / f"deployments/{self._name}.yaml"
         self._processes: list[subprocess.Popen[bytes]] = []
-        self._truth = folder / "truth.jsonl"
-        self._missions = 0
+        self._boots = self._missions = 0
+        self._clock: WallClock | None = None
         self._world = folder / "world.yaml"
-        world = yaml.safe_load(WORLD.read_text(encoding="utf-8"))
-        self._world.write_text(yaml.safe_dump({**world, "rounds": ["corridor_east"]}), encoding="utf-8")
+        world = yaml.safe_load(robot.world.read_text(encoding="utf-8"))
+        self._world.write_text(yaml.safe_dump({**world, **robot.shorter}), encoding="utf-8")
 
     # --- the base's computer -----------------------------------------------------------------------------------------
 
     def start_base(self) -> None:
-        """Start master, simulator and functional layer, and the watch of the truth."""
+        """Start master, simulator and functional layer, and the watch of the truth, which is of this boot alone."""
+        self._boots += 1
+        out = self.folder / f"base{self._boots}"
+        out.mkdir()
         self.start_master()
-        base = self._start("base", self.base, [IN_ROS1, "roslaunch", str(LAUNCH), f"world:={WORLD}"], self._base_environment)
-        watch = Path(__file__).with_name("truth_watch.py")
-        self._start("truth", self.base, [IN_ROS1, "python3", str(watch), str(self._truth)], self._base_environment)
-        until(lambda: self.poses() or base.poll() is not None, f"the rover's simulator tells where it is ({self.folder})", every_s=LOOK_S)
+        words = [IN_ROS1, "roslaunch", str(self.robot.launch), f"world:={self.robot.world}", f"out:={out}"]
+        words += [f"{name}:={value}" for name, value in self.robot.arguments.items()]
+        base = self._start(out.name, self.base, words, self._base_environment)
+        watch = str(Path(__file__).with_name("truth_watch.py"))
+        words = [IN_ROS1, "python3", watch, str(self._truth), "drone" if self.robot.still.flies else "rover", self.robot.moves_by]
+        self._start(f"truth{self._boots}", self.base, words, self._base_environment)
+        until(lambda: self.poses() or base.poll() is not None, f"the simulator tells where it is ({self.folder})", every_s=LOOK_S)
         if base.poll() is not None:
-            raise RigError(f"the base ended with {base.returncode}: {self.folder / 'base.log'}")
+            raise RigError(f"the base ended with {base.returncode}: {self.folder / out.name}.log")
 
     def start_master(self) -> None:
         """Start the ROS master of the base, which knows of no node."""
@@ -84,20 +88,20 @@ class TwoComputers:
     def _base_environment(self) -> dict[str, str]:
         ros1 = self.base.ros1_environment(self.base, port=MASTER_PORT)
         graph = {name: ros1[name] for name in ("ROS_MASTER_URI", "ROS_IP")}
-        return {**self._environment(), "ALULA_ROBOT": str(ROVER), "ROS_HOME": str(self.folder / "ros"), **graph}
+        return {**self._environment(), "ALULA_ROBOT": str(self.robot.folder), "ROS_HOME": str(self.folder / "ros"), **graph}
 
     @property
     def silent_after_s(self) -> float:
         """Return the limit of the base's dead man, simulated seconds."""
-        return float(yaml.safe_load(DEAD_MAN.read_text(encoding="utf-8"))["silent_after_s"])
+        return float(yaml.safe_load(self.robot.dead_man.read_text(encoding="utf-8"))["silent_after_s"])
 
     @property
     def collisions(self) -> int:
-        """Return how often the rover has run into something."""
+        """Return how often it has run into something since its base was started."""
         return max((int(one["collisions"]) for one in self._told() if "collisions" in one), default=0)
 
     def poses(self) -> list[Pose]:
-        """Return where the rover truly was until now."""
+        """Return where it truly was since its base was started."""
         return [Pose(**one) for one in self._told() if "x" in one]
 
     def beats(self) -> list[float]:
@@ -108,6 +112,10 @@ class TwoComputers:
             if "beat" in one:
                 beats.append(now_s)
         return beats
+
+    @property
+    def _truth(self) -> Path:
+        return self.folder / f"truth{self._boots}.jsonl"
 
     def _told(self) -> list[dict[str, Any]]:
         if not self._truth.exists():
@@ -125,8 +133,8 @@ class TwoComputers:
             f"ros1: {{master: 'http://{self.base.address}:{MASTER_PORT}', address: {self.decision.address}}}",
             f"ros2: {{domain: {self._claim.domain}}}",
             "managers:",
-            *(f"  {name}: rover_robot.hooks.{name}:make_hooks" for name in SKILLSETS),
-            "bridge: rover_bridge.yaml",
+            *(f"  {name}: {maker}" for name, maker in self.robot.hooks.items()),
+            f"bridge: {self.robot.bridge}",
         ]
         self._deployment.write_text("\n".join(lines) + "\n", encoding="utf-8")
         done = self._alula("up", self._name)
@@ -134,11 +142,11 @@ class TwoComputers:
             raise RigError(f"alula up ended with {done.returncode}: {done.stderr}")
 
     def start_mission(self) -> Mission:
-        """Start a patrol to the corridor's end and back on what is up."""
+        """Start a short mission on what is up."""
         self._missions += 1
         out = self.folder / f"run{self._missions}"
-        told = ("run", "patrol", "--on", self._name, "--world", str(self._world), "--out", str(out))
-        return Mission(out, self._start(out.name, self.decision, self._words(*told), self._environment()))
+        told = ("run", self.robot.scenario, "--on", self._name, "--world", str(self._world), "--out", str(out))
+        return Mission(out, self._start(out.name, self.decision, self._words(*told), self._decision_environment))
 
     def pid_of(self, part: str) -> int:
         """Return the process of a part that is up."""
@@ -146,9 +154,14 @@ class TwoComputers:
 
     def kept(self) -> dict[str, int]:
         """Return the processes of the parts that are up, and of their keeper."""
-        said = json.loads((ROVER / ".alula/up" / self._name / "state.json").read_text(encoding="utf-8"))
+        said = json.loads((self._up / "state.json").read_text(encoding="utf-8"))
         parts = {name: int(one["pid"]) for name, one in said["parts"].items()}
         return {name: pid for name, pid in {**parts, "keeper": int(said["keeper"])}.items() if pid and psutil.pid_exists(pid)}
+
+    @property
+    def _up(self) -> Path:
+        state = self.robot.folder / ".alula"
+        return (state / "robot" if self.robot.folder == ALULA_ROOT else state) / "up" / self._name
 
     def nodes(self) -> dict[str, int]:
         """Return the nodes of the base that roslaunch has started."""
@@ -161,11 +174,43 @@ class TwoComputers:
 
     def _alula(self, *words: str) -> subprocess.CompletedProcess[str]:
         words = tuple(self.decision.command(*self._words(*words)))
-        return subprocess.run(words, env=self._environment(), capture_output=True, text=True, check=False)
+        return subprocess.run(words, env=self._decision_environment, capture_output=True, text=True, check=False)
+
+    def make_clock(self) -> None:
+        """Have what runs on the decision computer from now on know a wall clock that can be set."""
+        self._clock = WallClock(self.folder)
+
+    def step_clock(self, by_s: int) -> None:
+        """Set that clock forward, or back."""
+        if self._clock is None:
+            raise RigError("the decision computer has this machine's clock")
+        self._clock.step(by_s)
+
+    def clock_by_doctor(self) -> float | None:
+        """Return by how far the base's clock is ahead of the decision computer's, as `alula doctor` says; None: it does not."""
+        for line in self._alula("doctor", self._name, "--json").stdout.splitlines():
+            if found := OFFSET.search(line):
+                return float(found[1]) * (1.0 if found[2] == "ahead of" else -1.0)
+        return None
+
+    def clock_by_status(self) -> float | None:
+        """Return the same as `alula status` says, which looks each minute; None: it does not know of a step within two."""
+
+        def said() -> float | None:
+            ahead_s = json.loads(self._alula("status", self._name, "--json").stdout)["clock_ahead_s"]
+            return None if ahead_s is None else float(ahead_s)
+
+        with suppress(AssertionError):
+            until(lambda: abs(said() or 0.0) > 1.0, "a step is told", 120.0, 2.0)
+        return said()
+
+    @property
+    def _decision_environment(self) -> dict[str, str]:
+        return {**self._environment(), **(self._clock.variables if self._clock else {})}
 
     def _words(self, *words: str) -> list[str]:
         # Not by `cwd`: who enters a mount namespace stands in its root.
-        return ["env", "-C", str(ROVER), str(ALULA_ROOT / "alula"), *words]
+        return ["env", "-C", str(self.robot.folder), str(ALULA_ROOT / "alula"), *words]
 
     def _environment(self) -> dict[str, str]:
         return {name: value for name, value in os.environ.items() if not name.startswith(FOREIGN)}
@@ -194,7 +239,7 @@ class TwoComputers:
             self._deployment.unlink(missing_ok=True)
             with suppress(OSError):  # another rig's may be there
                 self._deployment.parent.rmdir()
-            rmtree(ROVER / ".alula/up" / self._name, ignore_errors=True)
+            rmtree(self._up, ignore_errors=True)
 
     def _start(self, name: str, computer: Computer, words: Sequence[str], environment: dict[str, str]) -> subprocess.Popen[bytes]:
         with (self.folder / f"{name}.log").open("wb") as log:
@@ -261,11 +306,13 @@ def _namespace(pid: int) -> Path:
 
 
 @contextmanager
-def two_computers(folder: Path) -> Iterator[TwoComputers]:
-    """Have the base run and the decision side be up."""
+def two_computers(robot: Robot, folder: Path, *, sets_clock: bool = False) -> Iterator[TwoComputers]:
+    """Have the base run and the decision side be up; with ``sets_clock`` the wall clock of the latter can be set."""
     with Network() as network:
-        rig = TwoComputers(network, folder)
+        rig = TwoComputers(network, robot, folder)
         try:
+            if sets_clock:
+                rig.make_clock()
             rig.start_base()
             rig.up()
             yield rig

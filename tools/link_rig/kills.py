@@ -14,6 +14,7 @@ import psutil
 from alula_testing.waits import until
 from link_rig.cases import LINK, MISSION_S
 from link_rig.computers import LOOK_S, Mission, TwoComputers, two_computers
+from link_rig.robots import PATROL
 from link_rig.verdicts import Survived, Verdict, judge_kills
 
 EVERY_S = 60.0
@@ -43,7 +44,7 @@ class _Killed:
 def run_kills(minutes: int, seed: int, folder: Path) -> Verdict:
     """Kill one process a minute, for so many minutes, while missions follow each other, and then run one that nothing disturbs."""
     chance, killed, ends = random.Random(seed), list[_Killed](), list[Survived]()  # noqa: S311 - the same seed, the same order
-    with two_computers(folder) as rig:
+    with two_computers(PATROL, folder) as rig:
         mission, due_s = rig.start_mission(), time.monotonic() + EVERY_S
         while len(killed) < minutes:
             until(lambda m=mission, s=due_s: m.ended or time.monotonic() >= s, "a mission ends", MISSION_S, LOOK_S)  # type: ignore[misc]

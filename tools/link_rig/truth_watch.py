@@ -1,8 +1,8 @@
-"""A node of ROS 1 beside the rover's simulator: writes down where the rover truly is, a JSON line a pose: ``truth_watch FILE``.
+"""A node of ROS 1 beside a robot's simulator: writes down where the robot truly is, a JSON line a pose: ``truth_watch FILE ROBOT BEATS``.
 
-``{"at_s", "stamp_s", "x", "y", "theta"}``: monotonic clock of the machine and simulated time (s), metres and radians in the world's frame;
-a line ``{"at_s", "collisions"}`` at each word of the simulator's state, and ``{"at_s", "beat": true}`` at each heartbeat of the managers
-that move the rover, as it comes to the base.
+``{"at_s", "stamp_s", "x", "y", "z", "theta"}``: monotonic clock of the machine and simulated time (s), metres and radians in the world's
+frame; a line ``{"at_s", "collisions"}`` at each word of the simulator's state, and ``{"at_s", "beat": true}`` at each heartbeat of the
+managers that move the robot (topic BEATS), as it comes to the base. ROBOT: rover or drone.
 """
 
 from __future__ import annotations
@@ -15,6 +15,7 @@ from pathlib import Path
 from typing import IO
 
 import rospy
+from geometry_msgs.msg import Pose, PoseStamped
 from nav_msgs.msg import Odometry
 from std_msgs.msg import String
 
@@ -22,16 +23,23 @@ from std_msgs.msg import String
 def main() -> None:
     """Write until the node is shut down."""
     rospy.init_node("truth_watch")
-    with Path(rospy.myargv(sys.argv)[1]).open("w", buffering=1, encoding="utf-8") as file:
-        rospy.Subscriber("/truth/odom", Odometry, lambda told: _write(file, **_pose_of(told)))
-        rospy.Subscriber("/truth/state", String, lambda told: _write(file, collisions=json.loads(told.data)["collisions"]))
-        rospy.Subscriber("/base/alive", rospy.AnyMsg, lambda _: _write(file, beat=True), tcp_nodelay=True)
+    path, robot, beats = rospy.myargv(sys.argv)[1:]
+    with Path(path).open("w", buffering=1, encoding="utf-8") as file:
+        if robot == "drone":
+            state = "/sim/state"
+            rospy.Subscriber("/sim/true_pose", PoseStamped, lambda told: _write(file, **_pose_of(told, told.pose)))
+        else:
+            state = "/truth/state"
+            rospy.Subscriber("/truth/odom", Odometry, lambda told: _write(file, **_pose_of(told, told.pose.pose)))
+        rospy.Subscriber(state, String, lambda told: _write(file, collisions=json.loads(told.data)["collisions"]))
+        rospy.Subscriber(beats, rospy.AnyMsg, lambda _: _write(file, beat=True), tcp_nodelay=True)
         rospy.spin()
 
 
-def _pose_of(told: Odometry) -> dict[str, float]:
-    at, turned = told.pose.pose.position, told.pose.pose.orientation
-    return {"stamp_s": told.header.stamp.to_sec(), "x": at.x, "y": at.y, "theta": 2.0 * math.atan2(turned.z, turned.w)}
+def _pose_of(told: PoseStamped | Odometry, pose: Pose) -> dict[str, float]:
+    at, q = pose.position, pose.orientation
+    yaw_rad = math.atan2(2.0 * (q.w * q.z + q.x * q.y), 1.0 - 2.0 * (q.y * q.y + q.z * q.z))
+    return {"stamp_s": told.header.stamp.to_sec(), "x": at.x, "y": at.y, "z": at.z, "theta": yaw_rad}
 
 
 def _write(file: IO[str], **values: float) -> None:

@@ -9,8 +9,6 @@ from dataclasses import dataclass
 from itertools import pairwise
 
 ACCOMPLISHED = "accomplished"
-STILL_M_S, STILL_RAD_S = 0.02, 0.05
-"""A robot that moves and turns no faster stands."""
 MARGIN_S = 1.0
 """So much longer than the dead man's limit may it move, simulated seconds: a beat that is under way, and the way to a stop."""
 COLUMNS = (
@@ -20,6 +18,7 @@ COLUMNS = (
     "collisions",
     "stood for, s",
     "went on after its end, s",
+    "on the ground after its begin, s",
     "mission",
     "cause it says",
 )
@@ -35,6 +34,21 @@ class Pose:
     x: float
     y: float
     theta: float
+    z: float = 0.0
+
+
+@dataclass(frozen=True)
+class Still:
+    """A robot that moves and turns no faster stands; one that flies, too, when it sinks: it lands."""
+
+    m_s: float = 0.02
+    rad_s: float = 0.05
+    flies: bool = False
+
+
+STANDS = Still()
+GROUND_M = 0.3
+"""What flies is down when it is no higher than this over where it began."""
 
 
 @dataclass(frozen=True)
@@ -68,6 +82,7 @@ class Verdict:
         unheard_s: the longest time for which it moved while nothing was heard of who supervises it.
         stood_s: how long it then stood.
         went_on_s: from the fault's end until it moved again; negative: it moved before that.
+        down_s: of one that flies, from the fault's begin until it was on the ground for good.
         collisions: how often it ran into something.
         wrong: what must not be, in words; empty: nothing.
     """
@@ -78,6 +93,7 @@ class Verdict:
     unheard_s: float
     stood_s: float | None
     went_on_s: float | None
+    down_s: float | None
     collisions: int
     wrong: tuple[str, ...]
 
@@ -91,6 +107,7 @@ class Verdict:
             str(self.collisions),
             _seconds(self.stood_s),
             _seconds(self.went_on_s),
+            _seconds(self.down_s),
             self.end.outcome,
             self.end.reason.replace("|", "/") or "-",
         )
@@ -106,6 +123,7 @@ def judge(
     collisions: int,
     silent_after_s: float,
     following: End | None = None,
+    still: Still = STANDS,
 ) -> Verdict:
     """Judge a mission by where the robot truly was.
 
@@ -117,15 +135,19 @@ def judge(
         collisions: how often it ran into something.
         silent_after_s: the limit of the base's dead man, simulated seconds.
         following: how the mission after it ended, where there was one: it has to be accomplished.
+        still: when it stands.
     """
     limit_s = silent_after_s + MARGIN_S
-    stops = [pause for pause in _pauses(poses) if pause[0] >= fault.begun_s and pause[1] - pause[0] > MARGIN_S]
+    # It may have stood when the fault came.
+    pauses = [(max(begun_s, fault.begun_s), ended_s) for begun_s, ended_s in _pauses(poses, still)]
+    stops = [pause for pause in pauses if pause[1] - pause[0] > MARGIN_S]
     # One that comes later has nothing to do with the fault.
     stood = next((pause for pause in stops if pause[0] <= fault.ended_s + limit_s), None)
-    moved_on_s = None if stood is None else max(0.0, stood[0] - fault.begun_s)
+    moved_on_s = None if stood is None else stood[0] - fault.begun_s
     goes_on = stood is not None and math.isfinite(stood[1])
     lasted_s = fault.ended_s - fault.begun_s if fault.stops else 0.0
-    unheard_s = _moved_unheard(poses, beats)
+    unheard_s = _moved_unheard(poses, beats, still)
+    down_s = _down_since(poses, fault.begun_s) if still.flies else None
     wrong = []
     if unheard_s > limit_s:
         wrong.append(_moved_on(unheard_s, limit_s))
@@ -134,6 +156,8 @@ def judge(
         wrong.append(f"it moved on {told}: {limit_s:g} s are allowed")
     if stood is not None and goes_on and lasted_s > limit_s and stood[1] < fault.ended_s:
         wrong.append(f"it moved again {fault.ended_s - stood[1]:.1f} s before the fault's end")
+    if still.flies and down_s is None:
+        wrong.append("it is in the air still")
     if collisions:
         wrong.append(_ran_into(collisions))
     if end.outcome != ACCOMPLISHED and not any(word in end.reason for word in fault.cause):
@@ -147,6 +171,7 @@ def judge(
         unheard_s,
         stood[1] - stood[0] if stood is not None and goes_on else None,
         stood[1] - fault.ended_s if stood is not None and goes_on else None,
+        down_s,
         collisions,
         tuple(wrong),
     )
@@ -167,14 +192,14 @@ def judge_kills(
     outcomes = Counter(one.end.outcome for one in missions)
     told = [f"{number}: {one.end.reason}" for number, one in enumerate(missions, 1) if one.end.reason]
     end = End(", ".join(f"{count} {outcome}" for outcome, count in sorted(outcomes.items())), "; ".join(told))
-    unheard_s, limit_s = _moved_unheard(poses, beats), silent_after_s + MARGIN_S
+    unheard_s, limit_s = _moved_unheard(poses, beats, STANDS), silent_after_s + MARGIN_S
     wrong = [_moved_on(unheard_s, limit_s)] if unheard_s > limit_s else []
     if collisions:
         wrong.append(_ran_into(collisions))
     for number, one in enumerate(missions, 1):
         if one.end.outcome != ACCOMPLISHED and not any(word in one.end.reason for word in one.cause):
             wrong.append(f"mission {number} ended with '{one.end.reason}', which names none of: {', '.join(one.cause)}")
-    return Verdict(Fault(name, 0.0, 0.0, ()), end, None, unheard_s, None, None, collisions, tuple(wrong))
+    return Verdict(Fault(name, 0.0, 0.0, ()), end, None, unheard_s, None, None, None, collisions, tuple(wrong))
 
 
 def _moved_on(unheard_s: float, limit_s: float) -> str:
@@ -186,38 +211,47 @@ def _ran_into(collisions: int) -> str:
 
 
 def driving_since(poses: Sequence[Pose]) -> float | None:
-    """Return since when the robot moves without a pause, simulated time; None: it stands."""
-    pauses = list(_pauses(poses))
+    """Return since when a robot on the ground moves without a pause, simulated time; None: it stands."""
+    pauses = list(_pauses(poses, STANDS))
     if not pauses or math.isfinite(pauses[-1][1]):
         return pauses[-1][1] if pauses else (poses[0].stamp_s if len(poses) > 1 else None)
     return None
 
 
-def _moved_unheard(poses: Sequence[Pose], beats: Sequence[float]) -> float:
+def _moved_unheard(poses: Sequence[Pose], beats: Sequence[float], still: Still) -> float:
     """Return the longest time from a heartbeat to a moment at which the robot still moved, no other one having come, seconds."""
     longest_s, index = 0.0, -1
     for before, pose in pairwise(poses):
         while index + 1 < len(beats) and beats[index + 1] <= before.stamp_s:
             index += 1
-        if index >= 0 and _moves(before, pose):
+        if index >= 0 and _moves(before, pose, still):
             longest_s = max(longest_s, pose.stamp_s - beats[index])
     return longest_s
 
 
-def _moves(before: Pose, pose: Pose) -> bool:
-    """Tell whether the robot moved or turned between two moments."""
+def _moves(before: Pose, pose: Pose, still: Still) -> bool:
+    """Tell whether the robot moved, rose or turned between two moments."""
     lasted_s = pose.stamp_s - before.stamp_s
-    moves = math.hypot(pose.x - before.x, pose.y - before.y) > STILL_M_S * lasted_s
-    return moves or abs(math.remainder(pose.theta - before.theta, math.tau)) > STILL_RAD_S * lasted_s
+    moved_m = math.hypot(pose.x - before.x, pose.y - before.y, max(0.0, pose.z - before.z))
+    return moved_m > still.m_s * lasted_s or abs(math.remainder(pose.theta - before.theta, math.tau)) > still.rad_s * lasted_s
 
 
-def _pauses(poses: Sequence[Pose]) -> Iterator[tuple[float, float]]:
+def _down_since(poses: Sequence[Pose], begun_s: float) -> float | None:
+    """Return how long after a moment it was down for good, seconds (0: it was before); None: it is in the air."""
+    above_m = poses[0].z + GROUND_M
+    if poses[-1].z > above_m:
+        return None
+    up_s = next((one.stamp_s for one in reversed(poses) if one.z > above_m), begun_s)
+    return max(0.0, up_s - begun_s)
+
+
+def _pauses(poses: Sequence[Pose], still: Still) -> Iterator[tuple[float, float]]:
     """Return from when until when the robot stood, simulated time; the last one ends at infinity where it stands at the end."""
     begun_s: float | None = None
     for before, pose in pairwise(poses):
         if pose.stamp_s <= before.stamp_s:
             continue
-        moves = _moves(before, pose)
+        moves = _moves(before, pose, still)
         if not moves and begun_s is None:
             begun_s = before.stamp_s
         elif moves and begun_s is not None:
