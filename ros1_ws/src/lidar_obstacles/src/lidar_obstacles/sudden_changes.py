@@ -24,7 +24,7 @@ if TYPE_CHECKING:
     Floats = NDArray[np.float64]
 
 CHANGED_M = 0.6  # of the mean range of a cell, beside what the vehicle's motion may make of it
-MOST_CHANGED = 0.3  # of the cells; good sweeps have 0.12 at most
+MOST_CHANGED = 0.3  # of the cells; good sweeps have 0.18 at most
 ABOVE_USUAL = 2.5  # times what lately was usual: among trees more changes than in a street
 LATELY = 10  # sweeps of which the usual share is known
 KNOWN = 3  # of them are enough
