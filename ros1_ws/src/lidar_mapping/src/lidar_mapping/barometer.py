@@ -44,7 +44,7 @@ class HeightSettings:
     drift_m_s: float = 0.0035
     tail: float = 0.8
     drift_walk_m_s: float = 0.0005
-    change_m_s: float = 0.01
+    change_m_s: float = 0.015
     change_gain: float = 2.0
     jump_m: float = 0.1
     known_m: float = 0.3
