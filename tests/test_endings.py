@@ -44,7 +44,7 @@ def test_second_ctrl_c_ends_at_once(fly: StartFlight) -> None:
     flight.process.send_signal(signal.SIGINT)
     flight.wait_for("the first Ctrl-C is heard", lambda: "Ctrl-C again" in flight.words())
     flight.process.send_signal(signal.SIGINT)
-    assert flight.end() == 1
+    flight.end(1)
     assert flight.summary["landed"] is not True
 
 
@@ -53,7 +53,7 @@ def test_killed_process_ends_the_run_and_is_named(fly: StartFlight, victim: str)
     flight = fly()
     flight.wait_in_air()
     os.kill(flight.processes()[victim], signal.SIGKILL)
-    assert flight.end() == 1
+    flight.end(1)
     assert victim in died(flight)
     assert says_death(flight, victim)
     if victim != "uav_simulator":
@@ -92,7 +92,7 @@ def test_killed_nodes_are_named_and_ctrl_c_lands_first(fly: StartFlight, place: 
     flight.wait_running("goto_straight")
     lose(flight, LOST_NODES[place])
     os.killpg(flight.process.pid, signal.SIGINT)  # as a terminal does it
-    assert flight.end() == 1
+    flight.end(1)
     assert died(flight) == set(LOST_NODES[place])
     assert flight.summary["landed"] is True
     assert flight.summary["collisions"] == 0

@@ -267,7 +267,8 @@ def test_live_the_written_branch_decides_what_the_one_by_hand_does(
     lost = ("--rate", "0", "--seed", "1", "--fail", "zed@12")
     flights = [start_flight(tmp_path / "by-hand", *lost), start_flight(tmp_path / "written", *lost, checkout=checkout)]
     try:
-        assert [flight.end() for flight in flights] == [0, 0]
+        for flight in flights:
+            flight.end(0)
     finally:
         for flight in flights:
             flight.give_up()

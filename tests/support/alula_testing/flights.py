@@ -77,16 +77,17 @@ class Flight:
         """What the flight printed so far."""
         return (self.out.parent / f"{self.out.name}.txt").read_text(encoding="utf-8")
 
-    def end(self) -> int:
-        """Wait for the flight's end and return its exit code; fail if any process of the run is left."""
+    def end(self, code: int | None = None) -> None:
+        """Wait for the flight's end; fail with its last words at another exit code than this one, or if any process of the run is left."""
         try:
-            code = self.process.wait(FLIGHT_LIMIT_S)
+            self.process.wait(FLIGHT_LIMIT_S)
         except subprocess.TimeoutExpired:
             self.process.kill()
             end_run(self.run_id)
             pytest.fail(f"the flight did not end within {FLIGHT_LIMIT_S:.0f} s:\n{self.words()[-2000:]}")
         assert self.left_over() == {}
-        return code
+        if code not in {None, self.process.returncode}:
+            pytest.fail(f"the flight's exit code is {self.process.returncode}, not {code}; its last words:\n{self.words()[-4000:]}")
 
     def left_over(self) -> Mapping[int, str]:
         """Return processes of the run that live although it has ended."""
