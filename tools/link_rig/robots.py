@@ -12,6 +12,7 @@ from link_rig.verdicts import STANDS, Still
 ALULA_ROOT = Path(__file__).resolve().parents[2]
 ROVER = ALULA_ROOT / "examples/rover"
 UAV = ALULA_ROOT / "ros1_ws/src"
+BRAKES_S = 1.0 / 0.9  # from 1 m/s, as the simulated autopilot brakes: 0.6 of 1.5 m/s2
 
 
 @dataclass(frozen=True)
@@ -59,7 +60,7 @@ def _drone(scenario: str, world: str, skillsets: tuple[str, ...], goal_m: float)
         {name: f"uav_skills.{name}:make_hooks" for name in skillsets},
         "uav_bridge.yaml",
         {"decision": "false", "lockstep": "false"},
-        Still(m_s=0.3, rad_s=0.2, flies=True),
+        Still(m_s=0.3, rad_s=0.2, flies=True, brakes_s=BRAKES_S),
         goal_m,
     )
 

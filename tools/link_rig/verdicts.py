@@ -10,7 +10,8 @@ from itertools import pairwise
 
 ACCOMPLISHED = "accomplished"
 MARGIN_S = 1.0
-"""So much longer than the dead man's limit may it move, simulated seconds: a beat that is under way, and the way to a stop."""
+"""So much longer than the dead man's limit may it move, simulated seconds, beside `Still.brakes_s`: a beat that is under way, and
+what it takes to stop what has no way to brake."""
 COLUMNS = (
     "fault",
     "moved on for, s",
@@ -39,11 +40,12 @@ class Pose:
 
 @dataclass(frozen=True)
 class Still:
-    """A robot that moves and turns no faster stands; one that flies, too, when it sinks: it lands."""
+    """A robot that moves and turns no faster stands; one that flies, too, when it sinks: it lands. ``brakes_s``: how long it brakes before."""
 
     m_s: float = 0.02
     rad_s: float = 0.05
     flies: bool = False
+    brakes_s: float = 0.0
 
 
 STANDS = Still()
@@ -137,7 +139,7 @@ def judge(
         following: how the mission after it ended, where there was one: it has to be accomplished.
         still: when it stands.
     """
-    limit_s = silent_after_s + MARGIN_S
+    limit_s = silent_after_s + MARGIN_S + still.brakes_s
     # It may have stood when the fault came.
     pauses = [(max(begun_s, fault.begun_s), ended_s) for begun_s, ended_s in _pauses(poses, still)]
     stops = [pause for pause in pauses if pause[1] - pause[0] > MARGIN_S]

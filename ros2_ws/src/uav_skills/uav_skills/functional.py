@@ -76,6 +76,7 @@ class GuidanceApi(FunctionalPart):
         super().__init__(node)
         self._orphans = orphans
         self.state: GuidanceState | None = None
+        self.heard_s: float | None = None
         self._listeners: list[Callable[[GuidanceState], None]] = []
         self._takeoff = self._client(Takeoff, "uav_guidance/takeoff")
         self._position = self._client(SetPositionReference, "uav_guidance/set_position")
@@ -118,7 +119,7 @@ class GuidanceApi(FunctionalPart):
     def _on_state(self, state: GuidanceState) -> None:
         if self.state is None and state.reference in MOTIONS and state.reference in self._orphans:
             self.hover()
-        self.state = state
+        self.state, self.heard_s = state, self.now_s
         for listener in self._listeners:
             listener(state)
 

@@ -80,7 +80,7 @@ class GuidedSkill(SkillHooks):
         return float(state.distance_to_go_m)
 
     def lost(self, silent_s: float) -> SkillEnd:
-        """Say how the execution ends when the guidance does not speak of its reference any more."""
+        """Say how the execution ends when the guidance does not speak of its reference any more, but of something else."""
         state = self.guidance.state
         instead = "nothing" if state is None else f"{state.reference or 'nothing'} {state.reference_id}"
         return SkillEnd("ABORTED", f"the guidance does not follow this reference for {silent_s:.1f} s; last it spoke of {instead}")
@@ -161,7 +161,15 @@ class GuidedSkill(SkillHooks):
         if silent_s > self.thresholds.reference_lost_s:
             # The vehicle is being landed, perhaps because no mission decides any more: a hover would keep it in the air.
             state = self.guidance.state
-            self._end(motion, self.lost(silent_s), stop=state is None or state.reference != "land")
+            self._end(motion, self._unheard() or self.lost(silent_s), stop=state is None or state.reference != "land")
+
+    def _unheard(self) -> SkillEnd | None:
+        """Say how the execution ends when the guidance does not speak at all; None: it does."""
+        heard_s = self.guidance.heard_s
+        silent_s = self.guidance.now_s - (0.0 if heard_s is None else heard_s)
+        if silent_s <= self.thresholds.reference_lost_s:
+            return None
+        return SkillEnd("ABORTED", f"nothing is heard of the guidance for {silent_s:.1f} s: it has died, or the link to it is lost")
 
     def _end(self, motion: GuidedMotion, verdict: SkillEnd, *, stop: bool) -> None:
         with self._lock:
