@@ -40,7 +40,7 @@ class Pose:
 
 @dataclass(frozen=True)
 class Still:
-    """A robot that moves and turns no faster stands; one that flies, too, when it sinks: it lands. ``brakes_s``: how long it brakes before."""
+    """A robot that moves and turns no faster stands; one that flies, too, when it sinks: it lands. Before, it brakes for ``brakes_s``."""
 
     m_s: float = 0.02
     rad_s: float = 0.05
