@@ -119,7 +119,9 @@ def test_silence_and_time():
     assert decisions.decide_watch(2.0, "ZED") is None
     assert decisions.decide_watch(2.1, "ZED") == SkillEnd("LOST", "no obstacle message of the ZED for 2.1 s")
     assert decisions.decide_stream(1.0, told_idle=True) is None
-    assert decisions.decide_stream(1.1, told_idle=False) == SkillEnd("LOST", "nothing was heard of the video encoder for 1.1 s")
+    assert decisions.decide_stream(1.1, told_idle=False) == SkillEnd(
+        "LOST", f"nothing was heard of the video encoder for 1.1 s: {decisions.UNHEARD}"
+    )
     assert decisions.decide_stream(1.1, told_idle=True) == SkillEnd("LOST", "the video encoder was started again and sends nothing")
     assert decisions.decide_mapping(3.0, "silent") is None
     assert decisions.decide_mapping(3.1, "") == SkillEnd("ABORTED", "no scan registered for 3.1 s")

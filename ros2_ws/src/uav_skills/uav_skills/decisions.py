@@ -57,6 +57,7 @@ class Thresholds:
 
 
 DEFAULT_THRESHOLDS = Thresholds()
+UNHEARD = "it has died, or the link to it is lost"
 PUSHED = "the wind, or an autopilot that does not follow"
 
 
@@ -131,7 +132,7 @@ def decide_stream(silent_s: float, *, told_idle: bool, limits: Thresholds = DEFA
         return None
     if told_idle:
         return SkillEnd("LOST", "the video encoder was started again and sends nothing")
-    return SkillEnd("LOST", f"nothing was heard of the video encoder for {silent_s:.1f} s")
+    return SkillEnd("LOST", f"nothing was heard of the video encoder for {silent_s:.1f} s: {UNHEARD}")
 
 
 def decide_mapping(silent_s: float, lidar_fault: str, limits: Thresholds = DEFAULT_THRESHOLDS) -> SkillEnd | None:

@@ -15,7 +15,7 @@ from typing import TYPE_CHECKING, Any, ClassVar
 
 from alula import SkillHooks
 from uav_skills.calls import Reply, Response, ignore_response
-from uav_skills.decisions import DEFAULT_THRESHOLDS, SkillEnd, Thresholds, remaining_part, speaks_of
+from uav_skills.decisions import DEFAULT_THRESHOLDS, UNHEARD, SkillEnd, Thresholds, remaining_part, speaks_of
 
 if TYPE_CHECKING:
     from uav_msgs.msg import GuidanceState
@@ -169,7 +169,7 @@ class GuidedSkill(SkillHooks):
         silent_s = self.guidance.now_s - (0.0 if heard_s is None else heard_s)
         if silent_s <= self.thresholds.reference_lost_s:
             return None
-        return SkillEnd("ABORTED", f"nothing is heard of the guidance for {silent_s:.1f} s: it has died, or the link to it is lost")
+        return SkillEnd("ABORTED", f"nothing is heard of the guidance for {silent_s:.1f} s: {UNHEARD}")
 
     def _end(self, motion: GuidedMotion, verdict: SkillEnd, *, stop: bool) -> None:
         with self._lock:
