@@ -122,6 +122,14 @@ def test_a_drone_that_climbs_unheard_or_stays_in_the_air_is_wrong():
     assert hangs.down_s is None
 
 
+@pytest.mark.parametrize(("brakes_s", "allowed_s"), [(0.0, 3.0), (1.1, 4.1)])
+def test_what_brakes_for_a_while_may_move_on_for_as_long(brakes_s, allowed_s):
+    still = replace(FLIES, brakes_s=brakes_s)
+    for moved_s, is_wrong in ((allowed_s - 0.2, False), (allowed_s + 0.2, True)):
+        flight = flown((0.0, 1.0, 3.0), (1.0, 0.0, 7.0 + moved_s), (0.0, 0.0, 5.0), (0.0, -0.5, 7.0))
+        assert bool(judged(flight, still=still).wrong) is is_wrong
+
+
 def test_turning_is_moving():
     turning = [Pose(one.at_s, one.stamp_s, 0.0, 0.0, 0.5 * one.stamp_s) for one in driven((0.0, 30.0))]
     assert judged(turning).wrong == ("it moved on all the time: 3 s are allowed",)

@@ -515,6 +515,20 @@ def test_loopback_is_told_from_the_rest(host: str, *, ours: bool) -> None:
     assert is_loopback(host) is ours
 
 
+def test_runs_are_found_before_the_first_page_is_served(make_run: Callable[..., Path], monkeypatch: pytest.MonkeyPatch) -> None:
+    """Else a viewer were told of the report of a run that the server does not know yet."""
+    order: list[str] = []
+    for module, name in ((commands, "runs_in"), (server, "serve")):
+        real = getattr(module, name)
+        monkeypatch.setattr(module, name, lambda *given, _real=real, _name=name, **named: order.append(_name) or _real(*given, **named))
+
+    async def play(bench: Bench) -> None:
+        assert (await bench.get("/"))[0] == 200
+        assert order[:2] == ["runs_in", "serve"]
+
+    serve(play, fixed=make_run())
+
+
 def test_only_reports_of_runs_are_served_and_they_can_not_command(make_run: Callable[..., Path]) -> None:
     folder = make_run()
     (folder / "report.html").write_text("the report", encoding="utf-8")
