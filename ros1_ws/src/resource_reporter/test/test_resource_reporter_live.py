@@ -13,6 +13,7 @@ import pytest
 
 rospy = pytest.importorskip("rospy")
 
+from rosgraph_msgs.msg import Clock  # noqa: E402
 from skillset_interfaces.msg import ResourceState, ResourceStates  # noqa: E402
 from skillset_interfaces.srv import Transition, TransitionRequest, TransitionResponse  # noqa: E402
 
@@ -31,6 +32,14 @@ while not reporter._ledger._actual:
     rospy.sleep(0.01)
 reporter.when_settled(lambda: {}["of the reporter's thread"])
 print("a job waits", flush=True)
+rospy.spin()
+"""
+REPORTING = """
+import rospy
+from resource_reporter import ResourceReporter
+rospy.init_node("reporting")
+reporter = ResourceReporter("reported")
+reporter.report("zed_status", "OK")
 rospy.spin()
 """
 ENOUGH_S = 0.1
@@ -147,6 +156,26 @@ def test_it_is_heard_of_as_long_as_it_lives(ros_master):
     assert {(one.skillset, one.resources[0].name, one.resources[0].state) for one in beats} == {(SKILLSET, "zed_status", "OK")}
     reporter.close()
     until(lambda: not subscriber.get_num_connections(), what="nothing of it is left on the topic")
+    subscriber.unregister()
+
+
+@pytest.fixture
+def standing_clock(ros_master: str) -> Iterator[None]:
+    """Give nodes that are started now a simulated time that stands."""
+    rospy.set_param("/use_sim_time", True)
+    clock = rospy.Publisher("/clock", Clock, queue_size=1, latch=True)
+    clock.publish(rospy.Time(100))
+    yield
+    rospy.delete_param("/use_sim_time")
+    clock.unregister()
+
+
+def test_a_simulation_that_stands_is_no_silence(standing_clock, start_node):
+    beats: list[ResourceStates] = []
+    subscriber = rospy.Subscriber(f"/{SKILLSET}/reported", ResourceStates, beats.append)
+    start_node([sys.executable, "-c", REPORTING])
+    until(lambda: len(beats) > 3, what="it beats by the monotonic clock")
+    assert {one.header.stamp for one in beats} == {rospy.Time(100)}, "the beats are of the mission clock's moment"
     subscriber.unregister()
 
 

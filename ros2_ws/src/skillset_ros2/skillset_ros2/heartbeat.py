@@ -6,14 +6,14 @@ from rclpy.node import Node
 from skillset_interfaces.msg import ResourceState, ResourceStates
 
 from alula.runtime.middleware import REPORTED
-from skillset_ros2.mission_clock import NodeClock
+from skillset_ros2.mission_clock import STEADY, NodeClock
 from skillset_ros2.names import latched
 
 HEARTBEAT_S = 0.5
 
 
 class Heartbeat:
-    """Sends a heartbeat twice a second of mission clock: the node that reports these resources is alive.
+    """Sends a heartbeat twice a second, by the monotonic clock and by simulated time: the node that reports these resources is alive.
 
     Managers take a resource with a ``silence`` back to its initial state when that is not heard any more. A node that is heard again
     has to report anew what it is: follow ``SkillsetClient.on_change``.
@@ -23,11 +23,14 @@ class Heartbeat:
         self._node = node
         self._message = ResourceStates(skillset=skillset, resources=[ResourceState(name=name) for name in resources])
         self._publisher = node.create_publisher(ResourceStates, f"{skillset}/{REPORTED.name}", latched(REPORTED.depth))
-        self._timer = NodeClock(node).every(HEARTBEAT_S, self._beat)
+        # Managers count a silence by the clock that they have: /clock in a simulation, the monotonic one in a deployment.
+        clocks = [STEADY, node.get_clock()] if NodeClock(node).simulated else [STEADY]
+        self._timers = [node.create_timer(HEARTBEAT_S, self._beat, clock=clock) for clock in clocks]
 
     def close(self) -> None:
         """Stop the heartbeat."""
-        self._node.destroy_timer(self._timer)
+        for timer in self._timers:
+            self._node.destroy_timer(timer)
         self._node.destroy_publisher(self._publisher)
 
     def _beat(self) -> None:

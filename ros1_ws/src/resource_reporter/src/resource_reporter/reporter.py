@@ -11,6 +11,7 @@ import rospy
 from skillset_interfaces.msg import ResourceState, ResourceStates
 from skillset_interfaces.srv import Transition, TransitionRequest
 
+from resource_reporter.beats import Beats
 from resource_reporter.caller import CallFailedError, ServiceCaller
 from resource_reporter.calls import publisher, tell_call
 from resource_reporter.failing import ends_the_node
@@ -18,7 +19,7 @@ from resource_reporter.ledger import Call, Ledger
 
 # A latched topic may have been missed only while its publisher was away: nothing has to be polled. This bounds one wait.
 LONGEST_WAIT_S = 1.0
-# Mission clock; the managers count a `silence` by it.
+# Of each clock by which managers may count a `silence`.
 HEARTBEAT_S = 0.5
 # What waits for the skillset to know waits no longer than this (wall clock): a skillset that hangs must stop nothing.
 SETTLE_LIMIT_S = 10.0
@@ -31,8 +32,8 @@ class ResourceReporter:
     service is called by a thread of its own, at once, and until ``/<skillset>/resource_states`` agrees with what was reported last.
     An error in that thread ends the node, with exit code 1.
 
-    Twice a second of mission clock it says on ``/<skillset>/reported`` what it reports: its heartbeat. Where the model gives a resource
-    a ``silence``, the managers take it for unknown when that is not heard any more.
+    Twice a second, by the monotonic clock and by simulated time, it says on ``/<skillset>/reported`` what it reports: its heartbeat. Where
+    the model gives a resource a ``silence``, the managers take it for unknown when that is not heard any more.
     """
 
     def __init__(self, skillset: str) -> None:
@@ -48,7 +49,7 @@ class ResourceReporter:
         self._worker = threading.Thread(target=self._work, name=f"report_{skillset}", daemon=True)
         self._worker.start()
         self._heartbeat = rospy.Publisher(f"/{skillset}/reported", ResourceStates, queue_size=1, latch=True, tcp_nodelay=True)
-        self._beats = rospy.Timer(rospy.Duration(HEARTBEAT_S), self._beat, reset=True)
+        self._beats = Beats(f"beat_{skillset}", HEARTBEAT_S, self._beat)
         self._subscriber = rospy.Subscriber(f"/{skillset}/resource_states", ResourceStates, self._on_states, tcp_nodelay=True)
 
     def report(self, resource: str, state: str, reason: str = "", *, insist: bool = True) -> None:
@@ -84,19 +85,19 @@ class ResourceReporter:
             self._ended = True
             self._changed.notify()
         self._subscriber.unregister()
-        self._beats.shutdown()
+        self._beats.close()
         self._heartbeat.unregister()
         self._caller.close()
         self._worker.join(LONGEST_WAIT_S)
 
     @ends_the_node
-    def _beat(self, event: rospy.timer.TimerEvent) -> None:
+    def _beat(self) -> None:
         with self._changed:
             wanted = self._ledger.wanted
         if not wanted or self._ended:
             return
         message = ResourceStates(skillset=self._skillset, resources=[ResourceState(name=one, state=state) for one, state in wanted.items()])
-        message.header.stamp = event.current_real
+        message.header.stamp = rospy.Time.now()
         with contextlib.suppress(rospy.ROSException):  # at the end of the node the topic is closed first
             self._heartbeat.publish(message)
 
