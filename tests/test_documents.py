@@ -13,6 +13,7 @@ from typing import Any
 import pytest
 
 from alula_testing.waits import until
+from manual_site import contents
 from manual_site.sizes import lines, size_of, sizes
 
 ALULA_ROOT = Path(__file__).resolve().parents[1]
@@ -94,6 +95,16 @@ def test_the_pages_are_counted_apart_from_what_programs_write() -> None:
     *_, manual, experiments = lines(list(by_name.values()))
     assert manual.endswith("the manual")
     assert experiments.split()[1:] == ["0", "experiments"]
+
+
+def test_the_list_of_pages_is_current() -> None:
+    text = contents.PAGE.read_text(encoding="utf-8")
+    assert text == contents.page(text), f"write it again: {contents.COMMAND}"
+
+
+def test_a_page_is_listed_with_the_first_sentence_below_its_title() -> None:
+    assert contents.audience("# A\n\nFor [users](b.md) of `x.y`: what 0.3 is. More.\n\n## B") == "users of `x.y`: what 0.3 is"
+    assert contents.audience("# A\n\nOf something else.\n") == ""
 
 
 @pytest.fixture(scope="module")
