@@ -14,7 +14,7 @@ STOP_S = 30.0
 """How long (wall clock) what stops the robot may take while the mission clock stands still."""
 LAST_EVENTS_S = 2.0
 """How long (wall clock) the events of what has ended are waited for."""
-STANDS = "the mission clock stands still"
+STANDS = "the mission clock stands still (what gives it hangs, or the bridge that brings it)"
 
 
 class Standstill:

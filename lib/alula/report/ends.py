@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import contextlib
+import re
 import signal
 from collections.abc import Mapping, Sequence
 from dataclasses import asdict, dataclass
@@ -59,7 +60,7 @@ def with_dead(reason: str | None, died: Sequence[Death]) -> str | None:
     gone = ", ".join(f"{one['name']} died ({one['how']})" for one in died if one["when_s"] is not None and one["again_s"] is None)
     if reason is None or not gone or not reason.startswith(CLOCK_STANDS):
         return reason
-    return reason.replace(CLOCK_STANDS, f"{CLOCK_STANDS}: {gone}", 1)
+    return re.sub(rf"^{CLOCK_STANDS}( \([^)]*\))?", lambda _: f"{CLOCK_STANDS}: {gone}", reason)
 
 
 def read_end(out: Path) -> ReportedEnd | None:

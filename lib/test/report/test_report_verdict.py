@@ -11,6 +11,7 @@ import pytest
 from alula.common.record import FILE as RECORD
 from alula.common.record import MISSION, RecordWriter
 from alula.common.run_log import FILE, note_wait
+from alula.missions.running import STANDS
 from alula.report.deaths import Death
 from alula.report.ends import (
     FRONT,
@@ -129,6 +130,7 @@ def test_a_mission_that_heard_no_clock_tells_which_processes_had_died_for_good()
     said = "the mission clock stands still; the robot was not at rest within 30 s"
     told = "the mission clock stands still: a died (signal SIGKILL); the robot was not at rest within 30 s"
     assert with_dead(said, [for_good, again]) == told
+    assert with_dead(said.replace("the mission clock stands still", STANDS), [for_good, again]) == told
     assert with_dead(said, [again]) == said
     assert with_dead("the tree raised KeyError", [for_good]) == "the tree raised KeyError"
     assert with_dead(None, [for_good]) is None

@@ -190,6 +190,19 @@ def test_landing_interrupted_by_hover_goes_back_to_guided(flying):
     assert flying.vehicle.body.mode == GUIDED
 
 
+@pytest.mark.parametrize("height_m", [1.1, 0.3, 0.02])
+def test_a_landing_is_not_broken_off_near_the_ground(flying, height_m):
+    landing = flying.agreed(LandRequest())
+    flying.until(lambda _: flying.vehicle.enu[2] < height_m)
+    refused = flying.ask(HoverRequest())
+    assert not refused.accepted
+    assert "landing" in refused.reason
+    lowest_m = flying.vehicle.enu[2]
+    flying.until(lambda r: not r.vehicle.armed)
+    assert flying.vehicle.enu[2] <= lowest_m
+    assert (flying.report.course.reference, flying.report.reference_id) == ("land", landing.reference_id)
+
+
 def test_who_stops_it_lets_a_landing_go_on_and_anything_else_hover(flying):
     flying.go(10.0, 0.0)
     assert flying.agreed(StopRequest()).accepted

@@ -375,6 +375,19 @@ def test_how_the_vehicle_is_left_is_told(folder, last, by_skills, left):
     assert (summary["landed"], summary["left"]) == (by_skills, left)
 
 
+def test_a_guidance_that_died_is_not_believed_for_long(folder):
+    (folder / RECORD).unlink()
+    told = [{"t_s": LIFT_OFF_S + since_s, "landed_state": 2 if since_s > 0.0 else 1} for since_s in range(-3, 12)]
+    t_s, position = poses()
+    assert t_s[-1] - told[-1]["t_s"] > 10.0
+    state = {"lift_off_s": LIFT_OFF_S, "collisions": 0, "min_clearance_m": 1.1, "distance_m": 83.0, "faults": []}
+    last = {**told[-1], "mode": "LAND", "height_m": 2.2}
+    write_bag(folder / "functional.bag", poses=(t_s, position), states=[state], guidance=[*told[:-1], last])
+    unheard_s = t_s[-1] - last["t_s"]
+    said = f"still in the air, in LAND, at 2.2 m, as the guidance said last, {unheard_s:.0f} s before the end"
+    assert make_report(facts(folder))["left"] == said
+
+
 def test_a_recording_that_broke_off_before_the_lift_off_says_nothing_of_a_landing(folder):
     log = Log()
     log.change(0.0, "navigation.flight_status", "ON_GROUND", "IN_AIR")

@@ -136,7 +136,7 @@ class GuidedSkill(SkillHooks):
 
     @staticmethod
     def _stopped(execution: Execution, response: Response) -> None:
-        """Take the response to the stop of an interruption: refused on the ground or without the authority, when nothing of ours moves."""
+        """Take the response to the stop of an interruption: refused on the ground, just above it in a landing, or without authority."""
         execution.interrupted("" if response.accepted else f"the stop was not taken: {response.reason}")
 
     def _on_state(self, state: GuidanceState) -> None:

@@ -40,7 +40,7 @@ from uav_guidance.requests import (
     require,
 )
 from uav_guidance.settings import GuidanceSettings
-from uav_guidance.standing import GROUND_M, Standing, above_home_m
+from uav_guidance.standing import GROUND_M, LOW_M, Standing, above_home_m
 from uav_guidance.takeover import Takeover
 from uav_guidance.vectors import Vec3
 from uav_guidance.vehicle import Landed, Mode, VehicleSnapshot, in_map, leapt, mode_name, updated
@@ -292,6 +292,10 @@ class Guidance:
             return self._accept(Hold(self._settings), [disarm()], now_s)
         require(self.vehicle.off_ground, "the autopilot has not said whether it is in the air")
         require(self.vehicle.located, "the autopilot does not say where it is")
+        if isinstance(self._follower.reference, Land):
+            # A late request would lift a vehicle that is touching down, for the autopilot tells of the ground seconds later.
+            height_m = above_home_m(self.vehicle)
+            require(height_m > LOW_M, f"it is landing, {height_m:.1f} m above home: a landing is not broken off so low")
         return self._accept(Hold(self._settings), self._to_guided(), now_s)
 
     def _stop(self, _request: StopRequest, now_s: float) -> GuidanceDecision:

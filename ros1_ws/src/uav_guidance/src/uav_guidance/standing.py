@@ -13,6 +13,7 @@ STANDS_S = 5.0  # a landing sinks by 2.5 m meanwhile
 MOVED_M = 0.1  # since it began to stand
 SPEED_M_S = 0.1
 RATE_RAD_S = 0.05
+LOW_M = 1.2  # above home: a landing that is broken off here dips by 0.15 m, and its propellers are 0.85 m from the middle
 GROUND_M = 0.5  # above home: higher, it may lie in a tree or on a roof, and fall when its motors stop
 
 

@@ -29,6 +29,7 @@ from uav_report.world import TrueSurfaces
 
 RADIO = "radio"
 SAME_MOMENT_S = 1.0
+UNHEARD_S = 2.0  # before the end: a guidance that says nothing for so long has died, and where the vehicle is now nobody knows
 """The radio tells its state twice a second: a fault of it and what it says of it are no farther apart."""
 MOVING_M_S = 0.2
 
@@ -134,7 +135,8 @@ class FlightReport:
         guidance, phases = self._recording.guidance, self._phases
         if not guidance or not phases.lifted_off or guidance[-1].t_s <= phases.zero_s or (down and guidance[-1].landed_state != ON_GROUND):
             return ""
-        return guidance[-1].left
+        left, unheard_s = guidance[-1].left, self._recording.last_s - guidance[-1].t_s
+        return f"{left}, as the guidance said last, {unheard_s:.0f} s before the end" if left and unheard_s > UNHEARD_S else left
 
     def _compare(self) -> Truth:
         """Compare with the true world, where there is one: the path first, then the map."""

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+import math
 from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Protocol
@@ -109,6 +110,12 @@ class Recording:
     health: tuple[HealthChange, ...] = ()
     told: tuple[tuple[float, str], ...] = ()
     """What autopilot and guidance told a person, ``who: words``, each with its absolute seconds; what comes again within 10 s once."""
+
+    @property
+    def last_s(self) -> float:
+        """The last moment of which the bag tells where the vehicle is or does; absolute seconds, -inf where it tells nothing."""
+        ends = [float(track.t_s[-1]) for track in (self.truth, self.estimate) if track is not None]
+        return max([*ends, *(state.t_s for state in self.guidance[-1:])], default=-math.inf)
 
     @property
     def path(self) -> Track | None:
