@@ -9,6 +9,7 @@ from __future__ import annotations
 import argparse
 import json
 import os
+import shutil
 import signal
 import subprocess
 import sys
@@ -29,6 +30,10 @@ from alula_flight.station.parts import Part, Places, parts_of, places_of
 SKILLSETS = ("navigation", "perception", "mapping")
 SECONDS, SETTLE_S, END_S = 30.0, 8.0, 20.0  # wall clock
 MB = 1e6
+
+
+class UnreadyError(Exception):
+    """The decision side can't be measured: its skillsets can't be called."""
 
 
 @dataclass(frozen=True)
@@ -139,7 +144,7 @@ def measure(processes: Processes, seconds: float, folder: Path) -> Figures:
         begun_s = time.monotonic()
         found = {part.name: stack.enter_context(running(part, places)) for part in parts}
         if client.stdout.readline() != b"ready\n":
-            raise RuntimeError(f"the skillsets can't be called; the words of the parts are in {places.logs}")
+            raise UnreadyError(f"the skillsets can't be called; the words of the parts are in {places.logs}")
         up_s, up_cpu_s = time.monotonic() - begun_s, sum(cpu_s(tree_of(one)) for one in found.values())
         found["mission"] = stack.enter_context(running(Part("mission", places.in_ros2("mission", *mission, *waits), environment), places))
         time.sleep(SETTLE_S)  # what is imported and discovered at the start is not idle
@@ -165,9 +170,14 @@ def main(words: Sequence[str] | None = None) -> int:
     if not given.seconds > 0.0:
         parser.error(f"--seconds {given.seconds:g}: is a time, above 0")
     figures: dict[str, Figures] = {}
-    with tempfile.TemporaryDirectory(prefix="alula_bench_") as folder:
+    folder = Path(tempfile.mkdtemp(prefix="alula_bench_"))
+    try:
         for name in given.processes or [one.value for one in Processes]:
-            figures[name] = measure(Processes(name), given.seconds, Path(folder) / name)
+            figures[name] = measure(Processes(name), given.seconds, folder / name)
+    except UnreadyError as error:
+        sys.stderr.write(f"{parser.prog}: {error}\n")  # the folder is left: it says why
+        return 1
+    shutil.rmtree(folder)
     if given.json is not None:
         given.json.write_text(json.dumps({name: asdict(one) for name, one in figures.items()}, indent=1) + "\n", encoding="utf-8")
     sys.stdout.write(table(figures))
