@@ -9,7 +9,9 @@ import pytest
 pytest.importorskip("rclpy")
 
 from uav_skills_functional_fake import AHEAD_S, STEP_M, STEP_S
-from uav_skills_rig import Rig
+from uav_skills_rig import SKILLSETS, Rig
+
+from uav_skills.functional import WATCH_PERIOD_S
 
 LAG_S = AHEAD_S + 2 * STEP_S
 """So far what a node has heard (clock, or the last message before a silence) may be behind the clock of the functional layer."""
@@ -194,6 +196,15 @@ def test_a_depth_map_sees_until_it_is_interrupted(rig, skill, node):
     handle.interrupt()
     assert rig.ended(handle) == ("INTERRUPTED", "")
     rig.wait(lambda: rig.functional.calls == [(f"{node}.enable", True), (f"{node}.enable", False)])
+
+
+def test_both_depth_maps_are_watched_by_one_timer(rig):
+    node = rig.nodes[SKILLSETS.index("perception")]
+    assert [timer.timer_period_ns for timer in node.timers].count(round(WATCH_PERIOD_S * 1e9)) == 1
+    handles = [rig.start("perception", skill) for skill in ("zed_depthmap", "lidar_depthmap")]
+    rig.wait(lambda: all(handle.progress == 1.0 for handle in handles))
+    rig.functional.mute |= {"zed_depth", "lidar_obstacles"}
+    assert [rig.ended(handle) for handle in handles] == [("TERMINATED", "LOST"), ("TERMINATED", "LOST")]
 
 
 def test_a_depth_map_without_obstacle_messages_is_lost_after_two_seconds(rig):

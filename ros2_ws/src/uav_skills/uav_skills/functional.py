@@ -28,18 +28,24 @@ LAST_FEW = QoSProfile(depth=10)
 LATCHED = QoSProfile(depth=1, durability=DurabilityPolicy.TRANSIENT_LOCAL)
 
 
+def watch_of(node: Node) -> Watch:
+    """Make the timer that parts of a node share: each timer of its own wakes the executor at another moment."""
+    return Watch(node, WATCH_PERIOD_S, callback_group=ReentrantCallbackGroup())
+
+
 class FunctionalPart:
     """One part of the functional layer: a queue of calls, and a watch that notices when nothing is heard.
 
-    ``now_s`` is mission clock without its jumps: when the clock itself did not come through for a while (the bridge was started
-    again), nothing else came either, and what was not heard meanwhile must not count as silent.
+    ``clock`` is what ``watch_of`` has made, where several parts of a node share it. ``now_s`` is mission clock without its jumps: when
+    the clock itself did not come through for a while (the bridge was started again), nothing else came either, and what was not heard
+    meanwhile must not count as silent.
     """
 
-    def __init__(self, node: Node) -> None:
+    def __init__(self, node: Node, clock: Watch | None = None) -> None:
         self.now_s = 0.0
         self._node = node
         self._group = ReentrantCallbackGroup()
-        self._clock = Watch(node, WATCH_PERIOD_S, callback_group=self._group)
+        self._clock = clock or watch_of(node)
         self._clock_s = self._clock.now_s
         self._calls = CallQueue(lambda: self.now_s)
         self._watchers: list[Callable[[], None]] = []
@@ -127,8 +133,8 @@ class GuidanceApi(FunctionalPart):
 class DepthApi(FunctionalPart):
     """A sensor that looks ahead: ``node_name`` is zed_depth or lidar_obstacles."""
 
-    def __init__(self, node: Node, node_name: str) -> None:
-        super().__init__(node)
+    def __init__(self, node: Node, node_name: str, clock: Watch | None = None) -> None:
+        super().__init__(node, clock)
         self.heard_s: float | None = None
         self._enable = self._client(SetBool, f"{node_name}/enable")
         self._subscribe(Obstacle, f"{node_name}/obstacle", self._on_obstacle)

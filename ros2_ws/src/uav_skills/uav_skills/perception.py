@@ -9,7 +9,7 @@ from perception_managers.hooks import AbstractLidarDepthmapSkill, AbstractZedDep
 
 from alula import SkillHooks
 from uav_skills.decisions import decide_watch
-from uav_skills.functional import DepthApi
+from uav_skills.functional import DepthApi, watch_of
 from uav_skills.watched import WatchedSkill
 
 if TYPE_CHECKING:
@@ -54,7 +54,8 @@ class LidarDepthmap(_Depthmap, AbstractLidarDepthmapSkill):  # type: ignore[misc
 
 def make_hooks(node: Node) -> dict[str, SkillHooks]:
     """Make the hooks of all skills of the skillset."""
+    clock = watch_of(node)
     return {
-        "zed_depthmap": ZedDepthmap("ZED", DepthApi(node, "zed_depth")),
-        "lidar_depthmap": LidarDepthmap("LiDAR", DepthApi(node, "lidar_obstacles")),
+        "zed_depthmap": ZedDepthmap("ZED", DepthApi(node, "zed_depth", clock)),
+        "lidar_depthmap": LidarDepthmap("LiDAR", DepthApi(node, "lidar_obstacles", clock)),
     }
