@@ -386,3 +386,4 @@ def test_ctrl_c_ends_the_search_with_what_it_has(no_lidar: Path) -> None:
         assert search.wait() == 1, progress
     found = json.loads(said)
     assert (found["answer"], found["stopped"]) == ("unknown", True)
+    assert found["refused"][-1]["why"] == "the search ended before it was judged"

@@ -56,6 +56,22 @@ def _what(finding: Diagnostic) -> tuple[str, str]:
     return finding.code, re.sub(r"\([^)]*\)", "", finding.message)
 
 
+@dataclass(frozen=True)
+class Refused:
+    """A branch, or a course of skills, that was tried, and why it is not what was looked for; ``nodes``: of a branch."""
+
+    name: str
+    why: str
+    nodes: int = 0
+
+    def as_dict(self) -> dict[str, object]:
+        """Return it for JSON."""
+        return {"name": self.name, "why": self.why, **({"nodes": self.nodes} if self.nodes else {})}
+
+
+NOT_JUDGED = "the search ended before it was judged"
+
+
 class Judge:
     """Looks at a mission, and at what is made of it."""
 

@@ -27,7 +27,7 @@ from alula.repair.composing import Composer, Sources
 from alula.repair.courses import Course, Courses, Here, States, Wanted, initial_states
 from alula.repair.errors import RepairError
 from alula.repair.fates import MOST_FAULTS, Fate
-from alula.repair.judging import Judge
+from alula.repair.judging import NOT_JUDGED, Judge, Refused
 from alula.repair.naming import another, in_short, plain, told_state
 from alula.repair.purposes import Purpose, Purposes, asked_of_others, broken_by
 from alula.repair.repairing import Question, Search, Tell, condition_of
@@ -98,13 +98,17 @@ class Plan:
 
 @dataclass(frozen=True)
 class Answer:
-    """What came of it: a plan, or none; ``impossible``: no course of skills leads to the goal, though nothing fails."""
+    """What came of it: a plan, or none; ``impossible``: no course of skills leads to the goal, though nothing fails.
+
+    ``refused``: the courses that were tried and are none.
+    """
 
     plan: Plan | None
     tried: int
     impossible: bool = False
     stopped: bool = False
     reasons: tuple[str, ...] = ()
+    refused: tuple[Refused, ...] = ()
 
 
 class Planner:
@@ -153,6 +157,7 @@ class Planner:
         if not first.role and Here(states).fulfils(first.wanted):
             raise RepairError(f"--goal '{self._aim.goal}': it is so at first; say what is so by --from")
         tried = 0
+        refused: list[Refused] = []
         with suppress(OutOfTimeError):  # the search ends at once then
             self._can_be_asked()
         for course, ends in islice(self._through(Here(states), self._stages), MOST_COURSES):
@@ -161,12 +166,13 @@ class Planner:
             try:
                 plan = self._proved(course, ends)
             except OutOfTimeError:
-                return Answer(None, tried, stopped=True)
+                return Answer(None, tried, stopped=True, refused=(*refused, Refused(names, NOT_JUDGED)))
             if isinstance(plan, Plan):
                 self._tell(f"{names}: proved, {plan.nodes} nodes")
-                return Answer(self._repaired(plan), tried, stopped=self._stopped)
+                return Answer(self._repaired(plan), tried, stopped=self._stopped, refused=tuple(refused))
+            refused.append(Refused(names, plan))
             self._tell(f"{names}: no: {plan}")
-        return Answer(None, tried, impossible=not tried, reasons=() if tried else tuple(self._why(states)))
+        return Answer(None, tried, impossible=not tried, reasons=() if tried else tuple(self._why(states)), refused=tuple(refused))
 
     def _can_be_asked(self) -> None:
         """Raise RepairError where what must never be names what the robot has not."""

@@ -30,7 +30,7 @@ from alula.repair.errors import RepairError
 from alula.repair.failing import Failing, failing_by
 from alula.repair.fates import MOST_FAULTS, Fate
 from alula.repair.game import played
-from alula.repair.judging import Judge, Judgement, run_of
+from alula.repair.judging import NOT_JUDGED, Judge, Judgement, Refused, run_of
 from alula.repair.patterns import MOST_NODES, Patterns
 from alula.repair.subject import Subject, with_property, without_properties_of
 from alula.trees.attributes import node_name, type_name
@@ -111,7 +111,8 @@ class Answer:
 
     ``impossible``: it can't be accomplished with the fault, as ``reasons`` show; a repair then brings it to a safe end. Else, without a
     repair, nobody knows; ``stopped``: not all branches were tried, as the time was over, or somebody ended the search. ``strikes``: how
-    often the fault comes at most, where it is no more than bad ends of skills; 0: it comes once, and stays.
+    often the fault comes at most, where it is no more than bad ends of skills; 0: it comes once, and stays. ``refused``: the branches that
+    were tried and are none.
     """
 
     failing: tuple[Failing, ...]
@@ -122,6 +123,7 @@ class Answer:
     tried: int = 0
     stopped: bool = False
     strikes: int = 0
+    refused: tuple[Refused, ...] = ()
 
     @property
     def survives_already(self) -> bool:
@@ -156,6 +158,7 @@ class Search:
         self._judge = Judge(subject, deadline, self._goal, question.most_faults, question.reached)
         self._patterns = Patterns(subject, question.using, question.most_faults, question.most_nodes)
         self._refuted: set[frozenset[str]] = set()
+        self._refused: list[Refused] = []
         self._stopped = False
         self._missing = tuple(subject.names_asked())
 
@@ -209,8 +212,8 @@ class Search:
             repair = self._with_fates(text, repair)
         if repair is None and not reasons:
             reasons = [*self._why_unknown(text), *self._patterns.lacking]
-            return Answer(tuple(failing), fate, None, reasons=tuple(reasons), tried=tried, stopped=self._stopped)
-        return Answer(tuple(failing), fate, repair, bool(reasons), tuple(reasons), tried, self._stopped)
+            return Answer(tuple(failing), fate, reasons=tuple(reasons), tried=tried, stopped=self._stopped, refused=tuple(self._refused))
+        return Answer(tuple(failing), fate, repair, bool(reasons), tuple(reasons), tried, self._stopped, refused=tuple(self._refused))
 
     def _can_be_asked(self) -> None:
         """Raise RepairError where a condition that is asked for names what the robot has not."""
@@ -269,9 +272,11 @@ class Search:
                 found = self._judged(branch, read, fate, finding)
             except OutOfTimeError:
                 self._stopped = True
+                self._refused.append(Refused(branch.name, NOT_JUDGED, branch.size))
                 return None, tried
             if isinstance(found, Repair):
                 return replace(found, tried=tried), tried
+            self._refused.append(Refused(branch.name, found, branch.size))
             self._tell(f"{branch.size} nodes, '{branch.name}': no: {found}")
         return None, tried
 

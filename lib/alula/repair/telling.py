@@ -62,6 +62,7 @@ def as_dict(answer: Answer, odds: Both | None) -> dict[str, object]:
         "stopped": answer.stopped,
         "reasons": list(answer.reasons),
         "assuming": list(answer.assuming),
+        "refused": [one.as_dict() for one in answer.refused],
     }
     if repair is None:
         return found
@@ -140,7 +141,13 @@ def plan_as_text(answer: planning.Answer) -> str:
 def plan_as_dict(answer: planning.Answer) -> dict[str, object]:
     """Return what `--json` prints."""
     kind = "planned" if answer.plan else "impossible" if answer.impossible else "unknown"
-    found: dict[str, object] = {"answer": kind, "tried": answer.tried, "stopped": answer.stopped, "reasons": list(answer.reasons)}
+    found: dict[str, object] = {
+        "answer": kind,
+        "tried": answer.tried,
+        "stopped": answer.stopped,
+        "reasons": list(answer.reasons),
+        "refused": [one.as_dict() for one in answer.refused],
+    }
     if answer.plan is None:
         return found
     plan = answer.plan

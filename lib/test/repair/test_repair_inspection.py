@@ -102,6 +102,7 @@ def test_what_a_branch_needs_and_may_not_be_there_is_named(tmp_path: Path, monke
     answer, told = repaired("camera", tmp_path, monkeypatch, ready="look.camera == OK")
     assert (answer.repair, answer.impossible, answer.reasons) == (None, False, ())
     assert any("no: with camera it may not be accomplished" in one and "look.thermal may be UNKNOWN then" in one for one in told)
+    assert [f"{one.nodes} nodes, '{one.name}': no: {one.why}" for one in answer.refused] == [one for one in told if "': no: " in one]
 
 
 def test_what_stays_where_it_was_brought_need_not_be_brought_there_again(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:

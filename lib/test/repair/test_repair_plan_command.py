@@ -92,12 +92,16 @@ def test_what_no_course_keeps_is_unknown_not_impossible(robot: Path, capsys: pyt
     assert main([str(robot), *HOME, *TIME, "--never", "running(base.dock)", "--json"]) == 1
     found = json.loads(capsys.readouterr().out)
     assert (found["answer"], found["tried"], found["stopped"]) == ("unknown", 1, False)
+    (refused,) = found["refused"]
+    assert refused["name"].endswith("base.dock")
+    assert "`asked_never`" in refused["why"]
 
 
 def test_without_time_nothing_is_known(robot: Path, capsys: pytest.CaptureFixture[str]) -> None:
     assert main([str(robot), *HOME, "--time", "0", "--never", "running(base.fly)", "--json"]) == 1
     found = json.loads(capsys.readouterr().out)
     assert (found["answer"], found["stopped"]) == ("unknown", True)
+    assert found["refused"][-1]["why"] == "the search ended before it was judged"
 
 
 REFUSED = (
