@@ -11,6 +11,12 @@ from scipy.spatial.transform import Rotation
 
 from lidar_obstacles import MountCheck
 from perception_core import NS, FaultKind, Finding, PoseBuffer, Sweep, Verdict
+from uav_simulator.sensors.lidar import Lidar
+from uav_simulator.sensors.mounts import LIDAR
+from uav_simulator.sensors.pose_track import Pose, PoseTrack
+from uav_simulator.world.config import find_world, load_world
+from uav_simulator.world.parts import build_parts
+from uav_simulator.world.scene import Scene
 
 DATA = Path(os.environ.get("ALULA_DATA", Path(__file__).resolve().parents[5] / "shared" / "data")) / "lidar_kitti"
 UP = np.eye(4)
@@ -137,6 +143,24 @@ def test_a_dense_sensor_that_is_mirrored_or_turned_is_known_as_soon_as_a_sparse_
     first = next(k for k, finding in enumerate(findings) if not finding.ok)
     assert findings[first].reason == f"by the vehicle's own motion the LiDAR is {name}{CAUSES}"
     assert first <= 20  # 3 m
+
+
+def test_few_things_along_a_sideways_way_are_no_sensor_that_repeats_what_it_saw() -> None:
+    """Between x = 18 and 30 m of the yard a dozen posts and walls are near, most cut out of ground and fence by the rings."""
+    scene, mount = Scene(build_parts(load_world(find_world("yard")), 1)), np.eye(4)
+    mount[:3, :3], mount[:3, 3] = LIDAR.matrix, LIDAR.translation
+    for begin_m in np.arange(17.0, 19.0, 0.1):
+        lidar, track, poses, check = Lidar(scene, 1, noise_m=0.02), PoseTrack(), PoseBuffer(), MountCheck()
+        for tick in range(600):
+            stamp_s, place, heading = 1.0 + 0.02 * tick, (float(begin_m) + 0.02 * tick, 14.0, 3.0), np.pi / 4.0
+            track.add(Pose(stamp_s, place, (float(np.cos(heading)), 0.0, 0.0, float(np.sin(heading)))))
+            poses.add(round(stamp_s * NS), place, (0.0, 0.0, float(np.sin(heading)), float(np.cos(heading))))
+            if tick % 5 or tick < 10:
+                continue
+            points = lidar.scan(track, stamp_s - lidar.spec.period_s)
+            start_ns = round((stamp_s - lidar.spec.period_s) * NS)
+            sweep = Sweep(start_ns, np.column_stack([points[axis] for axis in "xyz"]), points["time"].copy())
+            assert check.finding(sweep, mount, poses, self_m=0.85).verdict is not Verdict.BROKEN
 
 
 def test_a_dense_sensor_that_repeats_what_it_saw_with_noise_is_frozen() -> None:

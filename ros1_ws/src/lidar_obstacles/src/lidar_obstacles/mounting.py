@@ -11,7 +11,7 @@ above it and none below. Where there is nothing to hold against each other, a mo
 from __future__ import annotations
 
 from contextlib import suppress
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -43,6 +43,8 @@ UNJUDGED_S = 5.0  # of motion, in which too little was seen to judge a mount tha
 FITTING = ((0.7, 0.2), (0.4, 0.3))  # shares of the pairs that fit with the sensor turned, and by how much they are greater than as told
 """Where motion and walls do not tell, all shares are alike; among trees fewer fit."""
 ALIKE = 0.01  # by which two shares may differ that tell nothing apart: on a way straight to a wall, turned back and mirrored are the same
+SAME_M, REPEATED = 0.1, 0.9  # apart at most, and share, of what a sensor that repeats what it saw has where it was: all, but for noise
+LEAST_REPEATED = 16  # walls and posts: of eight all stay by chance, where the ground and a fence are cut out alike on the way
 LOOKS = 2  # in a row that say the same
 ABOVE_M, BELOW_M = 0.5, 0.05  # the sensor: level planes that count
 LEVEL_PLANES, RARELY, FADING = 6.0, 0.2, 0.9  # of planes above, that many and the others rarer; by look
@@ -80,11 +82,6 @@ class _Look:
         """Return places and normals in the map, the sensor turned."""
         rotations = self.rotations @ turn
         return np.einsum("nij,nj->ni", rotations, self.places) + self.origins, np.einsum("nij,nj->ni", rotations, self.normals)
-
-    def unmoved(self) -> _Look:
-        """Return the planes as they are seen from the vehicle, wherever it is."""
-        unturned = np.broadcast_to(np.eye(3), self.rotations.shape)
-        return replace(self, rotations=unturned, origins=np.zeros_like(self.origins))
 
     def upright(self) -> _Look:
         """Return only the walls and the posts."""
@@ -182,7 +179,7 @@ class MountCheck:
             self._suspected, self._times, self._as_told = set(), 0, True
             return
         shares = {name: _fitting(before, now, turn) or 0.0 for name, turn in OTHERS.items()}
-        shares[FROZEN] = _fitting(before.unmoved(), now.unmoved(), np.eye(3)) or 0.0
+        shares[FROZEN] = _repeated(before, now)
         best = max(shares.values())
         if any(best >= max(share, as_told + better) for share, better in FITTING):
             alike = {name for name, share in shares.items() if share >= best - ALIKE}
@@ -218,6 +215,17 @@ def _fitting(before: _Look, now: _Look, turn: Floats) -> float | None:
         fits.append(apart[apart < BESIDE_M] < FITS_POST_M)
     fitting = np.concatenate(fits)
     return float(np.mean(fitting)) if len(fitting) >= PAIRS else None
+
+
+def _repeated(before: _Look, now: _Look) -> float:
+    """Return the share of walls and posts that the sensor sees at the very place where it saw them, where that is nearly all; otherwise 0.
+
+    Walls along the way and what is cut out of them by the rings go along with the vehicle, too, but not to a decimetre.
+    """
+    if min(len(before.places), len(now.places)) < LEAST_REPEATED:
+        return 0.0
+    share = float(np.mean(cKDTree(before.places).query(now.places)[0] < SAME_M))
+    return share if share >= REPEATED else 0.0
 
 
 def _planes(sweep: Sweep, T_base_lidar: Floats, poses: PoseBuffer, least_m: float) -> _Look:  # noqa: N803 -- T_target_source
