@@ -2,7 +2,7 @@
 
 1. the history of the skillsets, and what the robot's own recordings tell       4. the timeline
 2. when it departed, and when it was back                                        5. what the robot's part measures and draws
-3. what failed, and what the mission did about it                                6. the summary, and the page of it all
+3. what failed, and what the mission did about it                                6. the summary, the page, and what it explains
 """
 
 from __future__ import annotations
@@ -117,13 +117,12 @@ def _timeline(run: ReportedRun, account: Account) -> Timeline | None:
 
 
 def _write_page(run: ReportedRun, part: ReportPart, account: Account, summary: Summary) -> None:
-    """Write the page, of all that is in the folder by now."""
+    """Write the page, of all that is in the folder by now, and what it explains into the summary."""
     problems = Problems()
     with problems.survive("report.html"):
-        write_report(run.folder, [*fault_entries(account.observed), *part.entries()], title=run.title)
-    if problems.sentences:
-        summary["problems"] = [*summary["problems"], *problems.sentences]
-        _write_summary(run, summary)
+        summary["causes"] = write_report(run.folder, [*fault_entries(account.observed), *part.entries()], title=run.title)
+    summary["problems"] = [*summary["problems"], *problems.sentences]
+    _write_summary(run, summary)
 
 
 def fault_entries(observed: Observed) -> list[Wire]:
@@ -135,4 +134,5 @@ def _write_summary(run: ReportedRun, summary: Summary) -> None:
     try:
         write_json(run.folder / "summary.json", summary)
     except OSError as error:
-        summary["problems"].append(f"summary.json could not be written: {error.strerror or error}")
+        sentence = f"summary.json could not be written: {error.strerror or error}"
+        summary["problems"] = [*(one for one in summary["problems"] if one != sentence), sentence]

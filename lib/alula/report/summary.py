@@ -1,4 +1,7 @@
-"""``summary.json``: one run in numbers. Times are seconds since the departure, rounded to the millisecond; null is "not known"."""
+"""``summary.json``: one run in numbers. Times are seconds since the departure, rounded to the millisecond; null is "not known".
+
+``causes``, which is what the page shows of failures (``page/causes.py``), alone has stamps of mission clock.
+"""
 
 from __future__ import annotations
 

@@ -35,7 +35,7 @@ from alula.console.feed import CHUNK_BYTES, Feed, Place, place_of
 from alula.report.page.areas import areas_of
 from alula.report.page.clouds import MAX_POINTS, CloudError, packed, read_points, thinned
 from alula.report.page.embedded import REPORT, entries_inside, read_report
-from alula.report.page.entries import AREAS, CAUSES, HEALTH, MAP, NODES, PATH, PICTURE, ROUTE, RUN, Converter, Wire
+from alula.report.page.entries import AREAS, CAUSES, HEALTH, MAP, NODES, PATH, PICTURE, ROUTE, RUN, SUMMARY, Converter, Wire
 from alula.report.page.following import RunFollower
 from alula.report.page.writing import MAX_PICTURES, PARTS, make_page, write_report
 
@@ -192,6 +192,21 @@ def test_a_summary_decides_which_fault_a_failure_follows_from(tmp_path: Path) ->
     assert (fault["text"], fault["t"], fault["until"]) == ("lidar was lost", LIFT_OFF_S + 29, LIFT_OFF_S + 31)
     assert failure["fault"] == 0
     assert (causes["departed_s"], causes["back_s"]) == (LIFT_OFF_S, None)
+
+
+def test_a_page_opened_later_reads_the_causes_in_the_summary_and_makes_those_of_an_older_one(tmp_path: Path) -> None:
+    write_record(tmp_path, failing_story())
+    (tmp_path / "run.json").write_text(json.dumps({"faults": ["zed@30"]}), encoding="utf-8")
+    older = {"outcome": "degraded"}
+    (tmp_path / "summary.json").write_text(json.dumps(older), encoding="utf-8")
+    explained = write_report(tmp_path, title="x")
+    assert explained == causes_in(RunFollower(tmp_path).poll()) == causes_in(read_report(tmp_path / REPORT))
+    assert [failure["skill"] for failure in explained["failures"]] == ["zed_depthmap"]
+    kept = {**explained, "failures": [{**explained["failures"][0], "text": "as it was told when the run ended"}]}
+    (tmp_path / "summary.json").write_text(json.dumps({**older, "causes": kept}), encoding="utf-8")
+    entries = RunFollower(tmp_path).poll()
+    assert causes_in(entries) == kept, "what the summary says is derived again by nobody"
+    assert [value for topic, _, value in entries if topic == SUMMARY] == [older]
 
 
 def test_the_page_is_told_what_is_bad_news_and_why_and_looks_at_no_names(tmp_path: Path) -> None:

@@ -1,6 +1,7 @@
-"""Explain a run's failures for the page: faults, how and why each skill failed, how the mission reacted.
+"""Explain a run's failures: faults, how and why each skill failed, how the mission reacted.
 
-The page shows it and judges nothing: what is pushed to a live page and what is inside a report is made here, of the same entries.
+The page shows it and judges nothing. While a run goes on, its live page is pushed what is made here; when it has ended, the report makes
+it for the last time, shows it and writes it into ``summary.json``, where pages that are opened later read it.
 """
 
 from __future__ import annotations
@@ -28,7 +29,10 @@ from alula.runtime.core.events import EngineEvent, TransitionEvent, read_event
 HOLDING = {"pause": True, "paused": True, "resume": False, "abort": False}
 """Whether the mission is held after it has said so."""
 
-NOTHING: dict[str, Any] = {"departed_s": None, "back_s": None, "faults": [], "failures": []}
+Explanation = dict[str, Any]
+"""``departed_s`` and ``back_s``, ``faults``, and ``failures`` with their chains of causes; seconds of mission clock."""
+
+NOTHING: Explanation = {"departed_s": None, "back_s": None, "faults": [], "failures": []}
 """What a page is told that is told nothing."""
 
 
@@ -45,7 +49,8 @@ class Causes:
         self._held: list[tuple[float, float]] = []
         self._aborts: list[float] = []
         self._new = False
-        self._told: object = NOTHING
+        self._told: Explanation = NOTHING
+        self._summed: Explanation | None = None
         self._effects: EffectsByFault | None = None
 
     def take(self, entry: Wire) -> None:
@@ -54,16 +59,26 @@ class Causes:
         with contextlib.suppress(ValueError, TypeError, KeyError, IndexError, AttributeError):
             self._take(topic, -math.inf if t_s is None else t_s, value)
 
-    def told(self) -> dict[str, Any] | None:
+    def settle(self, explanation: object) -> None:
+        """Take the explanation that the run's summary has; for an older summary, which has none, it is made of the entries."""
+        self._summed = explanation if isinstance(explanation, dict) else None
+        self._new = True
+
+    def told(self) -> Explanation | None:
         """Return the explanation; None where it has not changed since the last call."""
         if not self._new:
             return None
         self._new = False
-        told = self._tell()
+        told = self._tell() if self._summed is None else self._summed
         if told == self._told:
             return None
         self._told = told
         return told
+
+    @property
+    def explanation(self) -> Explanation:
+        """The explanation that was returned last."""
+        return self._told
 
     def _take(self, topic: str, t_s: float, value: Any) -> None:
         match topic:
@@ -99,7 +114,7 @@ class Causes:
 
     # --- what follows from it ------------------------------------------------------------------------------------------
 
-    def _tell(self) -> dict[str, Any]:
+    def _tell(self) -> Explanation:
         events = sorted(self._events, key=lambda event: event.stamp_ns)
         failures = skill_failures(events)
         faults = self._faults(events)
@@ -231,6 +246,7 @@ def _failure(failure: SkillFailure, faults: list[KnownFault], scene: Scene, fail
     behind = next((at for at, fault in enumerate(faults) if end.id in fault.failed), None)
     chain = chain_of(failure, None if behind is None else faults[behind], scene, failures)
     reaction = reaction_in(chain)
+    until_s = reacts_until_s(end.stamp_s, scene)
     return {
         "key": f"{end.skillset}/{end.skill}/{end.id}",
         "skill": end.skill,
@@ -238,7 +254,7 @@ def _failure(failure: SkillFailure, faults: list[KnownFault], scene: Scene, fail
         "text": end_text(end),
         "fault": behind,
         "chain": [_step(one) for one in chain],
-        "reacts_until": reacts_until_s(end.stamp_s, scene),
+        "reacts_until": until_s if math.isfinite(until_s) else None,
         "reaction": None if reaction is None else {"t": reaction[0], "text": reaction[1]},
     }
 

@@ -38,7 +38,7 @@ PARTS = "/parts"
 """Of a deployment that is up, which is shown as a run without a scenario: ``{parts, master: {uri, problem, ahead_s, within_s}, disk}``.
 A part is ``{name, state, deaths, why}``."""
 SUMMARY = "/summary"
-"""The values of ``summary.json``."""
+"""The values of ``summary.json`` but for its ``causes``."""
 PATH = "/path"
 """Where the robot was: ``[x, y, z]``, frame map, metres."""
 FAULT = "/fault"

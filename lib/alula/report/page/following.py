@@ -11,7 +11,7 @@ from alula.common import run_log
 from alula.common.record import FILE, OPERATOR, Entry, RecordError, RecordFollower
 from alula.common.robots import page_words
 from alula.report.page.areas import areas_of
-from alula.report.page.causes import Causes
+from alula.report.page.causes import Causes, Explanation
 from alula.report.page.clouds import CloudError, packed, read_points
 from alula.report.page.embedded import REPORT, read_report
 from alula.report.page.entries import AREAS, CAUSES, MAP, OF_RECORDINGS, PARTS, PICTURE, RUN, SUMMARY, Converter, Wire
@@ -44,11 +44,16 @@ class RunFollower:
             (folder / "run.json", RUN, self._run),
             (folder / "run.json", AREAS, lambda path: areas_of(str(_json(path).get("world") or ""))),
             (folder / "map.ply", MAP, lambda path: packed(read_points(path))),
-            (folder / "summary.json", SUMMARY, _json),
+            (folder / "summary.json", SUMMARY, self._summary),
             (folder / "state.json", PARTS, _parts),
         ]
         self._seen: dict[str, tuple[int, int]] = {}
         self._told = False
+
+    @property
+    def explanation(self) -> Explanation:
+        """Failures and their causes, as by the last call of ``poll``."""
+        return self._causes.explanation
 
     def poll(self, limit: int | None = None) -> list[Wire]:
         """Return what came since the last call, what belongs to the whole run first.
@@ -117,6 +122,12 @@ class RunFollower:
             "name": self.folder.name,
             "words": page_words(),
         }
+
+    def _summary(self, path: Path) -> dict[str, Any]:
+        """Return the summary without the causes, which are an entry of their own."""
+        values: dict[str, Any] = _json(path)
+        self._causes.settle(values.pop("causes", None))
+        return values
 
 
 def _parts(path: Path) -> Any:

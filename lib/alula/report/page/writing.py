@@ -10,6 +10,7 @@ from collections.abc import Iterable, Mapping
 from pathlib import Path
 
 from alula.common.files import write_text
+from alula.report.page.causes import Explanation
 from alula.report.page.embedded import REPORT, embedded
 from alula.report.page.entries import PICTURE, Wire
 from alula.report.page.following import RunFollower
@@ -40,16 +41,19 @@ def make_page(*, title: str, entries: Iterable[Wire] | None = None) -> str:
     return skeleton
 
 
-def write_report(folder: Path, more: Iterable[Wire] = (), *, title: str) -> None:
+def write_report(folder: Path, more: Iterable[Wire] = (), *, title: str) -> Explanation:
     """Write ``report.html`` into a run's folder: what the folder tells, and ``more`` (``OF_RECORDINGS``) that its other recordings tell.
 
-    The live page of a run that is over takes the latter from the report, and so says what it says, to the last digit.
+    The live page of a run that is over takes the latter from the report, and so says what it says, to the last digit. Return what the
+    report says of failures and their causes.
 
     Raises:
         OSError: it can't be written.
     """
-    entries = few_pictures(RunFollower(folder, more).poll())
+    follower = RunFollower(folder, more)
+    entries = few_pictures(follower.poll())
     write_text(folder / REPORT, make_page(title=title, entries=sorted(entries, key=lambda entry: (entry[1] is not None, entry[1] or 0.0))))
+    return follower.explanation
 
 
 def few_pictures(entries: list[Wire]) -> list[Wire]:

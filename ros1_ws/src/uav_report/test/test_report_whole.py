@@ -19,6 +19,8 @@ from alula.common.record import FILE as RECORD
 from alula.report import __main__ as report
 from alula.report.facts import RunFacts
 from alula.report.making import make_report
+from alula.report.page.embedded import read_report
+from alula.report.page.entries import CAUSES
 from alula.report.verdict import verdict_lines
 
 sys.path.insert(0, str(Path(__file__).parent))
@@ -227,6 +229,13 @@ def test_the_timeline_as_picture(whole):
     assert "failed or refused" not in texts, "the legend explains only what is there"
 
 
+def test_the_summary_has_the_causes_that_the_page_shows(whole):
+    folder, summary = whole
+    (shown,) = [value for topic, _, value in read_report(folder / "report.html") if topic == CAUSES]
+    assert summary["causes"] == json.loads((folder / "summary.json").read_text())["causes"] == shown
+    assert "zed_depthmap" in [failure["skill"] for failure in shown["failures"]]
+
+
 def test_the_same_folder_gives_the_same_files_again(whole):
     folder, _ = whole
     before = (folder / "timeline.svg").read_bytes(), (folder / "timeline.json").read_bytes()
@@ -246,7 +255,7 @@ def test_the_report_of_a_run_without_a_supervisor_is_a_command(folder, capsys):
 def test_an_empty_folder(tmp_path):
     summary = make_report(facts(tmp_path, faults=[], mission_exit=None))
     known = {"scenario", "seed", "map", "skills", "resources", "faults", "injected", "died", "lift_off", "accounts", "problems"}
-    known |= {"answers", "tasks"}
+    known |= {"answers", "tasks", "causes"}
     assert {key for key, value in summary.items() if value is not None} == known
     assert summary["skills"] == summary["resources"] == []
     assert set(summary["map"].values()) == {None}
