@@ -73,6 +73,30 @@ def test_a_dead_encoder_is_told_as_such_and_ends_the_flight_as_a_lost_video_does
     assert on_ground(mission)
 
 
+CUT_OFF = """
+skills:
+  navigation.hover: {delay: 3.2, result: ABORTED, message: nothing is heard of the guidance}
+  navigation.land: {delay: 0.2, result: ABORTED, message: "refused: on the ground", then: [], moves: {}}
+"""
+"""What a vehicle answers that its dead man lands while the link is away."""
+
+
+@pytest.mark.parametrize(("told_s", "landings"), [(74.3, []), (75.5, [("TERMINATED", "ABORTED")])], ids=["at once", "later than the link"])
+def test_a_lost_link_that_ends_the_video_first_is_waited_for_before_anything_else_is_asked_of_the_vehicle(tmp_path, told_s, landings):
+    down = f"timeline: [{{after: {told_s}, set: {{navigation.flight_status: ON_GROUND}}}}]\n"
+    (tmp_path / "cut_off.yaml").write_text(CUT_OFF + down)
+    cut_off = Mission.load("inspection", behaviour=[tmp_path / "cut_off.yaml"])
+    mission = cut_off.mocked("encoder@40", "link:silent@44.5-72.5")  # the one from lift-off, the other from the start
+    assert mission.run().outcome is Outcome.DEGRADED
+    assert mission.end.reason.startswith("video.stream: LOST")
+    links = {event.to_state: event.stamp_ns for event in mission.events if getattr(event, "resource", "") == "link"}
+    hover, *asked = [one for one in mission.executions if one.skill in {"hover", "land"}]
+    assert hover.started_ns < links["UNKNOWN"] < hover.ended_ns, "it is asked for before the link is known to be lost"
+    assert all(one.requested_ns > links["UP"] for one in asked)
+    assert [(one.state.name, one.result) for one in asked] == landings
+    assert on_ground(mission)
+
+
 def test_without_the_ground_station_the_video_goes_first_and_then_the_failsafe_has_the_vehicle():
     mission = fly("ground_station@40")
     assert mission.end.outcome is Outcome.GIVEN_UP

@@ -85,7 +85,7 @@ def test_a_service_that_is_away_is_waited_for_and_then_given_up():
     assert there.sent == []
     clock.now = 3.1
     queue.tick()
-    assert responses == [Response(accepted=False, reason="service /away is not there for 3 s")]
+    assert responses == [Response(accepted=False, answered=False, reason="service /away is not there for 3 s")]
     assert len(there.sent) == 1
 
 
@@ -99,14 +99,16 @@ def test_a_service_that_comes_back_in_time_is_called():
     assert len(service.sent) == 1
 
 
-def test_a_call_without_a_response_is_refused_here_once():
+def test_a_call_without_a_response_gets_one_here_once_that_is_no_refusal():
     service, clock, responses = FakeService("/mute"), Clock(), []
     queue = CallQueue(clock)
     queue.submit(service, "a", responses.append)
     clock.now = 21.0
     queue.tick()
     queue.tick()
-    assert responses == [Response(accepted=False, reason="service /mute does not answer for 20 s")]
+    assert responses == [Response(accepted=False, answered=False, reason="service /mute does not answer for 20 s")]
+    assert responses[0].failure == responses[0].reason
+    assert Response(accepted=False, reason="on the ground").failure == "refused: on the ground"
     assert service.forgotten == [service.sent[0][1]]
     service.sent[0][1].finish(accepted=True, reason="", reference_id=1)
     assert len(responses) == 1

@@ -107,6 +107,49 @@ def test_a_refused_flight_carries_the_reason(rig):
     assert handle.message == "refused: target is outside the fence"
 
 
+@pytest.fixture
+def unanswered(rig, monkeypatch):
+    """Return what has a service of the guidance answer no more: its responses are lost, or the calls. It returns the guidance."""
+    from rclpy.task import Future
+
+    def lose(name):
+        guidance = next(hook.guidance for hook in rig._hooks if hasattr(hook, "guidance"))
+        monkeypatch.setattr(getattr(guidance, f"_{name}"), "call_async", lambda _request: Future())
+        return guidance
+
+    return lose
+
+
+def test_a_flight_whose_command_is_not_answered_was_not_refused(rig, unanswered):
+    rig.in_air()
+    unanswered("position")
+    handle = rig.start("navigation", "goto", target=(5.0, 0.0, 3.0), speed=1.0)
+    assert rig.ended(handle) == ("TERMINATED", "ABORTED")
+    assert handle.message == "service /uav_guidance/set_position does not answer for 20 s"
+    rig.wait(lambda: rig.functional.names() == ["hover"])  # it may have arrived, or still arrive
+
+
+def test_a_flight_whose_guidance_goes_silent_before_it_answers_ends_by_the_silence(rig, unanswered):
+    rig.in_air()
+    unanswered("position")
+    rig.functional.vehicle.silent, began_s = True, rig.functional.now_s
+    handle = rig.start("navigation", "goto", target=(5.0, 0.0, 3.0), speed=1.0)
+    assert rig.ended(handle) == ("TERMINATED", "ABORTED")
+    assert "nothing is heard of the guidance for 3." in handle.message
+    assert rig.functional.now_s - began_s < 10.0
+    rig.wait(lambda: rig.functional.names() == ["hover"])
+
+
+def test_a_hover_that_is_not_answered_is_not_followed_by_another(rig, unanswered):
+    rig.in_air()
+    guidance = unanswered("hover")
+    rig.functional.vehicle.silent = True
+    handle = rig.start("navigation", "hover", duration=2.0)
+    assert rig.ended(handle) == ("TERMINATED", "ABORTED")
+    assert "nothing is heard of the guidance" in handle.message
+    assert len(guidance._calls._calls) == 1
+
+
 def test_drifting_off_the_line_aborts_and_stops(rig):
     rig.in_air()
     rig.functional.vehicle.drift_m = 3.5

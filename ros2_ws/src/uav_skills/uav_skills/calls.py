@@ -3,7 +3,7 @@
 The functional layer lives in another world behind the bridge: a service may be away for a moment, and two services are
 served by different threads. So calls wait in one queue, and the next is sent when the last got its response, or when it was sent
 long enough ago to have arrived: a response may take seconds (the guidance arms the vehicle first), and a call that stops the
-vehicle must not wait for it. A call without a response in time gets a refusal from here that says so.
+vehicle must not wait for it. A call without a response in time gets one from here, that is no refusal: nobody knows whether it arrived.
 """
 
 from __future__ import annotations
@@ -20,11 +20,17 @@ SERVER_TIMEOUT_S = 3.0
 
 @dataclass(frozen=True)
 class Response:
-    """A service's response; ``reference_id`` is 0 where the service has none or refused."""
+    """A service's response; ``reference_id`` is 0 where the service has none or refused. ``answered``: it is the service's own."""
 
     accepted: bool
     reason: str = ""
     reference_id: int = 0
+    answered: bool = True
+
+    @property
+    def failure(self) -> str:
+        """Say why the request is not followed: the service's words, as a refusal, or that it gave none."""
+        return f"refused: {self.reason}" if self.answered else self.reason
 
 
 Reply = Callable[[Response], None]
@@ -63,11 +69,9 @@ class _Call:
     def holds_back(self, now_s: float) -> bool:
         return self.sent_s is None or now_s - self.sent_s < ARRIVED_AFTER_S
 
-    def refusal(self) -> Response:
-        name = self.service.service_name
-        if self.sent_s is None:
-            return Response(accepted=False, reason=f"service {name} is not there for {SERVER_TIMEOUT_S:g} s")
-        return Response(accepted=False, reason=f"service {name} does not answer for {RESPONSE_TIMEOUT_S:g} s")
+    def unanswered(self) -> Response:
+        missing = f"is not there for {SERVER_TIMEOUT_S:g} s" if self.sent_s is None else f"does not answer for {RESPONSE_TIMEOUT_S:g} s"
+        return Response(accepted=False, answered=False, reason=f"service {self.service.service_name} {missing}")
 
 
 def ignore_response(_response: Response) -> None:
@@ -105,7 +109,7 @@ class CallQueue:
         for call in overdue:
             if call.future is not None:
                 call.service.remove_pending_request(call.future)
-            call.reply(call.refusal())
+            call.reply(call.unanswered())
         for call in sent:
             self._follow(call)
 

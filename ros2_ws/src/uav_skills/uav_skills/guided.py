@@ -3,7 +3,7 @@
 The life of one execution (paper, Listing 4): ``on_dispatch`` sends a command and returns; the response brings the reference's id;
 every state of the guidance that speaks of this id is decided on; a verdict ends the execution. When the verdict is not the
 success, the vehicle is told to hover: the motion is not watched any more. A guidance that speaks of something else, or not
-at all, ends the execution, too: the reference is lost.
+at all, ends the execution, too: the reference is lost, or the command may not have arrived.
 """
 
 from __future__ import annotations
@@ -32,6 +32,7 @@ class GuidedMotion:
 
     execution: Execution
     reference_id: int | None = None
+    asked_s: float | None = None  # since when a response to the command is waited for
     heard_s: float = 0.0
     followed_since_s: float | None = None
     initial: float = 0.0
@@ -96,7 +97,7 @@ class GuidedSkill(SkillHooks):
         motion = GuidedMotion(execution)
         with self._lock:
             self._motion = motion
-        self.send(motion)
+        self._ask(motion)
 
     def progress(self, execution: Execution) -> float:
         """Tell how much of the way is behind."""
@@ -129,9 +130,9 @@ class GuidedSkill(SkillHooks):
         if self._motion is not motion:
             return  # interrupted meanwhile: the command that stops it is in the queue behind
         if not response.accepted:
-            self._end(motion, SkillEnd("ABORTED", f"refused: {response.reason}"), stop=False)
+            self._end(motion, SkillEnd("ABORTED", response.failure), stop=not response.answered and self._should_stop(motion))
             return
-        motion.heard_s = self.guidance.now_s
+        motion.asked_s, motion.heard_s = None, self.guidance.now_s
         motion.reference_id = response.reference_id
 
     @staticmethod
@@ -155,21 +156,42 @@ class GuidedSkill(SkillHooks):
 
     def _on_watch(self) -> None:
         motion = self._motion
-        if motion is None or motion.reference_id is None:
+        if motion is None:
             return
-        silent_s = self.guidance.now_s - motion.heard_s
-        if silent_s > self.thresholds.reference_lost_s:
-            # The vehicle is being landed, perhaps because no mission decides any more: a hover would keep it in the air.
-            state = self.guidance.state
-            self._end(motion, self._unheard() or self.lost(silent_s), stop=state is None or state.reference != "land")
+        verdict = self._unanswered(motion) if motion.reference_id is None else self._unfollowed(motion)
+        if verdict is not None:
+            self._end(motion, verdict, stop=self._should_stop(motion))
 
-    def _unheard(self) -> SkillEnd | None:
-        """Say how the execution ends when the guidance does not speak at all; None: it does."""
+    def _unanswered(self, motion: GuidedMotion) -> SkillEnd | None:
+        """Say how an execution ends whose command is not answered, because the guidance is not heard of since; None: wait."""
+        return None if motion.asked_s is None else self._unheard(motion.asked_s)
+
+    def _unfollowed(self, motion: GuidedMotion) -> SkillEnd | None:
+        """Say how an execution ends of whose reference the guidance does not speak; None: it does, or did a moment ago."""
+        silent_s = self.guidance.now_s - motion.heard_s
+        return (self._unheard() or self.lost(silent_s)) if silent_s > self.thresholds.reference_lost_s else None
+
+    def _unheard(self, since_s: float = 0.0) -> SkillEnd | None:
+        """Say how the execution ends when the guidance does not speak at all, since then at least; None: it does."""
         heard_s = self.guidance.heard_s
-        silent_s = self.guidance.now_s - (0.0 if heard_s is None else heard_s)
+        silent_s = self.guidance.now_s - max(since_s, 0.0 if heard_s is None else heard_s)
         if silent_s <= self.thresholds.reference_lost_s:
             return None
         return SkillEnd("ABORTED", f"nothing is heard of the guidance for {silent_s:.1f} s: {UNHEARD}")
+
+    def _should_stop(self, motion: GuidedMotion) -> bool:
+        """Tell whether a hover is to follow a motion that is not watched any more.
+
+        Not while the vehicle is being landed, perhaps because no mission decides: it would stay in the air. Nor after a hover that may
+        still arrive: another one might arrive after the landing that the mission asks for next.
+        """
+        state = self.guidance.state
+        asked = motion.reference_id is None and self.reference == "hover"
+        return not asked and (state is None or state.reference != "land")
+
+    def _ask(self, motion: GuidedMotion) -> None:
+        motion.asked_s = self.guidance.now_s
+        self.send(motion)
 
     def _end(self, motion: GuidedMotion, verdict: SkillEnd, *, stop: bool) -> None:
         with self._lock:

@@ -89,7 +89,7 @@ class _Flight(GuidedSkill):
         motion = self._motion
         if motion is None or motion.execution is not execution:
             return "the way to the target is forgotten"
-        self.send(motion)
+        self._ask(motion)
         return ""
 
     def decide(self, motion: GuidedMotion, state: GuidanceState) -> SkillEnd | None:  # noqa: ARG002

@@ -73,7 +73,7 @@ class WatchedSkill(SkillHooks):
     def on_response(self, execution: Execution, response: Response) -> None:
         """Take the answer to switching on."""
         if not response.accepted and self._forget(execution):
-            execution.terminate("ABORTED", f"refused: {response.reason}")
+            execution.terminate("ABORTED", response.failure)
 
     def _on_watch(self) -> None:
         execution = self._execution
