@@ -39,3 +39,15 @@ def test_nothing_is_left_of_what_was_measured(tmp_path: Path, monkeypatch: pytes
     assert bench.main(["--processes", "single", "--seconds", "1"]) == 0
     assert "| single | bridge | 1 | 100 | 70 | 0.010 |" in capsys.readouterr().out
     assert list(tmp_path.iterdir()) == []
+
+
+def test_nothing_is_left_of_a_measurement_that_was_broken_off(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    def measure(_processes: object, _seconds: float, folder: Path) -> bench.Figures:
+        folder.mkdir()
+        raise KeyboardInterrupt
+
+    monkeypatch.setattr(tempfile, "tempdir", str(tmp_path))
+    monkeypatch.setattr(bench, "measure", measure)
+    with pytest.raises(KeyboardInterrupt):
+        bench.main(["--processes", "single", "--seconds", "1"])
+    assert list(tmp_path.iterdir()) == []

@@ -170,14 +170,16 @@ def main(words: Sequence[str] | None = None) -> int:
     if not given.seconds > 0.0:
         parser.error(f"--seconds {given.seconds:g}: is a time, above 0")
     figures: dict[str, Figures] = {}
-    folder = Path(tempfile.mkdtemp(prefix="alula_bench_"))
-    try:
-        for name in given.processes or [one.value for one in Processes]:
-            figures[name] = measure(Processes(name), given.seconds, folder / name)
-    except UnreadyError as error:
-        sys.stderr.write(f"{parser.prog}: {error}\n")  # the folder is left: it says why
-        return 1
-    shutil.rmtree(folder)
+    with ExitStack() as cleaned:
+        folder = Path(tempfile.mkdtemp(prefix="alula_bench_"))
+        cleaned.callback(shutil.rmtree, folder)
+        try:
+            for name in given.processes or [one.value for one in Processes]:
+                figures[name] = measure(Processes(name), given.seconds, folder / name)
+        except UnreadyError as error:
+            cleaned.pop_all()  # the folder says why
+            sys.stderr.write(f"{parser.prog}: {error}\n")
+            return 1
     if given.json is not None:
         given.json.write_text(json.dumps({name: asdict(one) for name, one in figures.items()}, indent=1) + "\n", encoding="utf-8")
     sys.stdout.write(table(figures))

@@ -29,8 +29,9 @@ from uav_report.world import TrueSurfaces
 
 RADIO = "radio"
 SAME_MOMENT_S = 1.0
-UNHEARD_S = 2.0  # before the end: a guidance that says nothing for so long has died, and where the vehicle is now nobody knows
 """The radio tells its state twice a second: a fault of it and what it says of it are no farther apart."""
+UNHEARD_S = 2.0
+"""A guidance that says nothing for so long before the end has died: nobody knows where the vehicle is then."""
 MOVING_M_S = 0.2
 
 
