@@ -45,6 +45,13 @@ class Page:
         self.run(f"alula.choose({LIFT_OFF_S + since_lift_off_s})")
         self.run("new Promise((done) => requestAnimationFrame(() => requestAnimationFrame(done)))")
 
+    def unfold(self, selector: str) -> None:
+        """Open a `details` by the keyboard: what is drawn above it moves it away from a pointer."""
+        from selenium.webdriver.common.keys import Keys
+
+        self.browser.find_element("css selector", f"{selector} > summary").send_keys(Keys.ENTER)
+        self.wait(f"document.querySelector({json.dumps(selector)} + ' > :not(summary)').checkVisibility()")
+
     def status(self, node: str) -> str:
         return str(
             self.run(f"[...document.querySelectorAll('.row')].find((row) => row.textContent.includes({json.dumps(node)})).dataset.status")
