@@ -50,7 +50,7 @@ ROOMS = {
     "language": "common model",
     "generate": "language model",
     "runtime": "common model",
-    "mock": "common model runtime",
+    "mock": "common language model runtime",
     "trees": "common",
     "missions": "common mock model runtime trees",
     "check": "common language missions model trees",

@@ -27,7 +27,7 @@ class Kind(Enum):
     NUMBER = "a number"
     STRING = "a string"
     PUNCTUATION = "punctuation"
-    END = "the end of the file"
+    END = "the end"
 
 
 @dataclass(slots=True)
@@ -40,10 +40,9 @@ class Token:
     column: int
     comment: str = ""
 
-    @property
-    def shown(self) -> str:
-        """The token as a message names it."""
-        return Kind.END.value if self.kind is Kind.END else f"`{self.text[:40]}`"
+    def shown(self, source: Source) -> str:
+        """Return the token as a message names it."""
+        return source.ends if self.kind is Kind.END else f"`{self.text[:40]}`"
 
 
 @dataclass
@@ -56,6 +55,8 @@ class Source:
 
     transitions: int = 0
     """How many transitions of resources were read."""
+    ends: str = "the end of the file"
+    """How messages call what stands behind the last character."""
 
     def __post_init__(self) -> None:
         self._lines: list[str] | None = None
@@ -92,10 +93,10 @@ _TOKEN = re.compile(
       | (?P<endless>/\*)
       | (?P<NAME>[A-Za-z_][A-Za-z0-9_]*)
       | (?P<NUMBER>-?(?:[0-9]+(?:\.[0-9]*)?|\.[0-9]+)(?:[eE][+-]?[0-9]+)?)
-      | (?P<STRING>"(?:[^"\\\n]|\\[^\n])*")
-      | (?P<open>"[^\n]*)
-      | (?P<PUNCTUATION>->|=>|==|!=|<=|>=|[{}():=<>.,;%/\[\]])
-      | (?P<bad>[^\sA-Za-z0-9_"{}():=<>.,;%/\[\]]+|.)""",
+      | (?P<STRING>"(?:[^"\\\n]|\\[^\n])*"|'(?:[^'\\\n]|\\[^\n])*')
+      | (?P<open>["'][^\n]*)
+      | (?P<PUNCTUATION>->|=>|==|!=|<=|>=|[{}():=<>.,;%/*+\[\]-])
+      | (?P<bad>[^\sA-Za-z0-9_"'{}():=<>.,;%/*+\[\]-]+|.)""",
     re.VERBOSE,
 )
 
@@ -156,7 +157,7 @@ def number(source: Source, token: Token) -> float:
     value = float(token.text)
     if math.isfinite(value):
         return value
-    source.report("ALU102", f"{token.shown} is too large for a number", source.span(token))
+    source.report("ALU102", f"{token.shown(source)} is too large for a number", source.span(token))
     return 0.0
 
 
@@ -167,7 +168,7 @@ def string_value(token: Token) -> str:
 
 def _report_bad(source: Source, text: str, span: Span, *, unclosed: bool) -> None:
     if unclosed:
-        source.report("ALU101", 'the string has no closing `"` on its line', span)
+        source.report("ALU101", f"the string has no closing `{text[0]}` on its line", span)
         return
     shown = text[:20] if text.isprintable() else " ".join(f"U+{ord(c):04X}" for c in text[:5])
     hint = "names are made of a-z, A-Z, 0-9 and _" if text[0].isalpha() else ""

@@ -1,48 +1,25 @@
 """Small formulas of behaviour files: ``distance(position, target) / speed + uniform(0, 1)``.
 
-Python's arithmetic, comparisons, ``and``, ``or``, ``not``, ``a if b else c``, fields and elements; nothing else. Names are the
-inputs of the skill, the mock's memory, and what the place offers (``t``, ``f``, ``delay``).
-
-Not ``simpleeval``: it finds what is not allowed, and names that are not known, when it evaluates a formula. A file of behaviour is
-refused when it is read, with its line; a formula in a branch that a run does not take counts, too.
+The skill language's conditions between terms with arithmetic (``terms``); nothing else. Names are the inputs of the skill, the mock's
+memory, and what the place offers (``t``, ``f``, ``delay``).
 """
 
 from __future__ import annotations
 
-import ast
 import math
+import operator
 import random
+import re
 from collections.abc import Callable, Mapping, Sequence
-from types import CodeType
 from typing import Any
 
+from alula.language.lexer import Source
+from alula.mock.terms import Names, read_terms
 from alula.runtime.core.errors import SkillRuntimeError
 
-Names = Mapping[str, object]
-_NODES = (
-    ast.Expression,
-    ast.BinOp,
-    ast.UnaryOp,
-    ast.BoolOp,
-    ast.Compare,
-    ast.IfExp,
-    ast.Call,
-    ast.Attribute,
-    ast.Subscript,
-    ast.Name,
-    ast.Constant,
-    ast.List,
-    ast.Tuple,
-    ast.expr_context,
-    ast.Add,
-    ast.Sub,
-    ast.Mult,
-    ast.Div,
-    ast.Mod,
-    ast.unaryop,
-    ast.boolop,
-    ast.cmpop,
-)
+_COMMENT = re.compile(r"\"(?:[^\"\\]|\\.)*\"|'(?:[^'\\]|\\.)*'|(?P<comment>//|/\*)", re.DOTALL)
+"""Strings, and outside of them what begins a comment."""
+NO_RESOURCES: Mapping[str, Sequence[str]] = {}
 
 
 class FormulaError(SkillRuntimeError):
@@ -71,6 +48,7 @@ def angle(one_rad: float, other_rad: float) -> float:
 FUNCTIONS: Mapping[str, Callable[..., object]] = {
     "distance": distance,
     "angle": angle,
+    "mod": operator.mod,
     "abs": abs,
     "min": min,
     "max": max,
@@ -94,22 +72,32 @@ def _drawing(source: random.Random) -> dict[str, Callable[..., object]]:
 
 
 class Formula:
-    """An expression that was checked; raise FormulaError when the text is none."""
+    """An expression that was checked.
 
-    def __init__(self, text: str) -> None:
+    Args:
+        text: as the file has it.
+        resources: those that it may ask for, ``link == UP``, with their states.
+
+    Raises:
+        FormulaError: the text is no formula; the message says what was expected where.
+    """
+
+    def __init__(self, text: str, resources: Mapping[str, Sequence[str]] = NO_RESOURCES) -> None:
         self.text = text
-        try:
-            tree = ast.parse(text.strip(), mode="eval")
-        except (SyntaxError, ValueError, RecursionError, MemoryError) as error:
-            raise FormulaError(f"`{text}` is no formula: {getattr(error, 'msg', error)}") from None
-        self.names = _names(tree, text)
-        self._code: CodeType = compile(tree, "<formula>", "eval")
+        if any(match["comment"] for match in _COMMENT.finditer(text)):
+            raise FormulaError(f"`{text}`: `//` and `/*` begin comments, which a formula doesn't have; a division is written `a / b`")
+        source = Source("", " ".join(text.splitlines()), ends="the end of the formula")
+        term, self.names = read_terms(source, (*FUNCTIONS, *DRAWS), resources)
+        if source.diagnostics or term is None:
+            first = source.diagnostics[0]
+            hint = f"; {first.hint}" if first.hint else ""
+            raise FormulaError(f"`{text}`: {first.message} (character {first.span.column}){hint}")
+        self._term = term
 
     def __call__(self, names: Names, source: random.Random) -> object:
         """Return the value; raise FormulaError when there is none."""
-        scope = {"__builtins__": {}, **FUNCTIONS, **_drawing(source), **names}
         try:
-            return eval(self._code, scope)  # noqa: S307 - of the few kinds of nodes that were let through
+            return self._term(names, {**FUNCTIONS, **_drawing(source)})
         except Exception as error:
             raise FormulaError(f"`{self.text}` has no value: {type(error).__name__}: {error}") from error
 
@@ -121,22 +109,3 @@ class Formula:
 
     def __hash__(self) -> int:
         return hash(self.text)
-
-
-def _names(tree: ast.Expression, text: str) -> frozenset[str]:
-    """Return the names that a formula needs; raise FormulaError for anything that is not let through."""
-    called: set[ast.expr] = set()
-    names: set[str] = set()
-    for node in ast.walk(tree):
-        if not isinstance(node, _NODES):
-            raise FormulaError(f"`{text}`: {type(node).__name__} is not allowed in formulas")
-        if isinstance(node, ast.Attribute) and node.attr.startswith("_"):
-            raise FormulaError(f"`{text}`: the field {node.attr} is not allowed in formulas")
-        if isinstance(node, ast.Call):
-            if not isinstance(node.func, ast.Name) or node.func.id not in {*FUNCTIONS, *DRAWS} or node.keywords:
-                known = ", ".join((*FUNCTIONS, *DRAWS))
-                raise FormulaError(f"`{text}`: there is no function {ast.unparse(node.func)}; there are {known}")
-            called.add(node.func)
-        if isinstance(node, ast.Name) and node not in called:
-            names.add(node.id)
-    return frozenset(names)

@@ -12,7 +12,7 @@ from alula.common.located_yaml import Located, choices, read_yaml
 from alula.common.public import public
 from alula.mock.behaviour import NEVER, Behaviour, DataScript, Ending, MockChange, MockFault, Place, Rule, TimelineEvent, Value
 from alula.mock.errors import BehaviourError
-from alula.mock.formula import Formula, FormulaError
+from alula.mock.formula import NO_RESOURCES, Formula, FormulaError
 from alula.model.model import Skill, Skillset
 
 SECTIONS = ("memory", "skills", "timeline", "faults", "data")
@@ -20,6 +20,8 @@ CONDITIONS = ("call", "when", "chance")
 ENDINGS = ("result", "refuse", "crash", "never")
 RULE = (*CONDITIONS, "delay", *ENDINGS, "message", "progress", "outputs", "then", "moves")
 DEFAULT_PERIOD_S = 0.5
+States = Mapping[str, Sequence[str]]
+"""Resources that a formula may ask for, with their states."""
 T = TypeVar("T")
 
 
@@ -213,38 +215,43 @@ class _Reader:
         said = part.record(f"the data {name}", ("period", "value", "values"))
         if ("value" in said) == ("values" in said):
             raise part.wrong(f"{name} needs either `value` or `values`")
-        known = {*self._memory, "t", *(resource.name for resource in skillset.resources)}
+        resources = {resource.name: resource.states for resource in skillset.resources}
+        known = {*self._memory, "t", *resources}
         period_s = said["period"].number("`period`", 0.001) if "period" in said else data.period_s or DEFAULT_PERIOD_S
-        steps = ((0.0, self._filled(said["value"], known)),) if "value" in said else self._steps(name, said["values"], known)
+        steps = (
+            ((0.0, self._filled(said["value"], known, resources)),)
+            if "value" in said
+            else self._steps(name, said["values"], known, resources)
+        )
         return (skillset.name, member), DataScript(period_s, steps, part.place)
 
-    def _steps(self, name: str, part: Located, known: Collection[str]) -> tuple[tuple[float, object], ...]:
+    def _steps(self, name: str, part: Located, known: Collection[str], resources: States) -> tuple[tuple[float, object], ...]:
         steps = []
         for key, entry in part.entries(f"`values` of {name}").items():
             try:
                 from_s = float(key)
             except ValueError:
                 raise entry.wrong(f"`values` of {name}: `{key}` should be seconds since the start, as in {{0: 1.0, 10: null}}") from None
-            steps.append((from_s, None if entry.value is None else self._filled(entry, known)))
+            steps.append((from_s, None if entry.value is None else self._filled(entry, known, resources)))
         return tuple(sorted(steps, key=lambda step: step[0]))
 
-    def _filled(self, part: Located, known: Collection[str]) -> object:
+    def _filled(self, part: Located, known: Collection[str], resources: States) -> object:
         """Read a value that may be a message: a mapping of its fields."""
         if part.is_mapping:
-            return {name: self._filled(entry, known) for name, entry in part.entries("a message").items()}
+            return {name: self._filled(entry, known, resources) for name, entry in part.entries("a message").items()}
         if part.is_list:
-            return [self._filled(entry, known) for entry in part.elements()]
-        return self._value(part, known)
+            return [self._filled(entry, known, resources) for entry in part.elements()]
+        return self._value(part, known, resources)
 
     # --- parts -------------------------------------------------------------------------------------------------------
 
-    def _value(self, part: Located, known: Collection[str]) -> Value:
+    def _value(self, part: Located, known: Collection[str], resources: States = NO_RESOURCES) -> Value:
         """Read a number, true or false, or a formula of known names."""
         value = part.value
         if isinstance(value, bool | int | float):
             return value
         try:
-            formula = Formula(part.text("a value"))
+            formula = Formula(part.text("a value"), resources)
         except FormulaError as error:
             raise part.wrong(str(error)) from None
         for name in sorted(formula.names):

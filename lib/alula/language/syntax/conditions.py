@@ -2,24 +2,18 @@
 
 The paper's: `resource = (a == S and not b != T)`, `data = (battery.level > 0.2)`, and both joined by and, or, not, =>.
 The Robot Language's and every property: the same without the words `resource = (...)` and `data = (...)` around it.
-
-From loose to tight: `=>` (to the right), `or`, `and`, `not`, then comparisons and parentheses.
 """
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from dataclasses import replace
-from typing import NoReturn
 
 from alula.language.lexer import Kind, Token, string_value
-from alula.language.syntax.cursor import OPERATOR_WORDS, Cursor, SyntaxFault
+from alula.language.syntax.connectives import Connectives
+from alula.language.syntax.cursor import OPERATOR_WORDS, Cursor
 from alula.language.syntax.quantities import quantity
 from alula.model.expressions import And, Comparison, Constant, DataIs, Expression, Implies, MissionIs, Not, Or, ResourceIs, SkillRuns
-from alula.model.span import Span
-
-MAX_DEPTH = 40
-"""Nesting beyond this is a mistake or an attack; it also keeps the recursion within Python's limit."""
 
 Atom = Callable[[int], Expression]
 _COMPARISONS = tuple(comparison.value for comparison in Comparison)
@@ -31,69 +25,43 @@ _NO_EXECUTION = frozenset({*_COMPARISONS, ".", ":", "{", "->"})
 
 def paper_condition(cursor: Cursor) -> Expression:
     """Read a condition of the paper's notation, as it stands behind `name:` in a precondition or invariant."""
-    return _Reader(cursor, bare=False).implication(0)
+    return _Reader(cursor, bare=False).implication()
 
 
 def bare_condition(cursor: Cursor) -> Expression:
     """Read a condition of the Robot Language, or of a property in either notation."""
-    return _Reader(cursor, bare=True).implication(0)
+    return _Reader(cursor, bare=True).implication()
 
 
 def mission_condition(cursor: Cursor) -> Expression:
     """Read a condition of a mission's property: resources and skills with their skillset, nodes, the outcome, faults; `->` is `=>`."""
-    return _MissionReader(cursor, bare=True).implication(0)
+    return _MissionReader(cursor, bare=True).implication()
 
 
-class _Reader:
-    """Reads one condition; ``atom`` changes with where we are: outside, in `resource = (...)` or in `data = (...)`."""
-
-    implies: tuple[str, ...] = ("=>",)
+class _Reader(Connectives[Expression]):
+    """Reads one condition; ``_atom`` changes with where we are: outside, in `resource = (...)` or in `data = (...)`."""
 
     def __init__(self, cursor: Cursor, *, bare: bool) -> None:
-        self.cursor = cursor
-        self.atom: Atom = self._bare_atom if bare else self._predicate
-        self._enclosed = 0
+        super().__init__(cursor)
+        self._atom: Atom = self._bare_atom if bare else self._predicate
 
-    def implication(self, depth: int) -> Expression:
-        """Read `premise => conclusion`, which groups to the right."""
-        if depth > MAX_DEPTH:
-            self._too_deep()
-        premise = self._disjunction(depth)
-        if not self.cursor.accept(*self.implies):
-            return premise
-        return Implies(premise, self.implication(depth + 1), span=_span(premise))
+    def implied(self, premise: Expression, conclusion: Expression) -> Expression:
+        return Implies(premise, conclusion, span=premise.span)
 
-    def _disjunction(self, depth: int) -> Expression:
-        operands = [self._conjunction(depth)]
-        while self.cursor.accept("or"):
-            operands.append(self._conjunction(depth))
-        return operands[0] if len(operands) == 1 else Or(tuple(operands), span=_span(operands[0]))
+    def either(self, operands: Sequence[Expression]) -> Expression:
+        return Or(tuple(operands), span=operands[0].span)
 
-    def _conjunction(self, depth: int) -> Expression:
-        operands = [self._negation(depth)]
-        while self.cursor.accept("and"):
-            operands.append(self._negation(depth))
-        return operands[0] if len(operands) == 1 else And(tuple(operands), span=_span(operands[0]))
+    def both(self, operands: Sequence[Expression]) -> Expression:
+        return And(tuple(operands), span=operands[0].span)
 
-    def _negation(self, depth: int) -> Expression:
-        if depth > MAX_DEPTH:
-            self._too_deep()
-        if token := self.cursor.accept("not"):
-            return Not(self._negation(depth + 1), span=self.cursor.span(token))
-        if token := self.cursor.accept("true", "false"):
-            return Constant(token.text == "true", span=self.cursor.span(token))
-        if self.cursor.at("("):
-            return self._parenthesised(depth + 1)
-        return self.atom(depth)
+    def negated(self, word: Token, operand: Expression) -> Expression:
+        return Not(operand, span=self.cursor.span(word))
 
-    def _parenthesised(self, depth: int) -> Expression:
-        self.cursor.expect("(")
-        self._enclosed += 1
-        inner = self.implication(depth)
-        self._enclosed -= 1
-        if not self.cursor.accept(")"):
-            raise self.cursor.fail("`)`", "`and`", "`or`", "`=>`")
-        return inner
+    def constant(self, word: Token) -> Expression:
+        return Constant(word.text == "true", span=self.cursor.span(word))
+
+    def atom(self, depth: int) -> Expression:
+        return self._atom(depth)
 
     # --- the paper's predicates -----------------------------------------------------------------------------------
 
@@ -103,11 +71,11 @@ class _Reader:
             raise self.cursor.fail("`resource`", "`data`", "`not`", "`(`", hint=self._predicate_hint())
         word = self.cursor.advance()
         self.cursor.expect("=", hint=f"a condition is written `{word.text} = (...)`")
-        outside, self.atom = self.atom, (self._resource_atom if word.text == "resource" else self._data_atom)
+        outside, self._atom = self._atom, (self._resource_atom if word.text == "resource" else self._data_atom)
         try:
-            return self._parenthesised(depth + 1)
+            return self.parenthesised(depth + 1)
         finally:
-            self.atom = outside
+            self._atom = outside
 
     def _predicate_hint(self) -> str:
         if self.cursor.ahead().text in _EQUALITIES:
@@ -173,12 +141,7 @@ class _Reader:
             other = cursor.here.kind is Kind.NAME and cursor.previous.text in _EQUALITIES
             hint = "states are compared with a resource's name alone; those of another skillset can't be asked" if other else ""
             raise cursor.fail("a number", 'a string in `"`', "`true`", "`false`", hint=hint)
-        return quantity(cursor, enclosed=self._enclosed > 0)
-
-    def _too_deep(self) -> NoReturn:
-        message = f"the condition is nested more than {MAX_DEPTH} deep"
-        self.cursor.source.report("ALU105", message, self.cursor.span(self.cursor.here))
-        raise SyntaxFault
+        return quantity(cursor, enclosed=self.enclosed > 0)
 
 
 class _MissionReader(_Reader):
@@ -215,7 +178,3 @@ class _MissionReader(_Reader):
         skillset = self.cursor.name("a skillset")
         self.cursor.expect(".", hint=_MISSION_HINT)
         return f"{skillset.text}.{self.cursor.name('a name of the skillset').text}"
-
-
-def _span(expression: Expression) -> Span:
-    return expression.span

@@ -94,7 +94,7 @@ class Cursor:
 
     def fail(self, *expected: str, hint: str = "") -> SyntaxFault:
         """Report that something else was expected here and return the fault to raise."""
-        message = f"expected {' or '.join(expected) if len(expected) <= _FEW else 'something else'}, found {self.here.shown}"
+        message = f"expected {' or '.join(expected) if len(expected) <= _FEW else 'something else'}, found {self.here.shown(self.source)}"
         listed = expected if len(expected) > 1 else ()
         self.source.report("ALU103", message, self.source.span(self.here), hint=hint, expected=listed)
         return SyntaxFault()
@@ -140,7 +140,7 @@ class Cursor:
             self._ended = True
             self.source.report("ALU104", "this block has no `}` before the file ends", self.source.span(opening))
             return
-        message = f"the block opened in line {opening.line} has no `}}` before {self.here.shown} begins"
+        message = f"the block opened in line {opening.line} has no `}}` before {self.here.shown(self.source)} begins"
         self.source.report("ALU104", message, self.source.span(self.here), hint="close the block with `}`")
 
     def _skip_entry(self, outer: Callable[[], bool], begins: Callable[[], bool], *, minimum: int) -> bool:
