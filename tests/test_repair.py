@@ -173,7 +173,7 @@ def test_without_another_sensor_it_is_impossible_and_says_why(no_lidar: Path, ca
 
 
 def test_a_branch_may_be_forbidden_to_do_something(no_lidar: Path, capsys: pytest.CaptureFixture[str]) -> None:
-    found = answer(capsys, no_lidar, "--fault", "zed", "--most-faults", "1", "--never", "running(navigation.lock_head)", code=1)
+    found = answer(capsys, no_lidar, "--fault", "zed", "--most-faults", "1", "--never", "navigation.lock_head running", code=1)
     assert (found["answer"], found["stopped"]) == ("unknown", False)
 
 
@@ -213,7 +213,7 @@ def test_the_end_by_which_a_mission_gives_up_is_written_again(missions: Path, ca
         ([], "name what is to be answered: --fault NAME, or --finding N"),
         (["--fault", "zed", "--using", "navigation.gota"], "--using navigation.gota: there is no such skill"),
         (["--fault", "zed", "--within", "nowhere"], "--within nowhere: there is no such node"),
-        (["--fault", "zed", "--never", "running(navigation.gota)"], "--never 'running(navigation.gota)'"),
+        (["--fault", "zed", "--never", "navigation.gota running"], "--never 'navigation.gota running'"),
         (["--fault", "zed", "--goal", "outcome =="], "--goal 'outcome ==': can't be read as a condition"),
         (["--finding", "7"], "--finding 7: the mission has"),
     ],

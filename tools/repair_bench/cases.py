@@ -130,7 +130,7 @@ def legs(count: int) -> tuple[str, str]:
 
 def sensors(count: int) -> tuple[str, str]:
     """Return those of a robot with so many sensors, of which only the last one may watch while it drives."""
-    wrong = [f"property p{one}: never running(eyes.watch_{one}) and running(body.drive);" for one in range(1, count - 1)]
+    wrong = [f"property p{one}: never eyes.watch_{one} running and body.drive running;" for one in range(1, count - 1)]
     return _eyes(count) + _body("body"), _mission([_drives("body", 1)], " ".join(wrong))
 
 

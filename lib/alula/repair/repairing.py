@@ -418,14 +418,14 @@ class Search:
 
 def condition_of(option: str, text: str) -> Expression:
     """Read a condition, as those of a mission's properties; ``option`` is what gives it. Raises RepairError."""
-    source = Source("", f"goal: eventually {text}".replace("'", '"'))
+    source = Source("", f"goal: eventually {text}", ends="the end of the condition")
     with suppress(SyntaxFault):
         cursor = Cursor(source)
         one = read_mission_property(cursor)
         if cursor.at_end and not source.diagnostics:
             return one.condition
     why = f": {source.diagnostics[0].message}" if source.diagnostics else ""
-    raise RepairError(f"{option} '{text}': can't be read as a condition, such as outcome given_up or running(skillset.skill){why}")
+    raise RepairError(f"{option} '{text}': can't be read as a condition, such as outcome given_up or skillset.skill running{why}")
 
 
 def _told(fate: Fate | None) -> str:

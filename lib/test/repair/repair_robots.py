@@ -165,10 +165,10 @@ def _wanted(skills: Skills, chance: random.Random) -> str:
     watch = chance.choice(skills.watching)
     blind = f"{EYES}.s{chance.randrange(skills.sensors)} == BROKEN"
     several = (
-        f"property apart: never running({BODY}.{drive}) and running({EYES}.{watch});",
-        f"property motor: never running({BODY}.{drive}) and {BODY}.motor == BROKEN;",
-        f"property head: never running({BODY}.{drive}) and {BODY}.wheels == FREE;",
-        f"property blind: never running({EYES}.{watch}) and {blind};",
+        f"property apart: never {BODY}.{drive} running and {EYES}.{watch} running;",
+        f"property motor: never {BODY}.{drive} running and {BODY}.motor == BROKEN;",
+        f"property head: never {BODY}.{drive} running and {BODY}.wheels == FREE;",
+        f"property blind: never {EYES}.{watch} running and {blind};",
     )
     wanted = [one for one in several if chance.random() < 0.3]
     return f' _description="{" ".join(wanted)}"' if wanted else ""

@@ -89,7 +89,7 @@ def test_what_is_impossible_says_why_and_writes_nothing(robot: Path, capsys: pyt
 
 
 def test_what_no_course_keeps_is_unknown_not_impossible(robot: Path, capsys: pytest.CaptureFixture[str]) -> None:
-    assert main([str(robot), *HOME, *TIME, "--never", "running(base.dock)", "--json"]) == 1
+    assert main([str(robot), *HOME, *TIME, "--never", "base.dock running", "--json"]) == 1
     found = json.loads(capsys.readouterr().out)
     assert (found["answer"], found["tried"], found["stopped"]) == ("unknown", 1, False)
     (refused,) = found["refused"]
@@ -98,7 +98,7 @@ def test_what_no_course_keeps_is_unknown_not_impossible(robot: Path, capsys: pyt
 
 
 def test_without_time_nothing_is_known(robot: Path, capsys: pytest.CaptureFixture[str]) -> None:
-    assert main([str(robot), *HOME, "--time", "0", "--never", "running(base.fly)", "--json"]) == 1
+    assert main([str(robot), *HOME, "--time", "0", "--never", "base.fly running", "--json"]) == 1
     found = json.loads(capsys.readouterr().out)
     assert (found["answer"], found["stopped"]) == ("unknown", True)
     assert found["refused"][-1]["why"] == "the search ended before it was judged"
@@ -113,7 +113,7 @@ REFUSED = (
     ((*HOME, "--from", "base.place == AWAY and base.place == DOCKED"), "base.place can't be AWAY and DOCKED; name one state"),
     ((*HOME, "--from", "base.plaice == AWAY"), "there is no resource base.plaice; there are base.place, "),
     ((*HOME, "--never", "bse.place == AWAY"), "--never 'bse.place == AWAY': the property `asked`: there is no skillset `bse`"),
-    ((*HOME, "--never", "running(base.fly)"), "--never 'running(base.fly)': the property `asked`: there is no skill `fly`"),
+    ((*HOME, "--never", "base.fly running"), "--never 'base.fly running': the property `asked`: there is no skill `fly`"),
     ((*HOME, "--never", "running("), "--never 'running(': the property can't be read"),
     ((*HOME, "--using", "base.fly"), "--using base.fly: there is no such skill; there are base.creep, "),
     ((*HOME, "--out", "{robot}/nowhere/plan.xml"), "--out {robot}/nowhere/plan.xml: there is no folder {robot}/nowhere; make it"),

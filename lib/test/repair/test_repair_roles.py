@@ -367,7 +367,7 @@ def test_what_no_skill_leads_to_is_impossible(tmp_path: Path, monkeypatch: pytes
     [
         (Aim("base.place == HOME"), "--goal 'base.place == HOME': base.place has no state HOME; it has DOCKED, AWAY"),
         (Aim("base.plaice == DOCKED"), "--goal 'base.plaice == DOCKED': there is no resource base.plaice"),
-        (Aim("running(base.dock)"), "only states can be asked here"),
+        (Aim("base.dock running"), "only states can be asked here"),
         (Aim("base.place == DOCKED"), "it is so at first; say what is so by --from"),
         (Aim("base.place =="), "--goal 'base.place ==': can't be read as a condition"),
         (Aim("arrival", "not base.place == AWAY"), "--from 'not base.place == AWAY': write states"),

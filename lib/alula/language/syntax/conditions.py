@@ -7,7 +7,6 @@ The Robot Language's and every property: the same without the words `resource = 
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
-from dataclasses import replace
 
 from alula.language.lexer import Kind, Token, string_value
 from alula.language.syntax.connectives import Connectives
@@ -18,7 +17,7 @@ from alula.model.expressions import And, Comparison, Constant, DataIs, Expressio
 Atom = Callable[[int], Expression]
 _COMPARISONS = tuple(comparison.value for comparison in Comparison)
 _EQUALITIES = ("==", "!=")
-_MISSION_HINT = "ask `skillset.resource == STATE`, `running(skillset.skill)`, `active('node')`, `outcome given_up` or `fault name`"
+_MISSION_HINT = "ask `skillset.resource == STATE`, `skillset.skill running`, `active('node')`, `outcome given_up` or `fault name`"
 _NO_EXECUTION = frozenset({*_COMPARISONS, ".", ":", "{", "->"})
 """What tells that `running` is a name of its own and does not belong to the name before it."""
 
@@ -34,7 +33,7 @@ def bare_condition(cursor: Cursor) -> Expression:
 
 
 def mission_condition(cursor: Cursor) -> Expression:
-    """Read a condition of a mission's property: resources and skills with their skillset, nodes, the outcome, faults; `->` is `=>`."""
+    """Read a condition of a mission's property: resources and skills with their skillset, nodes, the outcome, faults."""
     return _MissionReader(cursor, bare=True).implication()
 
 
@@ -145,36 +144,39 @@ class _Reader(Connectives[Expression]):
 
 
 class _MissionReader(_Reader):
-    implies = ("=>", "->")
+    """Reads a condition of a mission: names of a skillset's members have its name before them, and there is no data."""
 
     def _bare_atom(self, _depth: int) -> Expression:
         cursor = self.cursor
         first = cursor.here
-        if cursor.at("running", "active") and cursor.ahead().text == "(":
+        if cursor.at("active") and cursor.ahead().text == "(":
             cursor.advance()
             cursor.advance()
-            asked = self._skill() if first.text == "running" else MissionIs("active", self._node())
+            node = self._node()
             cursor.expect(")")
-            return replace(asked, span=cursor.span(first, cursor.previous))
+            return MissionIs("active", node, span=cursor.span(first, cursor.previous))
         if cursor.at("outcome", "fault") and cursor.ahead().kind is Kind.NAME:
             word, name = cursor.advance(), cursor.advance()
             return MissionIs(word.text, name.text, span=cursor.span(word, name))
+        if cursor.at("running") and cursor.ahead().text == "(":
+            raise cursor.fail("a condition", hint=f"write `{self._asked_of_script()} running`")
         if first.kind is not Kind.NAME or first.text in OPERATOR_WORDS:
             raise cursor.fail("a condition", hint=_MISSION_HINT)
-        resource = self._of_skillset()
-        operator = cursor.expect(*_EQUALITIES, hint=_MISSION_HINT)
+        skillset = cursor.name("a skillset")
+        cursor.expect(".", hint=_MISSION_HINT)
+        member = f"{skillset.text}.{cursor.name('a name of the skillset').text}"
+        if token := cursor.accept("running"):
+            return SkillRuns(member, span=cursor.span(first, token))
+        operator = cursor.expect("==", "!=", "running", hint=_MISSION_HINT)
         state = cursor.name("a state")
-        return ResourceIs(resource, state.text, operator.text == "!=", span=cursor.span(first, state))
+        return ResourceIs(member, state.text, operator.text == "!=", span=cursor.span(first, state))
 
-    def _skill(self) -> SkillRuns:
-        return SkillRuns(self._of_skillset())
+    def _asked_of_script(self) -> str:
+        """Return the skill that stands in `running(...)`, as scripts of nodes have it."""
+        parts = [self.cursor.ahead(offset).text for offset in range(2, 5)]
+        return "".join(parts) if parts[1] == "." else "skillset.skill"
 
     def _node(self) -> str:
         if self.cursor.here.kind is not Kind.STRING:
             raise self.cursor.fail("the name of a node in quotes")
         return string_value(self.cursor.advance())
-
-    def _of_skillset(self) -> str:
-        skillset = self.cursor.name("a skillset")
-        self.cursor.expect(".", hint=_MISSION_HINT)
-        return f"{skillset.text}.{self.cursor.name('a name of the skillset').text}"

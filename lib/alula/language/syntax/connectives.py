@@ -23,8 +23,6 @@ class Connectives(ABC, Generic[T]):
     From loose to tight: `=>` (to the right), `or`, `and`, `not`, then operands and parentheses.
     """
 
-    implies: tuple[str, ...] = ("=>",)
-
     def __init__(self, cursor: Cursor) -> None:
         self.cursor = cursor
         self.enclosed = 0
@@ -58,7 +56,7 @@ class Connectives(ABC, Generic[T]):
         """Read `premise => conclusion`, which groups to the right."""
         self.limit(depth)
         premise = self._disjunction(depth)
-        if not self.cursor.accept(*self.implies):
+        if not self.cursor.accept("=>"):
             return premise
         return self.implied(premise, self.implication(depth + 1))
 

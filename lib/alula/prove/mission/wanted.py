@@ -1,9 +1,9 @@
 """What an author wants to hold in all runs of a mission, where Groot2 shows and keeps what a node is about.
 
-    <Fallback name="mapping mission" _description="property seen: always running(navigation.goto) => running(perception.lidar_depthmap);">
+    <Fallback name="mapping mission" _description="property seen: always navigation.goto running => perception.lidar_depthmap running;">
 
 A property goes on to the next `;`, `property` or `accepted`, or to the end. It is written as those of models (skillsets/LANGUAGE.md), over
-what a mission has: `skillset.resource == STATE`, `running(skillset.skill)`, `active('node')`, `outcome given_up`, `fault name`.
+what a mission has: `skillset.resource == STATE`, `skillset.skill running`, `active('node')`, `outcome given_up`, `fault name`.
 """
 
 from __future__ import annotations
@@ -60,13 +60,13 @@ def wanted(nodes: Sequence[Node], skillsets: Sequence[Skillset], faults: Collect
 
 
 def _read(attribute: Attribute, text: str, start: int) -> Property:
-    source = Source("", text.replace("'", '"').replace("\n", " "))
+    source = Source("", text.replace("\n", " "), ends="the end of the property")
     cursor = Cursor(source)
     one = None
     try:
         one = read_mission_property(cursor)
         if not cursor.at_end:
-            cursor.fail("`;`")
+            cursor.fail("`;`", hint="write `=>` for `->`" if cursor.at("->") else "")
     except SyntaxFault:
         pass
     if source.diagnostics:

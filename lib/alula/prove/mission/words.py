@@ -21,7 +21,7 @@ def situation(system: System, state: State) -> str:
     names = [f"{one.name}.{resource.name}" for one in system.skillsets for resource in one.resources]
     words = [f"{name} == {system.resource(state, name)}" for name in names if system.resource(state, name) != system.resource(first, name)]
     skills = ((f"{system.leaves[leaf].skillset}.{system.leaves[leaf].model.name}", one) for leaf, one in system.open(state))
-    words += [f"running({skill})" for skill, one in skills if one.phase == "running"]
+    words += [f"{skill} running" for skill, one in skills if one.phase == "running"]
     end = system.outcome(state)
     words.append(f"outcome {end.value}" if end else ", ".join(f"active('{node.name}')" for node in system.active(state)[-1:]))
     return ", ".join(word for word in words if word)

@@ -73,7 +73,7 @@ def test_waits_are_those_of_the_search_one_situation_after_another(seed: int, tm
     assert any(Waits(regions).found(Deadline.after(100.0))) == (comes.finding is not None)
 
 
-COMES = ("outcome accomplished or outcome degraded or outcome given_up", "outcome given_up", "drone.axes == FREE", "running(drone.land)")
+COMES = ("outcome accomplished or outcome degraded or outcome given_up", "outcome given_up", "drone.axes == FREE", "drone.land running")
 
 
 @pytest.mark.parametrize("tree", [*TREES, *ENDING, *(tree for tree, _ in ROUNDS)])

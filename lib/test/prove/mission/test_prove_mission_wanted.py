@@ -60,12 +60,12 @@ def about(found: Proved) -> list[Diagnostic]:
 @pytest.mark.parametrize(
     ("wanted", "tree"),
     [
-        ("property a: always running(drone.hover) -> drone.axes == USED", TREE),
-        ("property a: never running(drone.lift) and running(drone.hover)", TREE),
-        ("About it; property a: never drone.axes == FREE and running(drone.land); accepted ALU702: so be it", TREE),
+        ("property a: always drone.hover running => drone.axes == USED", TREE),
+        ("property a: never drone.lift running and drone.hover running", TREE),
+        ("About it; property a: never drone.axes == FREE and drone.land running; accepted ALU702: so be it", TREE),
         ("property a: eventually outcome accomplished or outcome given_up assuming termination", TREE),
         ("property a: fault pilot leads to outcome accomplished or outcome given_up assuming termination", TREE),
-        ("property a: running(drone.lift) leads to running(drone.hover) or active('drone.land') assuming termination", TREE),
+        ("property a: drone.lift running leads to drone.hover running or active('drone.land') assuming termination", TREE),
         ("property a: fault pilot leads to active('up') or active('drone.land') or outcome accomplished within 1 ticks", WAITS),
     ],
 )
@@ -79,13 +79,13 @@ def test_what_holds_is_no_finding(wanted: str, tree: str, tmp_path: Path) -> Non
     ("wanted", "tree", "words"),
     [
         ("property a: always drone.control == OURS", TREE, "drone.control == THEIRS"),
-        ("property a: never running(drone.hover) and drone.control == THEIRS", TREE, "running(drone.hover)"),
+        ("property a: never drone.hover running and drone.control == THEIRS", TREE, "drone.hover running"),
         ("property a: never active('drone.land')", TREE, "active('drone.land')"),
         ("property a: always not outcome accomplished", TREE, "outcome accomplished"),
-        ("property a: eventually outcome accomplished or outcome given_up", TREE, "running(drone."),
-        ("property a: eventually running(drone.hover) assuming termination", TREE, "outcome accomplished"),
+        ("property a: eventually outcome accomplished or outcome given_up", TREE, " running"),
+        ("property a: eventually drone.hover running assuming termination", TREE, "outcome accomplished"),
         ("property a: fault pilot leads to outcome accomplished assuming termination", WAITS, "active('ours')"),
-        ("property a: fault pilot leads to running(drone.land) or outcome accomplished assuming termination", WAITS, "THEIRS"),
+        ("property a: fault pilot leads to drone.land running or outcome accomplished assuming termination", WAITS, "THEIRS"),
         ("property a: fault pilot leads to active('drone.land') or outcome given_up within 3 ticks", WAITS, "THEIRS"),
     ],
 )
@@ -107,13 +107,15 @@ def test_what_does_not_hold_has_a_run_that_plays(wanted: str, tree: str, words: 
         ("property a: allways drone.control == OURS", "drone", "expected `.`, found `drone`"),
         ("property a: always drone.control == MINE", "drone.control", "there is no state `MINE` of `drone.control`"),
         ("property a: always drone.legs == MINE", "drone.legs", "there is no resource `legs`"),
-        ("property a: always running(drone.fly)", "running", "there is no skill `fly`"),
-        ("property a: always running(boat.fly)", "running", "there is no skillset `boat`"),
+        ("property a: always drone.fly running", "drone.fly", "there is no skill `fly`"),
+        ("property a: always boat.fly running", "boat", "there is no skillset `boat`"),
         ("property a: always outcome happy", "outcome", "there is no outcome `happy`"),
         ("property a: always active('nobody')", "active", "there is no node `nobody`"),
         ("property a: always active(nobody)", "nobody", "expected the name of a node in quotes"),
         ("property a: fault engine leads to outcome given_up", "fault", "there is no fault that shows in a state `engine`"),
         ("property a: never fault pilot", "fault", "`fault` is something that happens"),
+        ("property a: always running(drone.hover)", "running(", "expected a condition, found `running`"),
+        ("property a: always drone.hover running -> drone.axes == USED", "->", "expected `;`, found `->`"),
         ("property a: always control == OURS", "==", "expected `.`, found `==`"),
         ("property a: drone.control == OURS leads to outcome given_up within 0 ticks", "0", "a number of ticks from 1 to 1000"),
         ("property a: always drone.control == OURS or", "a: always", "found the end"),
@@ -130,6 +132,18 @@ def test_a_bad_property_is_one_error_with_place_and_cure(wanted: str, at: str, m
     assert found[0].span.column == 1 + line.index(escape(wanted)) + len(escape(wanted[: wanted.index(at)])) or "found the end" in message
 
 
+@pytest.mark.parametrize(
+    ("wanted", "remedy"),
+    [
+        ("property a: always running(drone.hover) => drone.axes == USED", "write `drone.hover running`"),
+        ("property a: always drone.hover running -> drone.axes == USED", "write `=>` for `->`"),
+    ],
+)
+def test_the_words_of_scripts_are_refused_with_those_of_properties(wanted: str, remedy: str, tmp_path: Path) -> None:
+    (found,) = about(proved(tmp_path, wanted))
+    assert found.hint == remedy
+
+
 def test_a_bound_of_a_property_is_never_silent(tmp_path: Path) -> None:
     found = proved(tmp_path, "property a: eventually outcome accomplished or outcome given_up assuming termination", time_s=0.0)
     assert not found.complete
@@ -141,8 +155,8 @@ def test_a_bound_of_a_property_is_never_silent(tmp_path: Path) -> None:
 ATOMS = (
     "drone.control == OURS",
     "drone.axes != FREE",
-    "running(drone.hover)",
-    "running(drone.lift)",
+    "drone.hover running",
+    "drone.lift running",
     "active('drone.land')",
     "active('some')",
     "outcome given_up",
@@ -322,7 +336,7 @@ def test_progress_that_a_script_waits_for_is_played(tmp_path: Path) -> None:
     (robot,) = check_texts([ModelFile("rover.rl", DRIVING)])
     assert not has_errors(robot.findings)
     tree = '<Sequence><WaitFor if="progress(rover.look) &gt;= 0.7"/><rover.drive/></Sequence>'
-    path = written(tmp_path, "property still: never running(rover.drive)", PARALLEL.format(f"<rover.look/>{tree}"))
+    path = written(tmp_path, "property still: never rover.drive running", PARALLEL.format(f"<rover.look/>{tree}"))
     (finding,) = (one for one in prove_mission(MissionFile.read(path, robot.skillsets, NO_PART)).findings if one.code == "ALU714")
     assert isinstance(finding, MissionFinding)
     assert finding.run is not None
