@@ -75,8 +75,8 @@ def _made(facts: RunFacts) -> Summary:
         mock=account.mock,
         problems=run.problems,
     )
-    _write_summary(run, summary)
     _write_page(run, part, account, summary)
+    _write_summary(run, summary)
     return summary
 
 
@@ -117,12 +117,12 @@ def _timeline(run: ReportedRun, account: Account) -> Timeline | None:
 
 
 def _write_page(run: ReportedRun, part: ReportPart, account: Account, summary: Summary) -> None:
-    """Write the page, of all that is in the folder by now, and what it explains into the summary."""
+    """Write the page, of the summary and all that is in the folder by now, and take what it explains into the summary."""
     problems = Problems()
     with problems.survive("report.html"):
-        summary["causes"] = write_report(run.folder, [*fault_entries(account.observed), *part.entries()], title=run.title)
+        entries = [*fault_entries(account.observed), *part.entries()]
+        summary["causes"] = write_report(run.folder, entries, title=run.title, summary=summary)
     summary["problems"] = [*summary["problems"], *problems.sentences]
-    _write_summary(run, summary)
 
 
 def fault_entries(observed: Observed) -> list[Wire]:
@@ -134,5 +134,4 @@ def _write_summary(run: ReportedRun, summary: Summary) -> None:
     try:
         write_json(run.folder / "summary.json", summary)
     except OSError as error:
-        sentence = f"summary.json could not be written: {error.strerror or error}"
-        summary["problems"] = [*(one for one in summary["problems"] if one != sentence), sentence]
+        summary["problems"] = [*summary["problems"], f"summary.json could not be written: {error.strerror or error}"]

@@ -209,6 +209,18 @@ def test_a_page_opened_later_reads_the_causes_in_the_summary_and_makes_those_of_
     assert [value for topic, _, value in entries if topic == SUMMARY] == [older]
 
 
+def test_a_report_says_the_summary_that_it_is_given_whatever_is_in_the_folder(tmp_path: Path) -> None:
+    write_record(tmp_path, failing_story())
+    (tmp_path / "run.json").write_text(json.dumps({"faults": ["zed@30"]}), encoding="utf-8")
+    kept = {"departed_s": None, "back_s": None, "faults": [], "failures": []}
+    (tmp_path / "summary.json").write_text(json.dumps({"outcome": "running", "causes": kept}), encoding="utf-8")
+    explained = write_report(tmp_path, title="x", summary={"outcome": "degraded", "problems": ()})
+    entries = read_report(tmp_path / REPORT)
+    assert [value for topic, _, value in entries if topic == SUMMARY] == [{"outcome": "degraded", "problems": []}]
+    assert causes_in(entries) == explained
+    assert [failure["skill"] for failure in explained["failures"]] == ["zed_depthmap"]
+
+
 def test_the_page_is_told_what_is_bad_news_and_why_and_looks_at_no_names(tmp_path: Path) -> None:
     changes = [("perception.zed_status", "BROKEN"), ("perception.zed_status", "OK"), ("rover.arm", "BROKEN"), ("video.link", "DOWN")]
     story = [(1.0, EVENTS, transition(resource, "X", state)) for resource, state in changes]

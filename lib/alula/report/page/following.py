@@ -3,11 +3,12 @@
 from __future__ import annotations
 
 import json
-from collections.abc import Callable, Iterable, Iterator
+from collections.abc import Callable, Iterable, Iterator, Mapping
 from pathlib import Path
 from typing import Any
 
 from alula.common import run_log
+from alula.common.files import strict
 from alula.common.record import FILE, OPERATOR, Entry, RecordError, RecordFollower
 from alula.common.robots import page_words
 from alula.report.page.areas import areas_of
@@ -26,11 +27,13 @@ class RunFollower:
     """Follows one run. ``problems`` names what could not be read.
 
     ``recordings``: what the run's other recordings tell; without it, this is taken from the run's report once there is one.
+    ``summary``: the run's, without its causes; without it, this is taken from its file.
     """
 
-    def __init__(self, folder: Path, recordings: Iterable[Wire] | None = None) -> None:
+    def __init__(self, folder: Path, recordings: Iterable[Wire] | None = None, summary: Mapping[str, object] | None = None) -> None:
         self.folder = folder
         self._of_recordings = recordings
+        self._summary = summary
         self.problems: list[str] = []
         self.behind = False
         self._converter = Converter()
@@ -44,9 +47,10 @@ class RunFollower:
             (folder / "run.json", RUN, self._run),
             (folder / "run.json", AREAS, lambda path: areas_of(str(_json(path).get("world") or ""))),
             (folder / "map.ply", MAP, lambda path: packed(read_points(path))),
-            (folder / "summary.json", SUMMARY, self._summary),
             (folder / "state.json", PARTS, _parts),
         ]
+        if summary is None:
+            self._files.append((folder / "summary.json", SUMMARY, self._read_summary))
         self._seen: dict[str, tuple[int, int]] = {}
         self._told = False
 
@@ -60,7 +64,7 @@ class RunFollower:
 
         ``limit``: read so many entries of the record at most; ``behind`` says then that there may be more.
         """
-        entries = [*self._changed_files(), *self._recordings(), *self._new_entries(limit)]
+        entries = [*self._changed_files(), *self._given_summary(), *self._recordings(), *self._new_entries(limit)]
         for entry in entries:
             self._causes.take(entry)
         told = None if self.behind else self._causes.told()
@@ -79,6 +83,12 @@ class RunFollower:
                 continue
             except (OSError, ValueError, TypeError, CloudError) as error:
                 self._note(f"{path.name}: {error}")
+
+    def _given_summary(self) -> Iterator[Wire]:
+        """Yield, once, the summary that was given."""
+        given, self._summary = self._summary, None
+        if given is not None:
+            yield SUMMARY, None, strict(dict(given))
 
     def _recordings(self) -> list[Wire]:
         """Return, once, what the run's other recordings tell."""
@@ -123,7 +133,7 @@ class RunFollower:
             "words": page_words(),
         }
 
-    def _summary(self, path: Path) -> dict[str, Any]:
+    def _read_summary(self, path: Path) -> dict[str, Any]:
         """Return the summary without the causes, which are an entry of their own."""
         values: dict[str, Any] = _json(path)
         self._causes.settle(values.pop("causes", None))

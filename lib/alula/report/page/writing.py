@@ -41,16 +41,16 @@ def make_page(*, title: str, entries: Iterable[Wire] | None = None) -> str:
     return skeleton
 
 
-def write_report(folder: Path, more: Iterable[Wire] = (), *, title: str) -> Explanation:
+def write_report(folder: Path, more: Iterable[Wire] = (), *, title: str, summary: Mapping[str, object] | None = None) -> Explanation:
     """Write ``report.html`` into a run's folder: what the folder tells, and ``more`` (``OF_RECORDINGS``) that its other recordings tell.
 
-    The live page of a run that is over takes the latter from the report, and so says what it says, to the last digit. Return what the
-    report says of failures and their causes.
+    The live page of a run that is over takes the latter from the report, and so says what it says, to the last digit. ``summary`` is the
+    run's where it is not written yet. Return what the report says of failures and their causes.
 
     Raises:
         OSError: it can't be written.
     """
-    follower = RunFollower(folder, more)
+    follower = RunFollower(folder, more, summary)
     entries = few_pictures(follower.poll())
     write_text(folder / REPORT, make_page(title=title, entries=sorted(entries, key=lambda entry: (entry[1] is not None, entry[1] or 0.0))))
     return follower.explanation
