@@ -66,9 +66,9 @@ def otherwise(steps: Sequence[str], here: Here, purposes: Purposes) -> Iterator[
 def _broken(step: str, one: Purpose, here: Here) -> Iterator[Otherwise]:
     for resource in one.skillset.resources:
         at = f"{one.skillset.name}.{resource.name}"
-        for arrow in resource.transitions:
-            states = {resource.name: arrow.target}
+        for moved in resource.transitions:
+            states = {resource.name: moved.target}
             broken = any(judge(each.condition, states, NO_DATA) is False for each in one.skill.invariants)
-            if arrow.extern and arrow.source == here.states[at] and broken:
-                found = replace(here, states={**here.states, at: arrow.target})
-                yield Otherwise(f"{at} {arrow.target} in {step}", is_result=False, here=found)
+            if moved.extern and moved.source == here.states[at] and broken:
+                found = replace(here, states={**here.states, at: moved.target})
+                yield Otherwise(f"{at} {moved.target} in {step}", is_result=False, here=found)

@@ -16,8 +16,8 @@ from alula.records.causes.responses import NO_SKILL, response_to, response_to_fa
 from alula.records.tree import Places
 from alula.runtime.core.events import EngineEvent, TransitionEvent
 
-FAULT, PROCESS, RESULT, INVARIANT, ARROW = "fault", "process", "result", "invariant", "extern arrow"
-KINDS = (FAULT, PROCESS, RESULT, INVARIANT, ARROW)
+FAULT, PROCESS, RESULT, INVARIANT, TRANSITION = "fault", "process", "result", "invariant", "extern transition"
+KINDS = (FAULT, PROCESS, RESULT, INVARIANT, TRANSITION)
 NO_NEED = "not in use"
 """A transition that broke no invariant: nothing that ran hung on it."""
 
@@ -53,15 +53,15 @@ class Failure:
 
 
 def ways_to_fail(skillsets: Iterable[Skillset], processes: Iterable[str] = ()) -> list[Way]:
-    """Return every result that is a failure, every invariant, every extern arrow that breaks an invariant, every process."""
+    """Return every result that is a failure, every invariant, every extern transition that breaks an invariant, every process."""
     found: list[Way] = []
     for skillset in skillsets:
         for skill in skillset.skills:
             found += [Way(RESULT, f"{skillset.name}.{skill.name} {name}") for name in _failures_of(skill)]
             found += [Way(INVARIANT, f"{skillset.name}.{skill.name} {one.name}") for one in skill.invariants]
         for resource in skillset.resources:
-            arrows = [arrow for arrow in resource.transitions if arrow.extern and breaks(skillset, resource, arrow)]
-            found += [Way(ARROW, _arrow(skillset.name, resource.name, arrow.source, arrow.target)) for arrow in arrows]
+            breaking = [one for one in resource.transitions if one.extern and breaks(skillset, resource, one)]
+            found += [Way(TRANSITION, _transition(skillset.name, resource.name, one.source, one.target)) for one in breaking]
     return [*dict.fromkeys(found), *(Way(PROCESS, name) for name in processes)]
 
 
@@ -69,7 +69,7 @@ def _failures_of(skill: Skill) -> list[str]:
     return [result.name for result in skill.results if skill.kind_of(result.name) is ResultKind.FAILURE]
 
 
-def _arrow(skillset: str, resource: str, source: str, target: str) -> str:
+def _transition(skillset: str, resource: str, source: str, target: str) -> str:
     return f"{skillset}.{resource} {source} -> {target}"
 
 
@@ -106,7 +106,8 @@ def name_of(fault: FaultRequest) -> str:
 
 def _way_of(event: EngineEvent) -> Way | None:
     if isinstance(event, TransitionEvent):
-        return Way(ARROW, _arrow(event.skillset, event.resource, event.from_state, event.to_state)) if event.cause == EXTERN else None
+        name = _transition(event.skillset, event.resource, event.from_state, event.to_state)
+        return Way(TRANSITION, name) if event.cause == EXTERN else None
     if event.state is S.TERMINATED:
         return Way(RESULT, f"{event.skillset}.{event.skill} {event.result}")
     if event.state is S.RESOURCE_INVARIANT_VIOLATED:

@@ -8,6 +8,7 @@ from collections.abc import Collection, Iterable, Mapping
 from pathlib import Path
 from typing import Any, BinaryIO
 
+from alula.campaign.failures import KINDS
 from alula.campaign.plan import Campaign
 from alula.common.files import strict, write_json, write_text
 from alula.records.errors import AnalysisError
@@ -37,7 +38,11 @@ class Table:
         try:
             folder.mkdir(parents=True, exist_ok=True)
             self._plan = self._claim(folder, campaign)
-            self._read({planned.number for planned in campaign.runs})
+            try:
+                self._read({planned.number for planned in campaign.runs})
+            except AnalysisError:
+                self._plan.close()
+                raise
             self._file: BinaryIO = self._path.open("ab")
         except OSError as error:
             raise AnalysisError(f"{folder}: can't hold a campaign: {error.strerror or error}") from None
@@ -66,9 +71,20 @@ class Table:
         """Read the rows that are whole, and leave no others in the file."""
         lines = self._path.read_bytes().splitlines(keepends=True) if self._path.is_file() else []
         whole = [row for line in lines if line.endswith(b"\n") and _is_row(row := _json(line), numbers)]
+        for row in whole:
+            self._check_kinds(row)
         self.rows = {row["run"]: row for row in whole}
         if len(whole) < len(lines):
             write_text(self._path, b"".join(map(_line, whole)).decode())
+
+    def _check_kinds(self, row: Row) -> None:
+        """Refuse a row of another version, whose failures the coverage doesn't know."""
+        for failure in row["failures"]:
+            if failure["kind"] not in KINDS:
+                raise AnalysisError(
+                    f"{self._path}: run {row['run']} has a failure of the kind `{failure['kind']}`; there are {', '.join(KINDS)}. Go on "
+                    "with the version that wrote it, or choose another folder with --out"
+                )
 
     def add(self, rows: Iterable[Row]) -> None:
         """Write rows, through to the disk."""

@@ -14,7 +14,7 @@ import pytest
 from campaign_mocks import fly_recorded
 
 from alula.campaign.coverage import cover, is_troubled, processes
-from alula.campaign.failures import ARROW, FAULT, INVARIANT, PROCESS, RESULT, Failure, Way, failures_in, ways_to_fail
+from alula.campaign.failures import FAULT, INVARIANT, PROCESS, RESULT, TRANSITION, Failure, Way, failures_in, ways_to_fail
 from alula.campaign.mocked_scenarios import load_mocked_scenario
 from alula.campaign.plan import MOCKS, PlannedRun, load_campaign
 from alula.campaign.rows import rows_of
@@ -161,8 +161,8 @@ def test_the_ways_to_fail_are_those_of_the_models():
     assert (RESULT, "navigation.goto BLOCKED") in names
     assert (RESULT, "navigation.goto ARRIVED") not in names
     assert (INVARIANT, "perception.zed_depthmap zed_ok") in names
-    assert (ARROW, "perception.zed_status OK -> BROKEN") in names
-    assert (ARROW, "perception.zed_status BROKEN -> OK") not in names
+    assert (TRANSITION, "perception.zed_status OK -> BROKEN") in names
+    assert (TRANSITION, "perception.zed_status BROKEN -> OK") not in names
     assert (PROCESS, "mission") in names
     assert {"mission", "navigation", "ros_bridge", "uav_guidance"} <= set(processes([load_scenario(name) for name in scenario_names()]))
 
@@ -174,8 +174,8 @@ def failures_of(scenario, *faults):
 
 
 def test_a_failure_is_answered_by_the_branch_of_the_tree_that_takes_over():
-    arrow, broken = failures_of("mapping", "zed@30")
-    assert (arrow.way, arrow.answered_by) == (Way(ARROW, "perception.zed_status OK -> BROKEN"), "LiDAR navigation")
+    moved, broken = failures_of("mapping", "zed@30")
+    assert (moved.way, moved.answered_by) == (Way(TRANSITION, "perception.zed_status OK -> BROKEN"), "LiDAR navigation")
     assert (broken.way, broken.answered_by) == (Way(INVARIANT, "perception.zed_depthmap zed_ok"), "LiDAR navigation")
     assert (broken.skill, 0.0 < broken.after_s < 0.2) == ("perception.lidar_depthmap", True)
     *_, lost = failures_of("inspection", "radio@30")
@@ -316,6 +316,16 @@ def test_a_row_that_was_damaged_costs_no_other(damaged, tmp_path):
     assert set(again.rows) == {1, 2}
     again.add([row(3)])
     assert [json.loads(line)["run"] for line in path.read_text(encoding="utf-8").splitlines()] == [1, 2, 3]
+
+
+def test_a_row_with_a_kind_of_failure_that_nobody_knows_is_refused_with_the_remedy(tmp_path):
+    campaign = load_campaign(campaign_file(tmp_path / "a.yaml", DRAWN))
+    table = Table(tmp_path / "out", campaign)
+    older = {"kind": "extern arrow", "name": "perception.zed_status OK -> BROKEN", "answered_by": "x", "after_s": None}
+    table.add([row(1), row(2, failures=[older])])
+    table.finish()
+    with pytest.raises(AnalysisError, match=r"run 2 has a failure of the kind `extern arrow`; .*, extern transition\. Go on"):
+        Table(tmp_path / "out", campaign)
 
 
 def test_a_campaign_whose_plan_was_damaged_is_refused(tmp_path):

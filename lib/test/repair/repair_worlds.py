@@ -1,7 +1,7 @@
 """Worlds that a repair has to hold out in, made without the steps of the search.
 
 - Flights: the mission's own tree over the real managers, in virtual time. Either one fault comes, at each moment, and nothing else fails;
-  or everything fails that a model has: any result, any arrow of the functional layer, at any time.
+  or everything fails that a model has: any result, any transition of the functional layer, at any time.
 - Brute force: every situation that managers of a small skillset can be brought into, by rules of their own (paper, Figure 5).
 """
 
@@ -113,9 +113,9 @@ class Sky:
         mission = self._mission(Behaviour(rules=self._rules(_anyhow, chance)), seed)
         for of in self.skillsets:
             for resource in of.resources:
-                arrows = [one for one in resource.transitions if one.extern]
-                for _ in range(chance.randrange(12) if arrows else 0):
-                    move = partial(mission.world.managers[of.name].transition, resource.name, chance.choice(arrows).target)
+                extern = [one for one in resource.transitions if one.extern]
+                for _ in range(chance.randrange(12) if extern else 0):
+                    move = partial(mission.world.managers[of.name].transition, resource.name, chance.choice(extern).target)
                     mission.world.clock.after(chance.uniform(0.0, chance.choice((1.0, 5.0, 20.0))), move)
         flight = Flight(mission, self.never)
         flight.fly()
@@ -215,11 +215,11 @@ class Brute:
                 for result in skill.results:
                     yield from self._step(states, without, come, result.effect.assignments)
         for number, resource in enumerate(self.skillset.resources):
-            for arrow in resource.transitions:
-                shows = (resource.name, arrow.target) in self.fault
-                hides = (resource.name, arrow.source) in self.fault and not shows
-                if arrow.extern and arrow.source == states[number] and not (come and hides):
-                    after = (*states[:number], arrow.target, *states[number + 1 :])
+            for moved in resource.transitions:
+                shows = (resource.name, moved.target) in self.fault
+                hides = (resource.name, moved.source) in self.fault and not shows
+                if moved.extern and moved.source == states[number] and not (come and hides):
+                    after = (*states[:number], moved.target, *states[number + 1 :])
                     yield "", (*self._settled(after, running), come or shows)
 
     def _step(
@@ -237,8 +237,8 @@ class Brute:
     def _applied(self, states: States, effect: Sequence[Assignment]) -> States | None:
         now = dict(zip((one.name for one in self.skillset.resources), states, strict=True))
         for one in effect:
-            arrows = self.skillset.resource(one.resource).transitions
-            if not any(not arrow.extern and (arrow.source, arrow.target) == (now[one.resource], one.target) for arrow in arrows):
+            known = self.skillset.resource(one.resource).transitions
+            if not any(not moved.extern and (moved.source, moved.target) == (now[one.resource], one.target) for moved in known):
                 return None
             now[one.resource] = one.target
         return tuple(now.values())

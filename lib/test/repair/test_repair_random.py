@@ -148,7 +148,7 @@ def test_a_skill_is_said_to_be_able_to_run_exactly_where_brute_force_can_run_it(
     told = Counter[bool]()
     for model in subject.skillsets:
         for resource in model.resources:
-            for state in {arrow.target for arrow in resource.transitions if arrow.extern}:
+            for state in {one.target for one in resource.transitions if one.extern}:
                 for skill in model.skills:
                     ours = played(model, skill.name, [(resource.name, state)], Deadline.after(TIME_S)).won
                     assert ours == Brute(model, frozenset({(resource.name, state)})).can_run(skill.name), (resource.name, state, skill.name)

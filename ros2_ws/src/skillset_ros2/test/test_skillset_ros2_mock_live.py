@@ -260,6 +260,6 @@ def test_the_starter_is_a_behaviour_file(tmp_path):
         resource
         for skillset in skillsets
         for resource in skillset.resources
-        if any(arrow.extern and arrow.source == resource.initial for arrow in resource.transitions)
+        if any(one.extern and one.source == resource.initial for one in resource.transitions)
     ]
     assert len(behaviour.timeline) == len(leaves_by_itself) > 0
