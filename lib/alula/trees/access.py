@@ -103,11 +103,14 @@ class Accesses:
         for attribute in scripts_of(wiring.element, wiring.type):
             yield from self.in_script(wiring, attribute.name)
 
+    def statements(self, wiring: Wiring) -> list[Part]:
+        """Return the statements of all scripts of a node, in the order in which these run."""
+        return [one for attribute in scripts_of(wiring.element, wiring.type) for one in self._statements_in(wiring, attribute)]
+
     def parts(self, wiring: Wiring) -> Iterator[Part]:
         """Yield the parts of all scripts of a node, in the order in which these run; each before what it is made of."""
-        for attribute in scripts_of(wiring.element, wiring.type):
-            for statement in self._statements_in(wiring, attribute):
-                yield from walk(statement)
+        for statement in self.statements(wiring):
+            yield from walk(statement)
 
     def calls(self, wiring: Wiring, attribute: str) -> Iterator[Call]:
         """Yield the calls in the script in an attribute of a node."""

@@ -11,9 +11,9 @@ from alula.missions.mission_file import DEGRADED, STOPPING
 from alula.missions.world import FUNCTIONS
 from alula.prove.mission.oracle import Oracle
 from alula.prove.mission.unknown import Unknown, UnknownNumber, UnknownText
-from alula.trees.access import Accesses, Key, scripts_of
+from alula.trees.access import Accesses, Key
 from alula.trees.node import Wiring, pointer
-from alula.trees.script import names_in, statements_of
+from alula.trees.script import Names, names_in, statements_of
 from alula.trees.script.syntax import Assignment, Call, Chain, Comparison, Literal, Name, Node, walk
 
 ANOTHER = "(another text)"
@@ -37,20 +37,17 @@ class Asks:
 
 
 @dataclass
-class Read:
-    """What is read of a mission's memory.
+class Reading:
+    """What is read of a mission's memory, by a node or by several.
 
     ``names``: entries that scripts or nodes decide by; ``numbers``, ``texts``: what each of them is compared with; ``counted``: those
     that are computed, perhaps without end; ``whole``: those of which every value counts; ``ends``: those that are asked with ``failed``.
     """
 
-    oracle: Oracle
     names: set[Key] = field(default_factory=set)
     numbers: dict[Key, set[float]] = field(default_factory=dict)
     texts: dict[Key, set[str]] = field(default_factory=dict)
     counted: set[Key] = field(default_factory=set)
-    exactly: int = 0
-    """Below which number entries that are counted are kept exactly, from 0 to the greatest one that they are compared with."""
     whole: set[Key] = field(default_factory=set)
     ordered: set[Key] = field(default_factory=set)
     """Entries that are compared with more than literals: of a text every letter counts."""
@@ -58,34 +55,73 @@ class Read:
     asks_first: bool = False
     flows: dict[Key, set[Key]] = field(default_factory=dict)
     """By entry those that what it has may come of."""
-    unread: frozenset[str] = frozenset()
-    """Types of node that decide by nothing that is known."""
-    free: frozenset[str] = frozenset()
-    """Types of node that may decide by anything."""
-    accesses: Accesses = field(default_factory=lambda: Accesses(lambda script: statements_of(script.value), None))
+
+    def add(self, other: Reading) -> None:
+        """Read what another one reads, too."""
+        self.names |= other.names
+        self.counted |= other.counted
+        self.whole |= other.whole
+        self.ordered |= other.ordered
+        self.ends |= other.ends
+        self.asks_first |= other.asks_first
+        for key, numbers in other.numbers.items():
+            self.numbers.setdefault(key, set()).update(numbers)
+        for key, texts in other.texts.items():
+            self.texts.setdefault(key, set()).update(texts)
+        for key, sources in other.flows.items():
+            self.flows.setdefault(key, set()).update(sources)
 
     def sources(self, names: Iterable[Key]) -> frozenset[Key]:
         """Return entries, and all that what they have may come of."""
         return frozenset(reachable_from(names, lambda name: self.flows.get(name, ())))
 
+
+@dataclass(kw_only=True)
+class Read(Reading):
+    """What a mission reads of its memory. Each node is read once.
+
+    ``unread`` are types of node that decide by nothing that is known, ``free`` those that may decide by anything. Entries that are counted
+    are kept exactly below ``exactly``, from 0 to the greatest number that they are compared with. ``constants`` are numbers by name.
+    """
+
+    oracle: Oracle
+    constants: Mapping[str, float]
+    exactly: int = 0
+    unread: frozenset[str] = frozenset()
+    free: frozenset[str] = frozenset()
+    accesses: Accesses = field(default_factory=lambda: Accesses(lambda script: statements_of(script.value), None))
+    _nodes: dict[Wiring, tuple[Reading, Asks]] = field(default_factory=dict)
+
+    def of_node(self, wiring: Wiring) -> Reading:
+        """Return what one node reads."""
+        return self._node(wiring)[0]
+
     def asks(self, wiring: Wiring) -> Asks:
         """Return what one node asks for."""
-        one = Read(self.oracle, names=set())
-        statements = _statements(wiring)
-        names = names_in(statements)
-        named = names.read | names.asked
-        for statement in statements:
-            _statement(one, wiring, statement, {})
-        _ports(one, wiring, self.unread)
-        if wiring.type.name not in self.unread and not wiring.is_subtree:
-            named |= {pointer(one.value, one.name) or one.value for one in wiring.port_attributes()}
-        written = _keys(wiring, names.replaced)
-        return Asks(frozenset(one.names), _keys(wiring, named), written, frozenset(one.ends), one.asks_first, self._skills(wiring))
+        return self._node(wiring)[1]
 
-    def _skills(self, wiring: Wiring) -> frozenset[str]:
-        """Return the skills whose executions a node asks for."""
+    def _node(self, wiring: Wiring) -> tuple[Reading, Asks]:
+        if wiring not in self._nodes:
+            reading, statements = Reading(), self.accesses.statements(wiring)
+            for statement in statements:
+                _statement(reading, wiring, statement, self.constants)
+            decides = wiring.type.name not in self.unread and not wiring.is_subtree
+            if decides:
+                _ports(reading, wiring)
+            self._nodes[wiring] = reading, self._asked(reading, wiring, names_in(statements), decides=decides)
+        return self._nodes[wiring]
+
+    def _asked(self, reading: Reading, wiring: Wiring, names: Names, *, decides: bool) -> Asks:
+        given = {pointer(one.value, one.name) or one.value for one in wiring.port_attributes()} if decides else set()
         calls = (part for part in self.accesses.parts(wiring) if isinstance(part, Call))
-        return frozenset(name for call in calls if FUNCTIONS[call.function].kind == "skill" for name in call.named)
+        return Asks(
+            frozenset(reading.names),
+            _keys(wiring, names.read | names.asked | given),
+            _keys(wiring, names.replaced),
+            frozenset(reading.ends),
+            reading.asks_first,
+            frozenset(name for call in calls if FUNCTIONS[call.function].kind == "skill" for name in call.named),
+        )
 
     def value(self, name: Key, value: object) -> object:
         """Return what is kept of an entry's value."""
@@ -138,13 +174,11 @@ def what_is_read(
     ``opaque`` are types of node that decide by nothing that is known, ``free`` those that may ask for more than the file shows.
     Entries that are counted are kept exactly below ``exactly``, up to what they are compared with.
     """
-    read = Read(oracle, exactly=exactly, unread=frozenset(opaque), free=frozenset(free))
+    read = Read(oracle=oracle, constants=constants, exactly=exactly, unread=frozenset(opaque), free=frozenset(free))
     for root in trees:
         read.names |= {(root.blackboard, name) for name in OUTCOME}
         for wiring in root.walk():
-            for statement in _statements(wiring):
-                _statement(read, wiring, statement, constants)
-            _ports(read, wiring, read.unread)
+            read.add(read.of_node(wiring))
     read.names |= read.sources(read.names)
     for source, target in [(source, target) for target, sources in read.flows.items() for source in sources]:  # a copy of it
         for one, other in ((source, target), (target, source)):
@@ -156,17 +190,12 @@ def what_is_read(
     return read
 
 
-def _statements(wiring: Wiring) -> list[Node]:
-    """Return the statements of all scripts of a node."""
-    return [one for attribute in scripts_of(wiring.element, wiring.type) for one in statements_of(attribute.value)]
-
-
 def _keys(wiring: Wiring, names: Iterable[str]) -> frozenset[Key]:
     """Return the entries that a node may mean by names."""
     return frozenset(key for name in names for key in wiring.blackboard.candidates(name))
 
 
-def _statement(read: Read, wiring: Wiring, statement: Node, constants: Mapping[str, float]) -> None:
+def _statement(read: Reading, wiring: Wiring, statement: Node, constants: Mapping[str, float]) -> None:
     targets = [one for one in walk(statement) if isinstance(one, Assignment) and isinstance(one.target, Name)]
     for one in targets:
         _assignment(read, wiring, one)
@@ -176,7 +205,7 @@ def _statement(read: Read, wiring: Wiring, statement: Node, constants: Mapping[s
         _look(read, wiring, node, constants)
 
 
-def _assignment(read: Read, wiring: Wiring, node: Assignment) -> None:
+def _assignment(read: Reading, wiring: Wiring, node: Assignment) -> None:
     sources = _keys(wiring, (one.name for one in walk(node.value) if isinstance(one, Name)))
     for target in _keys(wiring, [node.target.name] if isinstance(node.target, Name) else ()):
         if sources or not node.replaces:
@@ -185,7 +214,7 @@ def _assignment(read: Read, wiring: Wiring, node: Assignment) -> None:
             read.counted.add(target)
 
 
-def _look(read: Read, wiring: Wiring, node: Node, constants: Mapping[str, float]) -> None:
+def _look(read: Reading, wiring: Wiring, node: Node, constants: Mapping[str, float]) -> None:
     if isinstance(node, Call):
         read.asks_first |= node.function == "failed_first"
         read.ends |= set(node.named) if node.function == "failed" else set()
@@ -200,8 +229,7 @@ def _look(read: Read, wiring: Wiring, node: Node, constants: Mapping[str, float]
                 read.ordered.add(key)
 
 
-def _ports(read: Read, wiring: Wiring, unread: frozenset[str]) -> None:
-    if wiring.type.name not in unread and not wiring.is_subtree:
-        keys = _keys(wiring, (key for one in wiring.port_attributes() if (key := pointer(one.value, one.name)) is not None))
-        read.names |= keys
-        read.whole |= keys
+def _ports(read: Reading, wiring: Wiring) -> None:
+    keys = _keys(wiring, (key for one in wiring.port_attributes() if (key := pointer(one.value, one.name)) is not None))
+    read.names |= keys
+    read.whole |= keys
