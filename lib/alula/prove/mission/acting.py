@@ -4,20 +4,20 @@ from __future__ import annotations
 
 from collections.abc import Callable
 
+from alula.prove.playing import PlayedFunction
 from alula.runtime.core.execution import Execution
-from alula.runtime.hooks import SkillHooks
 from alula.runtime.local.middleware import Bus, VirtualLink, VirtualMiddleware
 from alula.runtime.middleware import GoalListener
 
 
-class Function(SkillHooks):
+class Function(PlayedFunction):
     """A function that ends when the run says so, also when it was interrupted; ``validated`` says why inputs are refused.
 
     ``stays`` has the execution that holds in a pause, and does not go on.
     """
 
     def __init__(self, running: dict[str, Execution], told: dict[str, float], validated: Callable[[], str], stays: set[str]) -> None:
-        self._running = running
+        super().__init__(running)
         self._told = told
         self._validated = validated
         self._stays = stays
@@ -25,10 +25,6 @@ class Function(SkillHooks):
     def validate(self, _: object) -> str:
         """Say why they are refused."""
         return self._validated()
-
-    def on_dispatch(self, execution: Execution) -> None:
-        """Run."""
-        self._running[execution.id] = execution
 
     def progress(self, execution: Execution) -> float:
         """Tell what the run says."""

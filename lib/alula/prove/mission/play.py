@@ -33,6 +33,7 @@ from alula.prove.mission.robot import Robot, progress_of
 from alula.prove.mission.run import MissionRun
 from alula.prove.mission.state import Event, Kind
 from alula.prove.mission.system import any_inputs, uses_of
+from alula.prove.playing import differences
 from alula.runtime.client import Client
 from alula.runtime.core.execution import Execution
 from alula.runtime.handle import SkillHandle
@@ -202,10 +203,7 @@ class _Player:
             case _:
                 self._fail(event)
         self.world.run_for(0.0)
-        for name, target in {name: target for name, _, target in event.changes}.items():
-            found = self._state(event.skillset, name)
-            if found != target:
-                raise LeftError(f"{event.skillset}.{name} is {found}, and {target} in the counterexample")
+        self._compare(event.skillset, {name: target for name, _, target in event.changes})
 
     def _trigger(self, event: Event) -> None:
         reply = self.world.managers[event.skillset].engine.trigger(event.name)
@@ -350,8 +348,10 @@ class _Player:
             raise LeftError(f"{event.skill} does not run")
         return execution
 
-    def _state(self, skillset: str, name: str) -> str:
-        return str(self.world.managers[skillset].engine.resources[name].state)
+    def _compare(self, skillset: str, expected: Mapping[str, str], when: str = "") -> None:
+        statuses = self.world.managers[skillset].engine.resources if expected else {}
+        for difference in differences(statuses, expected.items(), skillset):
+            raise LeftError(f"{when}{difference}")
 
     def compare_end(self) -> None:
         """Raise LeftError where the end is not that of the run."""
@@ -359,9 +359,8 @@ class _Player:
         if found != self._run.outcome:
             raise LeftError(f"the mission is {found} at the end, and {self._run.outcome} in the counterexample")
         for name, state in self._run.states:
-            real = self._state(*name.split("."))
-            if real != state:
-                raise LeftError(f"{name} is {real} at the end, and {state} in the counterexample")
+            skillset, _, resource = name.partition(".")
+            self._compare(skillset, {resource: state}, "at the end ")
 
     def finish(self, left: str) -> Played:
         """End the record."""

@@ -15,6 +15,7 @@ from alula.model.expressions import And, Expression, Not, ResourceIs
 from alula.model.model import Resource, Skill, Skillset, Transition
 from alula.model.overapproximation import OverApproximation
 from alula.prove.mission.managers import searched
+from alula.prove.playing import without_parameters
 
 AS_WANTED = "as_wanted"
 """Data say what every condition asks for."""
@@ -33,7 +34,7 @@ def playable(skillset: Skillset) -> Playable:
     """Return a skillset without inputs, outputs and data, and with the transitions that the search counts as extern."""
     model = searched(skillset)
     against = list(dict.fromkeys(_against(model)))
-    bare = replace(model.skillset, skills=tuple(replace(one, inputs=(), outputs=()) for one in model.skillset.skills))
+    bare = without_parameters(model.skillset)
     if not against:
         return Playable(bare)
     taken = {*(one.name for one in skillset.resources), *(one.name for one in skillset.data)}

@@ -9,18 +9,18 @@ from __future__ import annotations
 
 from collections import Counter
 from collections.abc import Callable, Iterable, Mapping
-from dataclasses import dataclass, field, replace
+from dataclasses import dataclass, field
 from types import SimpleNamespace
 
 from alula.language.counterexamples import Counterexample, CounterexampleStep, NumberedExecution, messages
 from alula.language.counterexamples import StepKind as Kind
 from alula.language.outside import opened
 from alula.model.model import Skillset
+from alula.prove.playing import PlayedFunction, differences, without_parameters
 from alula.prove.skillset.play_world import MakeWorld, PlayWorld, virtual_world
 from alula.runtime.core.execution import Execution as Running
 from alula.runtime.core.replies import TransitionReply
 from alula.runtime.handle import SkillHandle
-from alula.runtime.hooks import SkillHooks
 from alula.runtime.waiting import Pending
 
 READY_S = 60.0
@@ -37,19 +37,19 @@ class PlayedStep:
     differences: tuple[str, ...] = ()
 
 
-class _Function(SkillHooks):
-    """A function that goes on until the counterexample ends it."""
+class _Function(PlayedFunction):
+    """A function that tells when it was asked for its progress."""
 
     def __init__(self) -> None:
+        super().__init__({})
         self.now_ns: Callable[[], int] = lambda: 0
-        self.running: dict[str, Running] = {}
         self.asked_ns: dict[str, int] = {}
         """When each execution was dispatched, or asked for its progress last; mission clock."""
         self._reports = 0
 
     def on_dispatch(self, execution: Running) -> None:
         self.asked_ns[execution.id] = self.now_ns()
-        self.running[execution.id] = execution
+        super().on_dispatch(execution)
 
     def progress(self, execution: Running) -> float:
         """Return another number each time, so that no deadline of progress passes."""
@@ -62,7 +62,7 @@ def play(skillset: Skillset, counterexample: Counterexample, make_world: MakeWor
     """Play a counterexample from its first step on; stop after the first step with a difference."""
     transitions = _from_outside(counterexample)
     # Managers refuse what is not extern; transitions that the counterexample has taken from outside are, in this play.
-    played_model = _without_parameters(opened(skillset, transitions) if transitions else skillset)
+    played_model = without_parameters(opened(skillset, transitions) if transitions else skillset)
     functions = {skill.name: _Function() for skill in skillset.skills}
     played: list[PlayedStep] = []
     with make_world(played_model, functions) as world:
@@ -112,10 +112,7 @@ class _Player:
 
     def _differences(self, step: CounterexampleStep) -> Iterable[str]:
         """Yield each difference between the managers and the counterexample after a step."""
-        states = {name: status.state for name, status in self._managers.engine.resources.items()}
-        for name, state in step.states:
-            if states[name] != state:
-                yield f"{name} is {states[name]} in the managers, {state} in the counterexample"
+        yield from differences(self._managers.engine.resources, step.states)
         told, found = Counter(one.skill for one in step.running), Counter(one.skill for one in self._managers.engine.executions)
         for skill in sorted({*told, *found}):
             if told[skill] != found[skill]:
@@ -208,11 +205,6 @@ class _Player:
             for one in self._managers.engine.executions
             if one.skill in self._periods_s
         )
-
-
-def _without_parameters(skillset: Skillset) -> Skillset:
-    """Return the model as a counterexample knows it: inputs and outputs are the hooks' own affair."""
-    return replace(skillset, skills=tuple(replace(skill, inputs=(), outputs=()) for skill in skillset.skills))
 
 
 def _from_outside(counterexample: Counterexample) -> frozenset[tuple[str, str, str]]:

@@ -136,6 +136,10 @@ def test_a_run_that_does_not_happen_is_left_where_it_does_not(tmp_path: Path) ->
     events = tuple(one for one in finding.run.events if not one.changes or one.name != "control")
     played = play(MissionFile.read(path, finding.run.skillsets, NO_PART), replace(finding.run, events=events))
     assert "at step" in played.left
+    name, state = finding.run.states[0]
+    other = replace(finding.run, states=((name, "ELSEWHERE"), *finding.run.states[1:]))
+    played = play(MissionFile.read(path, finding.run.skillsets, NO_PART), other)
+    assert played.left == f"at the end {name} is {state} in the managers, ELSEWHERE in the counterexample"
 
 
 def test_the_axes_that_listing_3_keeps_are_kept_in_a_flight(tmp_path: Path) -> None:

@@ -101,7 +101,7 @@ def difference(player: _Player, system: System, state: State) -> str:
         alive = player.world.managers[skillset.name].alive
         for resource in skillset.resources if alive else ():
             name = f"{skillset.name}.{resource.name}"
-            if player._state(skillset.name, resource.name) != system.resource(state, name):
+            if player.world.managers[skillset.name].engine.resources[resource.name].state != system.resource(state, name):
                 return f"{name} is not {system.resource(state, name)}"
         if not alive and system.managers(state, skillset.name).states is not None:
             return f"the managers of {skillset.name} are not there"

@@ -1,0 +1,35 @@
+"""What the plays of counterexamples share, a skillset's and a mission's: what managers are made of, functions, and how states differ."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Iterator, Mapping
+from dataclasses import replace
+
+from alula.model.model import Skillset
+from alula.runtime.core.execution import Execution
+from alula.runtime.core.records import ResourceStatus
+from alula.runtime.hooks import SkillHooks
+
+
+class PlayedFunction(SkillHooks):
+    """A function that goes on until the counterexample ends it: what runs of it stands in ``running``, by its id."""
+
+    def __init__(self, running: dict[str, Execution]) -> None:
+        self.running = running
+
+    def on_dispatch(self, execution: Execution) -> None:
+        """Run."""
+        self.running[execution.id] = execution
+
+
+def without_parameters(skillset: Skillset) -> Skillset:
+    """Return the model as a counterexample knows it: inputs and outputs are the hooks' own affair."""
+    return replace(skillset, skills=tuple(replace(skill, inputs=(), outputs=()) for skill in skillset.skills))
+
+
+def differences(statuses: Mapping[str, ResourceStatus], expected: Iterable[tuple[str, str]], skillset: str = "") -> Iterator[str]:
+    """Yield each resource that the managers have in another state than the counterexample; ``skillset`` stands before its name."""
+    for name, state in expected:
+        found = statuses[name].state
+        if found != state:
+            yield f"{f'{skillset}.' if skillset else ''}{name} is {found} in the managers, {state} in the counterexample"
