@@ -17,10 +17,9 @@ from dataclasses import dataclass, field, replace
 from functools import cached_property
 
 from alula.language.errors import Diagnostic, Severity
-from alula.language.lexer import Source
-from alula.language.syntax.cursor import Cursor, SyntaxFault
-from alula.language.syntax.properties import read_mission_property
+from alula.language.syntax.properties import property_of_mission
 from alula.model.expressions import Expression
+from alula.model.model import Property
 from alula.odds.mission import achieved
 from alula.prove.limits import Deadline, OutOfTimeError
 from alula.prove.mission.run import MissionRun
@@ -418,14 +417,11 @@ class Search:
 
 def condition_of(option: str, text: str) -> Expression:
     """Read a condition, as those of a mission's properties; ``option`` is what gives it. Raises RepairError."""
-    source = Source("", f"goal: eventually {text}", ends="the end of the condition")
-    with suppress(SyntaxFault):
-        cursor = Cursor(source)
-        one = read_mission_property(cursor)
-        if cursor.at_end and not source.diagnostics:
-            return one.condition
-    why = f": {source.diagnostics[0].message}" if source.diagnostics else ""
-    raise RepairError(f"{option} '{text}': can't be read as a condition, such as outcome given_up or skillset.skill running{why}")
+    one = property_of_mission(f"goal: eventually {text}", "the end of the condition")
+    if isinstance(one, Property):
+        return one.condition
+    why = one.message + (f"; {one.hint}" if one.hint else "")
+    raise RepairError(f"{option} '{text}': can't be read as a condition, such as outcome given_up or skillset.skill running: {why}")
 
 
 def _told(fate: Fate | None) -> str:

@@ -15,11 +15,9 @@ pytest.importorskip("py_trees")
 from repair_robots import robot_of
 from repair_worlds import GOOD, Brute, Sky
 
-from alula.language.lexer import Source
-from alula.language.syntax.cursor import Cursor
-from alula.language.syntax.properties import read_mission_property
+from alula.language.syntax.properties import property_of_mission
 from alula.model.expressions import Expression
-from alula.model.model import Skill
+from alula.model.model import Property, Skill
 from alula.prove.limits import Deadline
 from alula.prove.mission.wanted import PROPERTY
 from alula.repair.errors import RepairError
@@ -49,8 +47,8 @@ def answers(seed: int, folder: Path, monkeypatch: pytest.MonkeyPatch) -> Iterato
 
 def properties(text: str) -> Mapping[str, Expression]:
     """Return what must never be, by the names of a mission's properties."""
-    several = (read_mission_property(Cursor(Source("", match["text"]))) for match in PROPERTY.finditer(text))
-    return {one.name: one.condition for one in several}
+    several = (property_of_mission(match["text"], "the end") for match in PROPERTY.finditer(text))
+    return {one.name: one.condition for one in several if isinstance(one, Property)}
 
 
 def attack_repair(subject: Subject, answer: Answer, flights: range) -> Counter[str]:

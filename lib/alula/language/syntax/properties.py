@@ -7,8 +7,10 @@ the runs in which an execution never ends are to be left out.
 from __future__ import annotations
 
 from collections.abc import Callable
+from contextlib import suppress
 
-from alula.language.lexer import Kind
+from alula.language.errors import Diagnostic
+from alula.language.lexer import Kind, Source
 from alula.language.syntax.conditions import bare_condition, mission_condition
 from alula.language.syntax.cursor import Cursor, SyntaxFault
 from alula.model.expressions import Expression
@@ -23,9 +25,20 @@ def read_property(cursor: Cursor) -> Property:
     return _read(cursor, bare_condition)
 
 
-def read_mission_property(cursor: Cursor) -> Property:
-    """Read a property of a mission: as those of models, and behind `leads to CONDITION` perhaps `within N ticks`."""
-    return _read(cursor, mission_condition, ticks=True)
+def property_of_mission(text: str, ends: str) -> Property | Diagnostic:
+    """Read a property of a mission, all of a text: as those of models, and behind `leads to CONDITION` perhaps `within N ticks`.
+
+    Return the first thing that is wrong where it can't be read; ``ends`` is how messages call the text's end.
+    """
+    source = Source("", text.replace("\n", " "), ends=ends)
+    with suppress(SyntaxFault):
+        cursor = Cursor(source)
+        one = _read(cursor, mission_condition, ticks=True)
+        if not cursor.at_end:
+            cursor.fail("the end", hint="write `=>` for `->`" if cursor.at("->") else "")
+        if not source.diagnostics:
+            return one
+    return source.diagnostics[0]
 
 
 def _read(cursor: Cursor, read_condition: Callable[[Cursor], Expression], *, ticks: bool = False) -> Property:

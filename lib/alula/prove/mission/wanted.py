@@ -10,11 +10,10 @@ from __future__ import annotations
 
 import re
 from collections.abc import Collection, Sequence
+from dataclasses import replace
 
 from alula.language.errors import Diagnostic
-from alula.language.lexer import Source
-from alula.language.syntax.cursor import Cursor, SyntaxFault
-from alula.language.syntax.properties import read_mission_property
+from alula.language.syntax.properties import property_of_mission
 from alula.missions.director import Outcome
 from alula.model.expressions import MissionIs, ResourceIs, SkillRuns, atoms
 from alula.model.model import Property, PropertyKind, Skillset
@@ -60,20 +59,11 @@ def wanted(nodes: Sequence[Node], skillsets: Sequence[Skillset], faults: Collect
 
 
 def _read(attribute: Attribute, text: str, start: int) -> Property:
-    source = Source("", text.replace("\n", " "), ends="the end of the property")
-    cursor = Cursor(source)
-    one = None
-    try:
-        one = read_mission_property(cursor)
-        if not cursor.at_end:
-            cursor.fail("`;`", hint="write `=>` for `->`" if cursor.at("->") else "")
-    except SyntaxFault:
-        pass
-    if source.diagnostics:
-        first = source.diagnostics[0]
-        raise WantedError(_wrong(_span(attribute, start, first.span), f"the property can't be read: {first.message}", first.hint or HINT))
-    assert one is not None  # noqa: S101 - a fault is reported
-    return Property(one.name, one.kind, one.condition, one.consequence, one.fair, one.within, _span(attribute, start, one.span))
+    one = property_of_mission(text, "the end of the property")
+    span = _span(attribute, start, one.span)
+    if isinstance(one, Diagnostic):
+        raise WantedError(_wrong(span, f"the property can't be read: {one.message}", one.hint or HINT))
+    return replace(one, span=span)
 
 
 HINT = "write `property name: never C`, `always C`, `eventually C`, or `C leads to D`, which may be `within N ticks`"

@@ -13,10 +13,8 @@ pytest.importorskip("z3")
 pytest.importorskip("py_trees")
 
 from alula.language.errors import Diagnostic, has_errors
-from alula.language.lexer import Source
 from alula.language.models import ModelFile, check_texts
-from alula.language.syntax.cursor import Cursor
-from alula.language.syntax.properties import read_mission_property
+from alula.language.syntax.properties import property_of_mission
 from alula.missions.mission_file import MissionFile
 from alula.missions.part import NO_PART
 from alula.model.model import Property, Skillset
@@ -115,7 +113,7 @@ def test_what_does_not_hold_has_a_run_that_plays(wanted: str, tree: str, words: 
         ("property a: fault engine leads to outcome given_up", "fault", "there is no fault that shows in a state `engine`"),
         ("property a: never fault pilot", "fault", "`fault` is something that happens"),
         ("property a: always running(drone.hover)", "running(", "expected a condition, found `running`"),
-        ("property a: always drone.hover running -> drone.axes == USED", "->", "expected `;`, found `->`"),
+        ("property a: always drone.hover running -> drone.axes == USED", "->", "expected the end, found `->`"),
         ("property a: always control == OURS", "==", "expected `.`, found `==`"),
         ("property a: drone.control == OURS leads to outcome given_up within 0 ticks", "0", "a number of ticks from 1 to 1000"),
         ("property a: always drone.control == OURS or", "a: always", "found the end"),
@@ -182,9 +180,8 @@ def condition(chance: random.Random, depth: int = 2) -> str:
 
 
 def read(text: str) -> Property:
-    source = Source("", text.replace("'", '"'))
-    one = read_mission_property(Cursor(source))
-    assert not source.diagnostics
+    one = property_of_mission(text, "the end")
+    assert isinstance(one, Property)
     return one
 
 
