@@ -31,3 +31,12 @@ def test_lines_of_code_in_the_page_parse() -> None:
     assert len(programs) >= 2
     for program in programs:
         ast.parse(re.sub(r"^ {4}", "", program, flags=re.MULTILINE))
+
+
+def test_what_a_public_class_has_of_a_private_base_is_told_once() -> None:
+    """The clients of both ROS worlds derive from one class; hooks are called by managers, so that of their bases only attributes count."""
+    text = page()
+    assert text.count("- `start(skill: str, **inputs: object) -> SkillHandle`: ") == 1
+    assert "\nIt has what [SkillsetClient](#skillsetclient) has.\n" in text
+    assert text.count("- `answer_s`: ") == 2
+    assert "`waited_s(" not in text

@@ -6,6 +6,8 @@ The modules are read as text, so that neither ROS world is needed. A name is loo
 from __future__ import annotations
 
 import ast
+import functools
+import itertools
 import re
 import sys
 import textwrap
@@ -42,7 +44,8 @@ class Name:
 
     name: str
     defined: Definition | None
-    value: str = ""
+    bases: tuple[ast.ClassDef, ...] = ()
+    """Private classes that a class derives from, the nearest first: their members are its own."""
 
 
 def main() -> int:
@@ -58,6 +61,7 @@ def page() -> str:
 
 
 def _lines() -> Iterator[str]:
+    told: dict[str, str] = {}
     for module in MODULES:
         tree = _parsed(module)
         yield f"## {module}"
@@ -66,7 +70,7 @@ def _lines() -> Iterator[str]:
         names = [_name(place, name) for name, place in _offered(tree)]
         values = [one for one in names if one.defined is None]
         for one in sorted((one for one in names if one.defined is not None), key=lambda one: one.name.lower()):
-            yield from _entry(one)
+            yield from _entry(one, told)
         if values:
             yield "### Values"
             yield ""
@@ -78,6 +82,7 @@ def _path(module: str) -> Path:
     return base / "__init__.py" if base.is_dir() else base.with_suffix(".py")
 
 
+@functools.cache
 def _parsed(module: str) -> ast.Module:
     return ast.parse(_path(module).read_text(encoding="utf-8"))
 
@@ -85,8 +90,7 @@ def _parsed(module: str) -> ast.Module:
 def _offered(tree: ast.Module) -> list[tuple[str, str]]:
     """Return the names of ``__all__``, each with the module that defines it."""
     (listed,) = [node.value for node in tree.body if isinstance(node, ast.Assign) and getattr(node.targets[0], "id", "") == "__all__"]
-    imports = [node for node in ast.walk(tree) if isinstance(node, ast.ImportFrom)]
-    places = {alias.name: node.module or "" for node in imports for alias in node.names}
+    places = _imported(tree)
     return [(name, places[name]) for name in ast.literal_eval(listed)]
 
 
@@ -95,11 +99,35 @@ def _name(module: str, name: str) -> Name:
     tree = _parsed(module)
     for node in ast.walk(tree):
         if isinstance(node, Definition) and node.name == name:
-            return Name(name, node)
+            return Name(name, node, tuple(_bases(tree, node)) if isinstance(node, ast.ClassDef) else ())
     return Name(name, None)
 
 
-def _entry(one: Name) -> Iterator[str]:
+def _bases(tree: ast.Module, node: ast.ClassDef) -> Iterator[ast.ClassDef]:
+    """Yield the private classes of our packages that a class derives from."""
+    for name in (ast.unparse(base).partition("[")[0] for base in node.bases):
+        module = _imported(tree).get(name, "")
+        if module.partition(".")[0] not in FOLDERS or _is_public(name):
+            continue
+        place = _parsed(module)
+        while (found := next((one for one in place.body if isinstance(one, ast.ClassDef) and one.name == name), None)) is None:
+            place = _parsed(_imported(place)[name])
+        yield found
+        yield from _bases(place, found)
+
+
+def _imported(tree: ast.Module) -> dict[str, str]:
+    """Return the module of each name that a module imports from another."""
+    imports = [node for node in ast.walk(tree) if isinstance(node, ast.ImportFrom)]
+    return {alias.name: node.module or "" for node in imports for alias in node.names}
+
+
+def _is_public(name: str) -> bool:
+    return any(name == offered for module in MODULES for offered, _ in _offered(_parsed(module)))
+
+
+def _entry(one: Name, told: dict[str, str]) -> Iterator[str]:
+    """Yield what is said of a name; ``told``: the names that list the members of a private base already."""
     node = one.defined
     assert node is not None  # noqa: S101 - values are listed elsewhere
     yield f"### {one.name}"
@@ -109,17 +137,29 @@ def _entry(one: Name) -> Iterator[str]:
         yield from _text(ast.get_docstring(node) or "")
         return
     yield from _text(ast.get_docstring(node) or "")
-    members = [member for member in node.body if isinstance(member, ast.FunctionDef) and _is_shown(member)]
+    if elsewhere := {told[base.name] for base in one.bases if base.name in told}:
+        yield from _wrapped(f"It has what [{min(elsewhere)}](#{min(elsewhere).lower()}) has.")
+        yield ""
+    classes = (node, *(base for base in one.bases if base.name not in told))
+    called = [part for part in reversed(classes) if part is node or not _is_hooks(part)]
+    told.update({base.name: one.name for base in one.bases if not _is_hooks(base)})
+    named = {member.name: member for part in called for member in part.body if isinstance(member, ast.FunctionDef)}
+    members = [member for member in named.values() if _is_shown(member)]
     if any(ast.unparse(base) == "Enum" for base in node.bases):
         yield from _wrapped(f"Values: {', '.join(_enum_members(node))}.")
         yield ""
-    fields = [_field(node, number) for number in range(len(node.body))]
-    found = [field for field in fields if field]
+    rows = {name: row for part in reversed(classes) for name, row in _fields(part)}
+    found = list(rows.values())
     yield from found
     for member in members:
         yield from _member(member)
     if members or found:
         yield ""
+
+
+def _is_hooks(node: ast.ClassDef) -> bool:
+    """Tell whether a class is a base of hooks: managers call its methods, and a robot sets its attributes."""
+    return any(ast.unparse(base) == "SkillHooks" for base in node.bases)
 
 
 def _enum_members(node: ast.ClassDef) -> list[str]:
@@ -131,15 +171,13 @@ def _is_shown(member: ast.FunctionDef) -> bool:
     return not member.name.startswith("_") and ast.get_docstring(member) is not None
 
 
-def _field(node: ast.ClassDef, number: int) -> str:
-    """Return the row of a class's attribute that has a docstring of its own, "" for anything else."""
-    here = node.body[number]
-    below = node.body[number + 1] if number + 1 < len(node.body) else None
-    if not isinstance(here, ast.AnnAssign) or not isinstance(here.target, ast.Name) or here.target.id.startswith("_"):
-        return ""
-    if not isinstance(below, ast.Expr) or not isinstance(below.value, ast.Constant) or not isinstance(below.value.value, str):
-        return ""
-    return _row(f"`{here.target.id}`", below.value.value)
+def _fields(node: ast.ClassDef) -> Iterator[tuple[str, str]]:
+    """Yield each attribute of a class that has a docstring of its own, with its row."""
+    for here, below in itertools.pairwise(node.body):
+        if not isinstance(here, ast.AnnAssign) or not isinstance(here.target, ast.Name) or here.target.id.startswith("_"):
+            continue
+        if isinstance(below, ast.Expr) and isinstance(below.value, ast.Constant) and isinstance(below.value.value, str):
+            yield here.target.id, _row(f"`{here.target.id}`", below.value.value)
 
 
 def _member(member: ast.FunctionDef) -> Iterator[str]:
