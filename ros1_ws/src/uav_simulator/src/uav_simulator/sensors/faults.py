@@ -29,15 +29,15 @@ class SensorMode(Enum):
     WRONG_INFO = "wrong_info"  # infos of twice the resolution
     THINNED = "thinned"  # one point of 500
     SECTOR = "sector"  # no returns from the front half
-    BIASED = "biased"  # ranges 0.5 m too long; rates and forces off by a constant
+    BIASED = "biased"  # ranges 0.5 m too long; rates off by 0.09 rad/s and forces by 0.9 m/s2
     LATE = "late"  # arrives half a second after its stamp
     FUTURE = "future"  # stamps ten seconds ahead
-    DRIFTING = "drifting"  # the height that is measured runs away
+    DRIFTING = "drifting"  # the autopilot's height runs away by 0.015 m/s, up or down depending on the seed
     JAMMED = "jammed"  # a GPS that says that it has no fix
-    STOPPED = "stopped"  # a motor of six
-    STRONG = "strong"  # a wind of 8 m/s, gusts 1.5
-    TAKES = "takes"  # the pilot flips the switch to LOITER, and back to GUIDED in the end
-    LANDS = "lands"  # the pilot takes it, and lands it
+    STOPPED = "stopped"  # one motor of six carries nothing: the vehicle falls, and stays armed on the ground, "Potential Thrust Loss (1)"
+    STRONG = "strong"  # it rises to 8 m/s with gusts of 1.5 m/s within 3 s, and calms down in the end
+    TAKES = "takes"  # the pilot takes the vehicle by LOITER, and gives it back by GUIDED in the end
+    LANDS = "lands"  # the pilot takes it by LAND, and gives it back by GUIDED in the end
     STICK = "stick"  # the pilot turns the nose by the stick, at 0.5 rad/s
 
 
