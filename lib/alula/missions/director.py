@@ -108,8 +108,9 @@ def halted(root: Behaviour) -> list[str]:
 
 
 class Director:
-    """Waits for the robot, has the tree ticked, and knows the outcome. ``step`` is to be called at 10 Hz and after each event.
+    """Waits for the robot, has the tree ticked, and knows the outcome.
 
+    ``step`` is to be called after each event, and at 10 Hz once the mission has begun; less often will do before.
     ``serves``: there is no mission; to be told to end is how the run ends well.
     """
 

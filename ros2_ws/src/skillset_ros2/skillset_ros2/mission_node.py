@@ -43,13 +43,18 @@ from skillset_ros2.fleet_clock import FleetClock
 from skillset_ros2.mission_clock import NodeClock
 from skillset_ros2.simulated_time import SimulatedTime
 
-TURN_S = 0.1  # wall clock; how soon a signal is seen when nothing else happens
+WAITING_PERIOD_S = 0.5
+"""How often a mission that waits for the robot looks, besides after each event. With a simulated clock it is ``TICK_PERIOD_S``: each tick
+tells the simulators how far they may go. Once the mission has begun, its ticks are part of what it does."""
 LATCHED = QoSProfile(depth=1, reliability=ReliabilityPolicy.RELIABLE, durability=DurabilityPolicy.TRANSIENT_LOCAL)
 BEAT_S = 1.0  # wall clock; heartbeats of a fleet's mission are repeated so often while its clock stands still
 
 
 class MissionNode(Node):  # type: ignore[misc]  # rclpy is not typed
-    """`/mission`: ticks the tree at 10 Hz of the mission clock and after every event, and keeps the run's record."""
+    """`/mission`: ticks the tree at 10 Hz of the mission clock and after every event, and keeps the run's record.
+
+    Before the mission has begun, it looks at 2 Hz and after every event whether it may begin.
+    """
 
     def __init__(self, out: Path, plan: MissionPlan) -> None:
         # Its parameters are what it was started with; their services are entities that each turn of the executor gathers.
@@ -80,12 +85,18 @@ class MissionNode(Node):  # type: ignore[misc]  # rclpy is not typed
         self._tree = self.create_publisher(String, "mission/tree", LATCHED, event_callbacks=QUIET_PUBLISHER)
         self.create_service(Trigger, "mission/abort", self._on_abort)
         self.create_service(SetBool, "mission/pause", self._on_pause)
-        self._mission_clock.every(TICK_PERIOD_S, self.driver.wake)
+        self._ticks = self._mission_clock.every(self.period_s, self.driver.wake)
 
     @property
     def now_s(self) -> float:
         """Mission clock, seconds."""
         return self._clock_ns() / 1e9
+
+    @property
+    def period_s(self) -> float:
+        """How often the mission is to be ticked, and how soon (wall clock) a signal is seen, when nothing else happens."""
+        waits = self.driver.director.start_s is None and self.driver.end is None and not self._mission_clock.simulated
+        return WAITING_PERIOD_S if waits else TICK_PERIOD_S
 
     def _clock_ns(self) -> int:
         return self._mission_clock.now_ns()
@@ -95,12 +106,20 @@ class MissionNode(Node):  # type: ignore[misc]  # rclpy is not typed
         self._meet()
         if self.driver.due or self.driver.abort_asked:
             self.driver.tick()
+            self._keep_pace()
             self._beat()
             self.driver.show(self._publish_tree)
         elif self._fleet_clock is not None and time.monotonic() - self._beat_s > BEAT_S:
             self._fleet_clock.look()
             # A robot may have to wait long for another one; it would take a mission that says nothing for one that hangs.
             self._beat()
+
+    def _keep_pace(self) -> None:
+        """Set the timer of the ticks to their period, which changes once."""
+        period_ns = round(self.period_s * 1e9)
+        if self._ticks.timer_period_ns != period_ns:
+            self._ticks.timer_period_ns = period_ns
+            self._ticks.reset()
 
     def finish(self, end: End) -> None:
         """Write what is left to write."""
@@ -176,7 +195,7 @@ def tick_to_the_end(node: MissionNode, signals: list[signal.Signals]) -> End:
     executor.add_node(node)
 
     def turn() -> None:
-        executor.spin_once(timeout_sec=TURN_S)
+        executor.spin_once(timeout_sec=node.period_s)
         while signals:
             node.driver.ask_abort(f"told to end by {signals.pop(0).name}")
         if node.driver.end is None:
