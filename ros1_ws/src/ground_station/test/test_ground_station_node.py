@@ -32,6 +32,7 @@ SOURCES = Path(__file__).parents[2]
 WIDTH, HEIGHT = 320, 180
 TICK_NS, FRAME_NS = NS // 50, NS // 20
 SHOWN = 40
+HEARD = 5
 PLAYED = 10
 RESTS, HOLDS = 5, 100  # messages of a stick, at most 50 a second
 KEY = "a secret of this test"
@@ -348,3 +349,15 @@ def test_the_stick_s_topic_takes_the_vehicle_over_and_the_service_gives_it_back(
     assert give_back().accepted
     flown(0.0, lambda: autopilot.mode == 4)
     autopilot.close()
+
+
+def test_an_encoder_is_heard_of_while_simulated_time_stands_and_tells_nothing_new(stage, telepilot):
+    flight, *_ = stage
+    telepilot.begin()
+    flight.until(telepilot.sees, 10.0)
+    heard: list[VideoState] = []
+    subscriber = rospy.Subscriber("/video_stream/state", VideoState, heard.append)
+    until(lambda: len(heard) > HEARD, what="it is heard of by the monotonic clock")
+    assert len({one.header.stamp for one in heard}) == 1
+    assert all(one.streaming for one in heard)
+    subscriber.unregister()

@@ -38,7 +38,8 @@ class MissionLoop(Generic[Item]):
     """Calls ``on_datagram(which socket, data)``, ``on_item(item)`` and ``on_tick()``, one at a time, until ROS shuts down.
 
     ``now_ns`` is the mission clock: simulated where there is one, else the ROS clock at 50 Hz. After each tick ``~done`` tells its
-    time, so that a simulator can wait for this loop and what the reporters tell.
+    time, so that a simulator can wait for this loop and what the reporters tell. ``on_look()`` follows each turn of the loop, at least ten
+    times a second of the monotonic clock, also where the mission clock creeps or stands.
     """
 
     def __init__(
@@ -48,10 +49,12 @@ class MissionLoop(Generic[Item]):
         on_tick: Callable[[], None],
         on_datagram: OnDatagram | None = None,
         on_item: Callable[[Item], None] | None = None,
+        on_look: Callable[[], None] | None = None,
         reporters: Sequence[ResourceReporter] = (),
     ) -> None:
         self.sockets = [udp_socket(port) for port in ports]
         self._on_tick, self._on_datagram, self._on_item = on_tick, on_datagram, on_item
+        self._on_look = on_look
         self._items: deque[Item] = deque()
         self._now_ns = self._ticked_ns = 0
         self._wake = os.eventfd(0, os.EFD_NONBLOCK)
@@ -93,6 +96,8 @@ class MissionLoop(Generic[Item]):
                     self._receive(number, each)
             self._handle_items()
             self._tick()
+            if self._on_look is not None:
+                self._on_look()
 
     def _receive(self, number: int, source: socket.socket) -> None:
         while True:

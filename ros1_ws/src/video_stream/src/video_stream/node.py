@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+import time
 from dataclasses import asdict, dataclass, replace
 from pathlib import Path
 from typing import TYPE_CHECKING
@@ -62,6 +63,8 @@ class VideoStreamNode:
         self._watch: Watch | None = Watch(Criteria(), 0) if settings.enabled else None
         self._link = ""
         self._state_due_ns = 0
+        self._told: VideoState | None = None
+        self._told_s = 0.0  # monotonic clock
         self._log = _SentLog(Path(settings.video_path)) if settings.video_path else None
         self._reporter = ResourceReporter("video")
         self._state = rospy.Publisher("~state", VideoState, queue_size=5)
@@ -73,6 +76,7 @@ class VideoStreamNode:
             on_tick=self._on_tick,
             on_datagram=self._on_report,
             on_item=self._on_item,
+            on_look=self._on_look,
             reporters=[self._reporter],
         )
         self._service = ToldService("~stream", Stream, self._on_stream)
@@ -160,6 +164,18 @@ class VideoStreamNode:
             self._state_due_ns = now_ns + STATE_PERIOD_NS
             self._publish_state(now_ns, up=up)
 
+    def _on_look(self) -> None:
+        """Tell the last state again where simulated time creeps or stands: that the encoder is alive, as a reporter's heartbeat does.
+
+        What is new in a state, and when by the mission clock, is not changed by how slow the machine is.
+        """
+        if self._told is not None and time.monotonic() - self._told_s >= STATE_PERIOD_NS / NS:
+            self._tell(self._told)
+
+    def _tell(self, message: VideoState) -> None:
+        self._told, self._told_s = message, time.monotonic()
+        self._state.publish(message)
+
     def _tell_link(self, state: str) -> None:
         if state and state != self._link:
             self._link = state
@@ -179,7 +195,7 @@ class VideoStreamNode:
         message.fps_margin, message.quality_margin = margins.fps, margins.quality
         message.bit_rate_bps, message.exhausted, message.adaptations = sender.target_bps, sender.exhausted, sender.adaptations
         message.level = describe_level(sender.level)
-        self._state.publish(message)
+        self._tell(message)
 
 
 def describe_level(level: Level | None) -> str:
