@@ -7,13 +7,13 @@ import os
 import signal
 import time
 from collections.abc import Callable, Iterator, Mapping
-from contextlib import AbstractContextManager, contextmanager
+from contextlib import AbstractContextManager, contextmanager, nullcontext
 from dataclasses import dataclass, replace
 from pathlib import Path
 
 from alula_testing.waits import until
 from link_rig.computers import LOOK_S, Mission, RigError, TwoComputers, two_computers
-from link_rig.robots import INSPECTION, MAPPING, PATROL, Robot
+from link_rig.robots import INSPECTION, MAPPING, PATROL, SLOW_PATROL, Robot
 from link_rig.verdicts import End, Fault, Verdict, driving_since, judge
 
 DRIVES_S = 2.0
@@ -54,6 +54,10 @@ class Case:
     world_ends: bool = False
     sets_clock: bool = False
     look: Callable[[TwoComputers], tuple[str, ...]] | None = None
+
+
+def _nothing(_rig: TwoComputers, _mission: Mission) -> AbstractContextManager[None]:
+    return nullcontext()
 
 
 def _cut(rig: TwoComputers, _mission: Mission) -> AbstractContextManager[None]:
@@ -164,6 +168,7 @@ def _cuts_of_a_flight(robot: Robot) -> dict[str, Case]:
 
 
 CASES: Mapping[str, Case] = {
+    "slow": Case("nothing, with a base that takes five seconds for one", _nothing, 0.0, (), robot=SLOW_PATROL, stops=False),
     "cut-0.2": Case("link cut for 0.2 s", _cut, 0.2, LINK),
     "cut-5": Case("link cut for 5 s", _cut, 5.0, LINK),
     "cut-30": Case("link cut for 30 s", _cut, 30.0, LINK),

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from pathlib import Path
 from typing import Any
 
@@ -75,5 +75,6 @@ PATROL = Robot(
     {name: f"rover_robot.hooks.{name}:make_hooks" for name in ("base", "perception", "power", "cargo")},
     "rover_bridge.yaml",
 )
+SLOW_PATROL = replace(PATROL, arguments={"rate": "0.2"})
 MAPPING = _drone("mapping", "yard", ("navigation", "perception", "mapping"), 14.0)
 INSPECTION = _drone("inspection", "building", ("navigation", "perception", "video"), 14.0)
