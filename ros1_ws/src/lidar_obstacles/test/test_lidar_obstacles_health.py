@@ -168,14 +168,16 @@ def test_noise_stays_a_fault_until_it_ends_or_the_vehicle_has_gone_away() -> Non
     assert verdicts(0.3) == [Verdict.OK] * 6 + [Verdict.BROKEN] * 17 + [Verdict.OK] * 17
 
 
-def judge_drive(change, *, metres_a_sweep=0.1, until=30, begin=10, count=30) -> list[tuple[Finding, Finding]]:
+def judge_drive(change, *, metres_a_sweep=0.1, until=30, begin=10, count=30, at_rest=range(0)) -> list[tuple[Finding, Finding]]:
     """Return what is found of the sweeps of a drive through the hall, and whether they are changed; ``change`` breaks some of them."""
     judge, found, before = CloudJudge(LidarSettings().cloud), [], room(begin - 1, x=metres_a_sweep * (begin - 1))
+    x_m = 0.0
     for k in range(count):
-        points = room(k, x=metres_a_sweep * k)
+        points = room(k, x=x_m)
         points = change(points, before, k) if begin <= k < until else points[: len(points) - 7 * k]
         sweep = Sweep(NS + k * NS // 10, points.astype(np.float32), np.zeros(len(points), np.float32))
-        found.append((judge.finding(sweep, self_m=1.0, position_m=np.array([metres_a_sweep * k, 0.0, 2.0])), judge.changed))
+        found.append((judge.finding(sweep, self_m=1.0, position_m=np.array([x_m, 0.0, 2.0])), judge.changed))
+        x_m += 0.0 if k in at_rest else metres_a_sweep
     return found
 
 
@@ -195,10 +197,36 @@ def test_what_is_seen_elsewhere_at_once_is_told_at_the_first_sweep_and_until_it_
     assert "of the view changed by more than 0.6 m from one sweep to the next: its mount" in found[10][1].reason
 
 
-def test_what_has_changed_at_once_is_forgotten_5_m_away() -> None:
-    found = judge_drive(SUDDEN["turned"], metres_a_sweep=0.2, until=99, count=50)
-    changed = [not other.ok for _, other in found]
-    assert changed == [False] * 10 + [True] * 24 + [False] * 16
+def test_what_has_changed_at_once_is_not_forgotten_by_time_or_way() -> None:
+    found = judge_drive(SUDDEN["turned"], metres_a_sweep=0.05, until=999, count=250)
+    changed = [not (finding.ok and other.ok) for finding, other in found]
+    assert changed == [False] * 10 + [True] * 240  # 24 s, and 12 m
+
+
+AROUND = np.linspace(0.0, 2.0 * np.pi, 400)
+GROUND_BELOW = np.stack([1.2 * np.cos(AROUND), 1.2 * np.sin(AROUND), np.full(400, -0.3)], axis=1)  # as of a vehicle that has landed
+
+
+@pytest.mark.parametrize("below", [np.empty((0, 3)), GROUND_BELOW], ids=["in the air", "landed"])
+def test_what_has_changed_at_once_is_unknown_once_the_vehicle_was_at_rest_for_10_s(below) -> None:
+    def change(points, before, k) -> np.ndarray:
+        return np.concatenate([SUDDEN["turned"](points, before, k), below[: 400 * (k > 14)]])
+
+    found = judge_drive(change, until=999, count=140, at_rest=range(14, 130))
+    assert all(finding.ok and other.ok for finding, other in found[:10])
+    assert {other.verdict for _, other in found[10:110]} == {Verdict.BROKEN}
+    assert {other.verdict for _, other in found[118:131]} == {Verdict.UNKNOWN}
+    assert "from one sweep to the next, and nothing moves since by which it could be judged: its mount" in found[125][1].reason
+    assert {other.verdict for _, other in found[135:]} == {Verdict.BROKEN}  # it moves
+
+
+def test_what_has_changed_at_once_stays_so_while_returns_are_missed() -> None:
+    def change(points, before, k) -> np.ndarray:
+        return SUDDEN["turned"](points, before, k)[:: 20 if k == 15 else 1]
+
+    found = judge_drive(change, until=999)
+    assert not found[15][0].ok
+    assert {other.verdict for _, other in found[10:]} == {Verdict.BROKEN}
 
 
 REPEATING = {

@@ -198,6 +198,58 @@ def test_a_mount_that_was_judged_once_stays_so_in_the_open() -> None:
         assert check.finding(sweep, UP, poses, self_m=1.0).ok, k
 
 
+CHANGES = {
+    "not at all": lambda points: points,
+    "1 m ahead": lambda points: points + np.array([1.0, 0.0, 0.0]),
+    "0.5 m to the left": lambda points: points + np.array([0.0, 0.5, 0.0]),
+    "turned by 15 degrees": lambda points: points @ Rotation.from_euler("z", 15, degrees=True).as_matrix(),
+    "mirrored": lambda points: points * [1.0, -1.0, 1.0],
+    "0.9 times": lambda points: 0.9 * points,
+}
+
+
+@pytest.mark.parametrize("name", CHANGES)
+def test_after_a_sudden_change_only_a_sensor_as_before_is_back(name) -> None:
+    """From 1.5 m along the way on all is changed; 4.4 m on it is as it was, but the last metres do not look like the first ones."""
+    check, poses, rng, backs = MountCheck(), PoseBuffer(keep_s=1e6), np.random.default_rng(1), []
+    for k in range(60):
+        stamp_ns, origin = NS + k * NS // 10, np.array([0.13 * k, 0.07 * k, 1.5])
+        poses.add(stamp_ns, tuple(origin), (0.0, 0.0, 0.0, 1.0))
+        ranges = np.min(np.where(RAYS > 0, HIGH - origin, LOW - origin) / np.where(RAYS == 0, 1e-9, RAYS), axis=1)
+        points = (RAYS * (ranges + rng.normal(0.0, 0.02, len(RAYS)))[:, None])[ranges < 60.0]
+        points = CHANGES[name](points) if 10 <= k < 40 else points
+        sweep = Sweep(stamp_ns, points.astype(np.float32), np.zeros(len(points), np.float32))
+        check.hold(changed=k >= 10)
+        check.finding(sweep, UP, poses, self_m=1.0)
+        backs.append(check.back)
+    assert not any(backs[:10])
+    assert any(backs[10:40]) is (name == "not at all")
+    assert backs[-1]
+    check.hold(changed=False)
+    assert not check.back
+
+
+@pytest.mark.parametrize(
+    ("good", "after", "apart_at_last"),
+    [((LOW, HIGH), (LOW, HIGH), False), ((LOW, HIGH), OPEN, True), (OPEN, OPEN, True)],
+    ids=["within its walls", "out in the open", "always in the open"],
+)
+def test_after_a_sudden_change_and_20_m_with_too_little_seen_before_it_none_can_tell(good, after, apart_at_last) -> None:
+    """The vehicle goes round in the yard, 0.12 m from sweep to sweep; after the change its walls are there, or none."""
+    check, poses, rng, apart = MountCheck(), PoseBuffer(keep_s=1e6), np.random.default_rng(1), []
+    for k in range(190):
+        stamp_ns, origin = NS + k * NS // 10, np.array([2.0 * np.cos(0.06 * k), 2.0 * np.sin(0.06 * k), 1.5])
+        poses.add(stamp_ns, tuple(origin), (0.0, 0.0, 0.0, 1.0))
+        low, high = after if k >= 10 else good
+        ranges = np.min(np.where(RAYS > 0, high - origin, low - origin) / np.where(RAYS == 0, 1e-9, RAYS), axis=1)
+        points = (RAYS * (ranges + rng.normal(0.0, 0.02, len(RAYS)))[:, None])[ranges < 60.0]
+        check.hold(changed=k >= 10)
+        check.finding(Sweep(stamp_ns, points.astype(np.float32), np.zeros(len(points), np.float32)), UP, poses, self_m=1.0)
+        apart.append(check.apart)
+    assert not any(apart[:170])  # 19.2 m, and up to 0.6 m from the look before
+    assert apart[-1] is apart_at_last
+
+
 def real(turned=None, *, repeated=False) -> list[Finding]:
     """Return what is said of three real sweeps of 124,000 points, 0.8 m apart; ``repeated``: the first one again, with 5 mm of noise."""
     ways = np.loadtxt(DATA / "T_first_scan.txt").reshape(-1, 3, 4)

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections import deque
 from dataclasses import dataclass
+from functools import cached_property
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -91,8 +92,6 @@ class CloudJudge:
 
         Those that had lost them where the vehicle was before stay in it.
         """
-        self.changed: Finding = FINE
-        """Whether a good sweep sees its surroundings elsewhere than the one before: of less weight than what is found of the mount."""
 
     def finding(
         self, sweep: Sweep, *, self_m: float, position_m: Floats | None = None, turned_rad: float = 0.0, tilted_rad: float = 0.0
@@ -102,66 +101,105 @@ class CloudJudge:
         ``turned_rad``: by how much the sensor has turned about its z axis since the sweep before. What it saw has then moved to other
         sectors: a vehicle that leans in a gust loses nothing. ``tilted_rad``: by how much its z axis has turned.
         """
-        self.changed = FINE
         self._turned_rad += turned_rad
+        if self._left_behind(position_m):
+            self._forget()
+        taken = self._taken(sweep, self_m, position_m)
+        checks = (self._unusable, self._repeated, self._scattered, self._stepped, self._missing)
+        finding = next((found for check in checks if (found := check(taken)) is not None), None)
+        if finding is None:
+            self._changes.take(taken.cells_m, sweep.stamp_ns, position_m=position_m, tilted_rad=tilted_rad, clear=taken.clear)
+            finding = self._in_the_air(taken)
+        return finding or FINE
+
+    @property
+    def changed(self) -> Finding:
+        """Whether good sweeps see their surroundings elsewhere at once: of less weight than what is found of the mount."""
+        return self._changes.finding
+
+    def after_change(self, *, back: bool, apart: bool) -> None:
+        """Tell what walls and posts say after a sudden change: they are back where they were, or too few of them are in view."""
+        if back:
+            self._changes.forget()
+        self._changes.part(apart=apart)
+
+    def _taken(self, sweep: Sweep, self_m: float, position_m: Floats | None) -> _Taken:
+        """Return what is looked at of a sweep, and of those before it."""
         stride = max(1, len(sweep.points) // SAMPLE) | 1  # odd: every second ring, or every 16th, is no sample of a sweep
         sample = np.ascontiguousarray(sweep.points[::stride].T)
         previous, self._previous = self._previous, sample
-        ranges = np.sqrt(np.einsum("ij,ij->j", sample, sample))
-        returned = ranges > self_m
-        seen = Seen.of(sample, ranges)
-        outside = seen.select(seen.ranges_m > self_m)
-        sectors = _sectors(seen, stride, self_m, self._turned_rad)
-        moved_m = self._moved_m(sweep.stamp_ns, position_m)
-        if self._left_behind(position_m):
-            self._forget()
-        before = self._lately()
-        count = len(outside.ranges_m) * stride
+        ranges_m = np.sqrt(np.einsum("ij,ij->j", sample, sample))
+        seen = Seen.of(sample, ranges_m)
+        self._looks += 1
+        return _Taken(
+            sweep=sweep,
+            number=self._looks,
+            stride=stride,
+            sample=sample,
+            previous=previous,
+            returned=ranges_m > self_m,
+            outside=seen.select(seen.ranges_m > self_m),
+            sectors=_sectors(seen, stride, self_m, self._turned_rad),
+            before=self._lately(),
+            self_m=self_m,
+            turned_rad=self._turned_rad,
+            position_m=position_m,
+            moved_m=self._moved_m(sweep.stamp_ns, position_m),
+        )
+
+    def _unusable(self, taken: _Taken) -> Finding | None:
+        """Return what is wrong with a sweep that is no sweep, or is in another unit."""
+        count = len(taken.outside.ranges_m) * taken.stride
         if count < self._limits.min_returns:
-            return self._too_few(count, before, self_m)
-        far = self._far(outside.ranges_m)
-        if far is not None:
-            return far
-        if _frozen(sample, previous, returned):
+            return self._too_few(count, taken.before, taken.self_m)
+        return self._far(taken.outside.ranges_m)
+
+    def _repeated(self, taken: _Taken) -> Finding | None:
+        """Return that the sweep was there before."""
+        if _frozen(taken.sample, taken.previous, taken.returned):
             return broken(FaultKind.FROZEN, "the sweep is the same as the one before", "the driver repeats it", "the sensor hangs")
-        if self._repeats.again(sweep):
+        if self._repeats.again(taken.sweep):
             told = f"the sweep has the points of one of the last {REPEATED_OF}"
             return broken(FaultKind.FROZEN, told, "the driver repeats it", "an old buffer is sent anew")
-        self._looks += 1
-        neighbours = Neighbours.of(sweep, self._looks, self_m=self_m)
-        noise_m = self._noise.risen_m(neighbours)
-        if noise_m:
-            self._lost_at_m = position_m if self._lost_at_m is None else self._lost_at_m
-            told = f"the ranges scatter by {noise_m:.2f} m where they are smoothest"
-            return broken(FaultKind.RANGE, told, "the sensor is failing", "dust or fog is around it")
-        least_m = NEAR * self_m
-        off_m = self._steps.offset_m(outside, sweep.stamp_ns, least_m=least_m, position_m=position_m)
-        if off_m:
-            became = f"{abs(off_m):.1f} m {'longer' if off_m > 0 else 'shorter'}"
-            told = f"all ranges became at least {became} from one sweep to the next"
-            return broken(FaultKind.RANGE, told, "the driver has changed their unit or offset", "the vehicle's position has jumped")
-        lost = self._gates.lost(outside.ranges_m, stride, least_m=least_m, moved_m=moved_m)
-        finding = self._against_the_past(sectors, before, stride, sweep.stamp_ns)
-        if lost and finding.ok:
-            finding = broken(
-                FaultKind.RANGE, f"no returns any more {lost}", "the driver cuts these ranges off", "fog, dirt or light takes them"
-            )
-        if finding.ok:
+        return None
+
+    def _scattered(self, taken: _Taken) -> Finding | None:
+        """Return that the ranges scatter as they did not before."""
+        noise_m = self._noise.risen_m(taken.neighbours)
+        if not noise_m:
+            return None
+        self._lost_at_m = taken.position_m if self._lost_at_m is None else self._lost_at_m
+        told = f"the ranges scatter by {noise_m:.2f} m where they are smoothest"
+        return broken(FaultKind.RANGE, told, "the sensor is failing", "dust or fog is around it")
+
+    def _stepped(self, taken: _Taken) -> Finding | None:
+        """Return that all ranges became longer, or shorter."""
+        off_m = self._steps.offset_m(taken.cells_m, taken.sweep.stamp_ns, clear=taken.clear, position_m=taken.position_m)
+        if not off_m:
+            return None
+        told = f"all ranges became at least {abs(off_m):.1f} m {'longer' if off_m > 0 else 'shorter'} from one sweep to the next"
+        return broken(FaultKind.RANGE, told, "the driver has changed their unit or offset", "the vehicle's position has jumped")
+
+    def _missing(self, taken: _Taken) -> Finding | None:
+        """Return which returns are missed: most of them, those of some directions, or of some ranges."""
+        lost = self._gates.lost(taken.outside.ranges_m, taken.stride, least_m=NEAR * taken.self_m, moved_m=taken.moved_m)
+        finding = self._against_the_past(taken.sectors, taken.before, taken.stride, taken.sweep.stamp_ns)
+        if finding is None and lost:
+            causes = "the driver cuts these ranges off", "fog, dirt or light takes them"
+            finding = broken(FaultKind.RANGE, f"no returns any more {lost}", *causes)
+        if finding is None:
             self._lost_at_m = None
         elif self._lost_at_m is None:
-            self._lost_at_m = position_m
-        if finding.ok:
-            # On the ground, and just above it, small motions change all that is seen.
-            above = np.percentile(outside.ranges_m, FEW) > least_m
-            self.changed = self._changes.finding(
-                outside, sweep.stamp_ns, position_m=position_m if above else None, turned_rad=self._turned_rad, tilted_rad=tilted_rad
-            )
-        specks = self._specks.share(neighbours)
-        if finding.ok and specks:
-            return unsure(
-                FaultKind.RANGE, f"{specks:.1%} of the returns stand alone in the air", "rain, dust or snow", "the light of another LiDAR"
-            )
+            self._lost_at_m = taken.position_m
         return finding
+
+    def _in_the_air(self, taken: _Taken) -> Finding | None:
+        """Return that many returns stand alone."""
+        share = self._specks.share(taken.neighbours)
+        if not share:
+            return None
+        told = f"{share:.1%} of the returns stand alone in the air"
+        return unsure(FaultKind.RANGE, told, "rain, dust or snow", "the light of another LiDAR")
 
     def _moved_m(self, stamp_ns: int, position_m: Floats | None) -> float:
         """Return how far the vehicle may have come since the sweep before: by its position (3,), else by its greatest speed."""
@@ -225,7 +263,7 @@ class CloudJudge:
         told = f"{share:.0%} of the returns are beyond {self._limits.max_range_m:g} m, half of all beyond {size} m"
         return broken(FaultKind.RANGE, told, *causes)
 
-    def _against_the_past(self, sectors: _Sectors, before: Floats, stride: int, stamp_ns: int) -> Finding:
+    def _against_the_past(self, sectors: _Sectors, before: Floats, stride: int, stamp_ns: int) -> Finding | None:
         counts, expected = sectors.counts, self._expected(before)
         gone = (before >= SECTOR_RETURNS * stride) & (counts < self._limits.sector_share * before)
         missed = gone & (expected >= SECTOR_RETURNS * stride) & (counts < self._limits.sector_share * expected)
@@ -244,7 +282,7 @@ class CloudJudge:
         self._blind = (self._blind | self._of_sensor(holes)) & (sectors.of_sensor < BLIND_RETURNS * stride)
         lately = np.abs(stamp_ns - self._gone_ns) < GONE_S * NS  # a clock may have gone back
         self.gone = self._of_sensor(lately) | self._blind
-        return FINE
+        return None
 
 
 @dataclass(frozen=True)
@@ -257,6 +295,51 @@ class _Sectors:
     counts: Floats
     near: NDArray[np.bool_]
     of_sensor: Floats
+
+
+@dataclass(frozen=True)
+class _Taken:
+    """A sweep, its ``number``, and what is looked at of it.
+
+    Attributes:
+        stride: of the points that are looked at.
+        sample: these, (3, N); ``previous`` are those of the sweep before, ``returned`` (N,) are no part of the vehicle.
+        outside: those of them.
+        before: returns that each sector lately had at least, (SECTORS,).
+        self_m: radius of the vehicle.
+        turned_rad: by how much the sensor has turned since it was started.
+        position_m: of the vehicle, (3,), None while unknown.
+        moved_m: how far it may have come since the sweep before.
+    """
+
+    sweep: Sweep
+    number: int
+    stride: int
+    sample: NDArray[np.float32]
+    previous: NDArray[np.float32]
+    returned: NDArray[np.bool_]
+    outside: Seen
+    sectors: _Sectors
+    before: Floats
+    self_m: float
+    turned_rad: float
+    position_m: Floats | None
+    moved_m: float
+
+    @cached_property
+    def neighbours(self) -> Neighbours:
+        """Some returns with those beside them."""
+        return Neighbours.of(self.sweep, self.number, self_m=self.self_m)
+
+    @cached_property
+    def cells_m(self) -> Floats:
+        """The mean range in each direction, as of `Seen.mean_ranges`."""
+        return self.outside.mean_ranges(self.turned_rad)
+
+    @cached_property
+    def clear(self) -> bool:
+        """Whether few returns are near: on the ground, and just above it, small motions change all that is seen."""
+        return bool(np.percentile(self.outside.ranges_m, FEW) > NEAR * self.self_m)
 
 
 def _sectors(seen: Seen, stride: int, self_m: float, turned_rad: float) -> _Sectors:
@@ -305,17 +388,31 @@ class Repeats:
     """Know a sweep again by the sums of its points, in whatever order these come; not thread-safe."""
 
     def __init__(self) -> None:
-        self._lately: deque[NDArray[np.float32]] = deque(maxlen=REPEATED_OF)
+        self._lately: deque[_Sums] = deque(maxlen=REPEATED_OF)
 
     def again(self, sweep: Sweep) -> bool:
         """Return whether one of the last sweeps had the same points."""
-        alike = [points for points in self._lately if len(points) == len(sweep.points)]
-        self._lately.append(sweep.points)
-        if not alike:
-            return False
-        sums = np.nansum(sweep.points, axis=0, dtype=np.float64)
-        known = bool(np.isfinite(sums).all())
-        return known and any(np.allclose(sums, np.nansum(points, axis=0, dtype=np.float64), rtol=SAME, atol=SAME) for points in alike)
+        now = _Sums(sweep.points)
+        alike = [each for each in self._lately if len(each.points) == len(now.points)]
+        self._lately.append(now)
+        return any(now.same(each) for each in alike)
+
+
+@dataclass(frozen=True)
+class _Sums:
+    """Points (N, 3), and their sums, formed when asked for."""
+
+    points: NDArray[np.float32]
+
+    @cached_property
+    def sums(self) -> Floats:
+        """The sum of each coordinate, (3,)."""
+        sums: Floats = np.nansum(self.points, axis=0, dtype=np.float64)
+        return sums
+
+    def same(self, other: _Sums) -> bool:
+        """Return whether the sums are the same; those that are not finite are not."""
+        return bool(np.isfinite(self.sums).all() and np.allclose(self.sums, other.sums, rtol=SAME, atol=SAME))
 
 
 def _angles(lost: NDArray[np.bool_]) -> str:

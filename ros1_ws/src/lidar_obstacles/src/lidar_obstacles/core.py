@@ -117,7 +117,9 @@ class LidarObstacles:
         turned_rad, tilted_rad = self._turned_rad(pose, frame)
         position_m = None if pose is None else pose[:3, 3]
         content = self._judge.finding(sweep, self_m=self_m, position_m=position_m, turned_rad=turned_rad, tilted_rad=tilted_rad)
+        self._mounting.hold(changed=not self._judge.changed.ok)
         mounted = self._mounted(sweep, frame, self_m) if stamp.ok and content.ok else FINE
+        self._judge.after_change(back=self._mounting.back, apart=self._mounting.apart)
         return Judged(sweep, first_trouble(stamp, content, mounted, self._judge.changed), self._judge.gone)
 
     def ahead(self, judged: Judged, frame: str) -> Ahead:

@@ -46,6 +46,9 @@ ALIKE = 0.01  # by which two shares may differ that tell nothing apart: on a way
 SAME_M, REPEATED = 0.1, 0.9  # apart at most, and share, of what a sensor that repeats what it saw has where it was: all, but for noise
 LEAST_REPEATED = 16  # walls and posts: of eight all stay by chance, where the ground and a fence are cut out alike on the way
 LOOKS = 2  # in a row that say the same
+ACROSS = 0.7  # of a wall's normal along one of two axes: walls along the way do not show whether the sensor is displaced along it
+PAIRS_ACROSS, BACK = 4, 0.7  # pairs for each of these axes, and share of them that are where they were
+APART_M = 20.0  # of way since a sudden change on which there was too little to hold against what was seen before it
 ABOVE_M, BELOW_M = 0.5, 0.05  # the sensor: level planes that count
 LEVEL_PLANES, RARELY, FADING = 6.0, 0.2, 0.9  # of planes above, that many and the others rarer; by look
 
@@ -108,6 +111,9 @@ class MountCheck:
         self._times = 0
         self._as_told = False  # whether walls have stayed where they were, with the mount as it is told
         self._unjudged_ns = 0  # of motion
+        self._good: _Look | None = None  # the last look before a sudden change, as long as that lasts
+        self._held, self._alike = False, 0  # whether there is a change; looks in a row that were as the good one
+        self._apart_m = 0.0  # of way since the last one that could be held against it
         self._above, self._below = 0.0, 0.0
 
     def finding(self, sweep: Sweep, T_base_lidar: Floats, poses: PoseBuffer, *, self_m: float) -> Finding:  # noqa: N803 -- T_target_source
@@ -130,6 +136,22 @@ class MountCheck:
             return unsure(FaultKind.CALIBRATION, told, f"too few walls and posts within {FARTHEST_M:g} m", "ranges or poses that scatter")
         return FINE
 
+    def hold(self, *, changed: bool) -> None:
+        """Tell, before each sweep is looked at, whether the surroundings have suddenly changed: what was seen before is then remembered."""
+        if changed and not self._held:
+            self._good, self._alike, self._apart_m = (None if self._before is None else self._before[1]), 0, 0.0
+        self._held = changed
+
+    @property
+    def back(self) -> bool:
+        """Whether, after a sudden change, walls and posts are where they were before it."""
+        return self._held and self._alike >= LOOKS
+
+    @property
+    def apart(self) -> bool:
+        """Whether, after a sudden change, the vehicle has gone far with too little in view that it saw before: none can tell any more."""
+        return self._held and self._apart_m >= APART_M
+
     @property
     def _overturned(self) -> bool:
         return self._above >= LEVEL_PLANES and self._below <= RARELY * self._above
@@ -143,7 +165,7 @@ class MountCheck:
         if since_s < SOON_S:
             return False
         moved_m, turned_rad = self._motion(pose)
-        soon = self._looks < FIRST_LOOKS or bool(self._suspected) or not self._upright
+        soon = self._looks < FIRST_LOOKS or bool(self._suspected) or self._held or not self._upright
         told = moved_m >= MOVED_M or not self._upright
         return bool(turned_rad >= TURNED_RAD or (told and (soon or since_s >= LATER_S)))
 
@@ -165,8 +187,16 @@ class MountCheck:
         old = self._before is None or not 0 <= sweep.stamp_ns - self._before[1].stamp_ns <= OLDEST_S * NS
         if old or moved_m >= MOVED_M or turned_rad >= TURNED_RAD:
             before, self._before = self._before, (pose, look.upright())
+            if self._held and before is not None:
+                self._hold_against(self._before[1], moved_m)
             if before is not None and not old:
                 self._compare(before[1], self._before[1])
+
+    def _hold_against(self, now: _Look, moved_m: float) -> None:
+        """Count the looks that are as the one before the sudden change, and the way on which they could not be held against it."""
+        back = None if self._good is None else _back(self._good, now)
+        self._alike = self._alike + 1 if back else 0
+        self._apart_m = self._apart_m + moved_m if back is None else 0.0
 
     def _compare(self, before: _Look, now: _Look) -> None:
         """Count the looks that say that the sensor is turned in the same way. A fault that was found stays until motion shows otherwise."""
@@ -198,22 +228,39 @@ class MountCheck:
         return broken(FaultKind.CALIBRATION, told, "/tf_static does not tell how it is mounted", "its driver has other axes")
 
 
+@dataclass(frozen=True)
+class _Pairs:
+    """Walls and posts of two looks side by side: normals (N, 3) of the walls, and which walls (N,) and posts (M,) are where they were."""
+
+    normals: Floats
+    walls: NDArray[np.bool_]
+    posts: NDArray[np.bool_]
+
+    @classmethod
+    def of(cls, before: _Look, now: _Look, turn: Floats) -> _Pairs:
+        """Hold two looks against each other, both turned."""
+        places, normals = before.in_map(turn)
+        seen, facing = now.in_map(turn)
+        across: Floats = np.empty((0, 3))
+        walls: NDArray[np.bool_] = np.empty(0, np.bool_)
+        posts: NDArray[np.bool_] = np.empty(0, np.bool_)
+        if not (before.posts.all() or now.posts.all()):
+            of_wall, mine = ~before.posts, ~now.posts
+            distance, nearest = cKDTree(places[of_wall]).query(seen[mine])
+            beside, wall = distance < BESIDE_M, normals[of_wall][nearest]
+            off_m = np.abs(np.einsum("nj,nj->n", wall, seen[mine] - places[of_wall][nearest]))
+            alike = np.abs(np.einsum("nj,nj->n", wall, facing[mine])) > FITS_COSINE
+            across, walls = wall[beside], ((off_m < FITS_M) & alike)[beside]
+        if before.posts.any() and now.posts.any():
+            apart: Floats = cKDTree(places[before.posts, :2]).query(seen[now.posts, :2])[0]  # at any height
+            posts = apart[apart < BESIDE_M] < FITS_POST_M
+        return cls(across, walls, posts)
+
+
 def _fitting(before: _Look, now: _Look, turn: Floats) -> float | None:
     """Return which share of the walls and posts is where it was, both looks turned; None with too few of them side by side."""
-    places, normals = before.in_map(turn)
-    seen, facing = now.in_map(turn)
-    fits: list[NDArray[np.bool_]] = [np.empty(0, np.bool_)]
-    if not (before.posts.all() or now.posts.all()):
-        of_wall, mine = ~before.posts, ~now.posts
-        distance, nearest = cKDTree(places[of_wall]).query(seen[mine])
-        beside, wall = distance < BESIDE_M, normals[of_wall][nearest]
-        off_m = np.abs(np.einsum("nj,nj->n", wall, seen[mine] - places[of_wall][nearest]))
-        alike = np.abs(np.einsum("nj,nj->n", wall, facing[mine])) > FITS_COSINE
-        fits.append(((off_m < FITS_M) & alike)[beside])
-    if before.posts.any() and now.posts.any():
-        apart: Floats = cKDTree(places[before.posts, :2]).query(seen[now.posts, :2])[0]  # at any height
-        fits.append(apart[apart < BESIDE_M] < FITS_POST_M)
-    fitting = np.concatenate(fits)
+    pairs = _Pairs.of(before, now, turn)
+    fitting = np.concatenate([pairs.walls, pairs.posts])
     return float(np.mean(fitting)) if len(fitting) >= PAIRS else None
 
 
@@ -226,6 +273,20 @@ def _repeated(before: _Look, now: _Look) -> float:
         return 0.0
     share = float(np.mean(cKDTree(before.places).query(now.places)[0] < SAME_M))
     return share if share >= REPEATED else 0.0
+
+
+def _back(good: _Look, now: _Look) -> bool | None:
+    """Return whether what stands across each of two horizontal axes is where it was in a good look; posts stand across both.
+
+    None where too little of both looks is side by side to tell it for each axis, and nothing is elsewhere.
+    """
+    pairs = _Pairs.of(good, now, np.eye(3))
+    level = pairs.normals[:, :2]
+    across = [np.concatenate([pairs.walls[np.abs(level @ axis) > ACROSS], pairs.posts]) for axis in np.linalg.eigh(level.T @ level)[1].T]
+    told = [fitting for fitting in across if len(fitting) >= PAIRS_ACROSS]
+    if any(np.mean(fitting) < BACK for fitting in told):
+        return False
+    return True if len(told) == len(across) else None
 
 
 def _planes(sweep: Sweep, T_base_lidar: Floats, poses: PoseBuffer, least_m: float) -> _Look:  # noqa: N803 -- T_target_source

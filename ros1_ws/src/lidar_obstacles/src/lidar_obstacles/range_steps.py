@@ -52,6 +52,18 @@ class Seen:
         x, y, z = points
         return cls(np.arctan2(y, x), z / np.maximum(ranges_m, np.float32(1e-6)), ranges_m)
 
+    def mean_ranges(self, turned_rad: float = 0.0) -> Floats:
+        """Return the mean range in each cell of directions, (AROUND * UP,), NaN where returns are few.
+
+        The cells are those of a sensor that has not turned by ``turned_rad`` about its z axis.
+        """
+        around = (self.azimuth_rad + np.float32(np.pi + turned_rad % (2.0 * np.pi))) * np.float32(AROUND / (2.0 * np.pi))
+        up = (np.arcsin(np.clip(self.sine_up, -1.0, 1.0)) + np.float32(np.pi / 2.0)) * np.float32(UP / np.pi)
+        cell = around.astype(np.int32) % AROUND * UP + np.minimum(up.astype(np.int32), UP - 1)
+        counts = np.bincount(cell, minlength=AROUND * UP)
+        sums = np.bincount(cell, weights=self.ranges_m, minlength=AROUND * UP)
+        return np.where(counts >= CELL_RETURNS, sums / np.maximum(counts, 1), np.nan)
+
     def select(self, mask: NDArray[np.bool_]) -> Seen:
         """Return the points where the mask (N,) is true."""
         return self if mask.all() else Seen(self.azimuth_rad[mask], self.sine_up[mask], self.ranges_m[mask])
@@ -65,21 +77,14 @@ class RangeSteps:
         self._before: list[tuple[int, Floats, Floats | None]] = []
         self._offset_m = 0.0
 
-    def offset_m(
-        self,
-        seen: Seen,
-        stamp_ns: int,
-        *,
-        least_m: float,
-        position_m: Floats | None = None,
-    ) -> float:
+    def offset_m(self, cells_m: Floats, stamp_ns: int, *, clear: bool, position_m: Floats | None = None) -> float:
         """Return by how much the ranges are too long; 0 where no step was seen, or it was taken back.
 
-        Where the nearest surfaces are nearer than ``least_m``, as on the ground, the sensor may not see the very nearest, and small motions
-        change all ranges along the rays by much: nothing new is found there. By the vehicle's position (3,) where it is known, else by
-        its speed at most, ranges may change.
+        ``cells_m``: as of `Seen.mean_ranges`. Where the view is not ``clear``, as on the ground, the sensor may not see the very nearest,
+        and small motions change all ranges along the rays by much: nothing new is found there. By the vehicle's position (3,) where it
+        is known, else by its speed at most, ranges may change.
         """
-        now = mean_ranges(seen)
+        now = cells_m
         if np.count_nonzero(np.isfinite(now)) < CELLS:
             return self._offset_m
         at_once = (stamp_ns, now, position_m)
@@ -94,7 +99,7 @@ class RangeSteps:
             if position_m is not None and then_m is not None:
                 limit_m = min(limit_m, OBLIQUE * float(np.linalg.norm(position_m - then_m)) + STEP_M)
             step_m = _step(then, now, most_share=limit_m / LEAST_HEIGHT_M)
-            if abs(step_m) > limit_m and np.percentile(seen.ranges_m, FEW) > least_m:
+            if abs(step_m) > limit_m and clear:
                 offset_m = self._offset_m + step_m
                 self._offset_m, self._before = offset_m if abs(offset_m) > limit_m / 2.0 else 0.0, [at_once]
                 break
@@ -118,16 +123,3 @@ def _step(before_m: Floats, now_m: Floats, *, most_share: float) -> float:
     low, high = (float(value) for value in np.percentile(change_m / before_m, QUARTILES))
     alike = high_m - low_m <= max(abs(step_m), ALIKE_M)
     return step_m if alike or max(low, -high) > most_share else 0.0
-
-
-def mean_ranges(seen: Seen, turned_rad: float = 0.0) -> Floats:
-    """Return the mean range in each cell of directions, (AROUND * UP,), NaN where returns are few.
-
-    The cells are those of a sensor that has not turned by ``turned_rad`` about its z axis.
-    """
-    around = (seen.azimuth_rad + np.float32(turned_rad % (2.0 * np.pi))) * np.float32(AROUND / (2.0 * np.pi))
-    up = np.arcsin(np.clip(seen.sine_up, -1.0, 1.0)) * np.float32(UP / np.pi)
-    cell = np.floor(around).astype(np.intp) % AROUND * UP + np.clip(np.floor(up + UP / 2), 0, UP - 1).astype(np.intp)
-    counts = np.bincount(cell, minlength=AROUND * UP)
-    sums = np.bincount(cell, weights=seen.ranges_m, minlength=AROUND * UP)
-    return np.where(counts >= CELL_RETURNS, sums / np.maximum(counts, 1), np.nan)
