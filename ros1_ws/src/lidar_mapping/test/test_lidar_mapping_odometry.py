@@ -113,7 +113,7 @@ def test_points_too_near_to_one_another_tell_no_normal_and_thinned_ones_do() -> 
     frames = Keyframes(voxel_m=0.08, limit=10)
     for k in range(4):  # what the last keyframes saw lies upon one another
         frames.add(k, np.eye(4), wall[k::4])
-    assert len(frames.all[-1].patches.points) > 0.9 * len(thinned)
+    assert len(frames.all[-1].seen.patches.points) > 0.9 * len(thinned)
 
 
 def surface_of(points) -> Surface:
@@ -216,7 +216,7 @@ def test_keyframes_that_lie_behind_are_thinned_and_no_place_is_lost(monkeypatch)
         pose[0, 3] = 0.3 * k
         places.append(wall)
         bounded.add(k, pose, wall)
-    counts = [len(frame.points) for frame in bounded.all]
+    counts = [frame.seen.count for frame in bounded.all]
     assert sum(counts) < 0.4 * len(counts) * counts[-1]
     assert counts[-3:] == pytest.approx([counts[-1]] * 3, rel=0.1)
     kept = np.vstack([frame.points_in_map() for frame in bounded.all])

@@ -225,7 +225,9 @@ def test_a_jump_of_the_autopilots_heading_turns_odom_and_not_the_map(path) -> No
     assert slam.count.rejected == 0
 
 
-def test_a_loop_is_closed_and_the_correction_carried_on_to_the_map() -> None:
+@pytest.mark.parametrize("held", [1 << 40, 0], ids=["all in memory", "what lies behind in a file"])
+def test_a_loop_is_closed_and_the_correction_carried_on_to_the_map(held, monkeypatch) -> None:
+    monkeypatch.setattr("lidar_mapping.keyframes.MOST_HELD", held)
     slam = Slam(SlamSettings())
     path = Path(lap)
     assert fly(path, slam, 20.0) < 0.1

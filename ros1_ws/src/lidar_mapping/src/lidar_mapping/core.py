@@ -60,7 +60,7 @@ class LidarMapping:
         self._settings = settings
         self._host = host
         self._path = Path(settings.map_path)
-        self._slam = Slam(settings.slam)
+        self._slam = Slam(settings.slam, self._path.parent)
         self._readings = ReadingQueue()
         self._imu = ImuWatch()
         self._standing = StandingGyro()
@@ -69,6 +69,7 @@ class LidarMapping:
         self._lock = Lock()
         self._saving = Lock()
         self._height = "AGREED"
+        self._storage = ""
         self._received = 0
         self._saved_scans = 0
         self._resume()
@@ -195,8 +196,15 @@ class LidarMapping:
             self._publish_state(sweep.stamp_ns, registration)
             self._publish_pose(sweep.end_ns)
         self._report()
+        self._tell_what_lacks()
+
+    def _tell_what_lacks(self) -> None:
+        """Warn where the map is full, or where what lies behind can't be stored or read."""
         if self._slam.full:
             self._host.warn("full", f"the map is full ({len(self._slam.map)} voxels): new surfaces are left out", every_s=10.0)
+        if self._slam.keyframes.problem != self._storage:
+            self._storage = self._slam.keyframes.problem
+            self._host.warn("storage", self._storage)
 
     def _usable(self, readings: Sequence[ImuReading], end_ns: int) -> Sequence[ImuReading]:
         """Return the readings, or none of an IMU that has failed or stands still: the filter then says itself how much less it knows.

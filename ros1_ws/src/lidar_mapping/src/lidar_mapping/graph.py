@@ -164,7 +164,8 @@ class PoseGraph:
         rotation, position = frame.pose[:3, :3], frame.pose[:3, 3]
         place = InertialFilter(_loose(), frame.stamp_ns, InertialState(rotation, np.zeros(3), position))
         place.covariance[POSITION, POSITION] = np.eye(3) * 0.3**2
-        found = register(frame.patches.points[:: max(1, len(frame.patches.points) // 2000)], surface, place, self._registration)
+        points = frame.seen.patches.points
+        found = register(points[:: max(1, len(points) // 2000)], surface, place, self._registration)
         if not found.believed or found.fitness < settings.loop_fitness or found.degenerate:
             return
         relative = np.linalg.inv(keyframes.all[known].pose) @ place.state.matrix

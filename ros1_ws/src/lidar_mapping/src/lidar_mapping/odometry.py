@@ -297,7 +297,7 @@ class LidarInertialOdometry:
         if self._surface is None or len(self.keyframes.all) % WHOLE_KEYFRAMES == 0:
             self._surface = self.keyframes.surface(pose[:3, 3], settings.reach_m)
         else:
-            self._surface = self._surface.joined(frame.patches.moved(pose))
+            self._surface = self._surface.joined(frame.patches_in_map())
         return frame
 
 

@@ -20,6 +20,7 @@ from perception_core import NS
 
 if TYPE_CHECKING:
     from collections.abc import Sequence
+    from pathlib import Path
 
     from numpy.typing import NDArray
 
@@ -56,12 +57,15 @@ class SlamCount:
 
 
 class Slam:
-    """One map and the vehicle's place in it; not thread-safe."""
+    """One map and the vehicle's place in it; not thread-safe.
 
-    def __init__(self, settings: SlamSettings) -> None:
+    What lies behind is stored in ``folder``, or the system's folder for temporary files.
+    """
+
+    def __init__(self, settings: SlamSettings, folder: Path | None = None) -> None:
         self._settings = settings
         self.map = VoxelMap(voxel_m=settings.voxel_m, max_voxels=settings.max_voxels)
-        self.keyframes = Keyframes(voxel_m=settings.odometry.map_voxel_m, limit=settings.odometry.max_keyframes)
+        self.keyframes = Keyframes(voxel_m=settings.odometry.map_voxel_m, limit=settings.odometry.max_keyframes, folder=folder)
         self.count = SlamCount()
         self.T_map_odom: Floats = np.eye(4)
         self.gyro_bias: Floats = np.zeros(3)
