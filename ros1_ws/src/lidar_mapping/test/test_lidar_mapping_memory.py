@@ -4,6 +4,8 @@ from __future__ import annotations
 
 import os
 import resource
+import subprocess
+import sys
 from types import SimpleNamespace
 
 import numpy as np
@@ -12,7 +14,7 @@ import pytest
 from lidar_mapping import Keyframes, MappingSettings
 from lidar_mapping.core import LidarMapping
 from lidar_mapping.seen import HeldSeen, SeenFile, StoredSeen
-from lidar_mapping.surface import join
+from lidar_mapping.surface import BLOCK, flat_patches, join
 
 HELD, POINTS, KEPT = 600_000, 8_000, 60_000
 """Bytes in memory, about six keyframes; points a keyframe has before they are thinned to voxels; points in all, until they are thinned."""
@@ -148,3 +150,43 @@ def test_what_fails_with_the_file_is_told_once(tmp_path) -> None:
         frames._file.problem = problem
         core._tell_what_lacks()
     assert told == [("storage", "full"), ("storage", "lost")]
+
+
+HEAP = """
+import ctypes, sys
+from lidar_mapping import heap
+libc = ctypes.CDLL(None)
+libc.malloc.restype, libc.malloc.argtypes, libc.free.argtypes = ctypes.c_void_p, [ctypes.c_size_t], [ctypes.c_void_p]
+class Info(ctypes.Structure):
+    _fields_ = [(name, ctypes.c_size_t) for name in "arena ordblks smblks hblks hblkhd usmblks fsmblks uordblks fordblks keepcost".split()]
+libc.mallinfo2.restype = Info
+assert sys.argv[1] == "before" or heap.give_back()
+libc.free(libc.malloc(16 * heap.LARGE_BYTES))
+arrays = libc.mallinfo2().hblks
+libc.malloc(2 * heap.LARGE_BYTES)
+print(libc.mallinfo2().hblks - arrays)
+"""
+
+
+def own_blocks(when) -> int:
+    """How many blocks of its own the system gives an array of 2 MiB, once one of 16 MiB has been freed."""
+    return int(subprocess.run([sys.executable, "-c", HEAP, when], check=True, capture_output=True, text=True).stdout)
+
+
+def test_a_large_array_goes_back_to_the_system() -> None:
+    assert (own_blocks("before"), own_blocks("set")) == (0, 1)
+
+
+def test_patches_found_block_by_block_are_those_found_at_once(monkeypatch) -> None:
+    rng = np.random.default_rng(3)
+    wall = np.stack([rng.uniform(0.0, 12.0, 3 * BLOCK), rng.normal(3.0, 0.01, 3 * BLOCK), rng.uniform(0.0, 3.0, 3 * BLOCK)], axis=1)
+    sparse = rng.uniform(20.0, 30.0, (BLOCK // 8, 3)) * [1.0, 1.0, 0.0]
+    cloud = np.vstack([wall, sparse])
+    blocks = flat_patches(cloud, cloud)
+    monkeypatch.setattr("lidar_mapping.surface.BLOCK", len(cloud))
+    whole = flat_patches(cloud, cloud)
+    assert len(whole.points) > 2 * BLOCK
+    for one, other in ((blocks, whole), (flat_patches(cloud[:0], cloud), join([]))):
+        assert np.array_equal(
+            np.unique(np.hstack([one.points, one.normals]), axis=0), np.unique(np.hstack([other.points, other.normals]), axis=0)
+        )

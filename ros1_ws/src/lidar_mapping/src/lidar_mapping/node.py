@@ -8,6 +8,7 @@ import rospy
 from std_srvs.srv import Trigger, TriggerResponse
 
 from lidar_mapping.core import OUTPUTS, LidarMapping
+from lidar_mapping.heap import give_back
 from lidar_mapping.settings import MappingSettings
 from node_core.ros import RosHost
 from perception_core.ros import read_settings
@@ -31,6 +32,7 @@ def serve_save(core: LidarMapping) -> ToldService:
 
 def main() -> None:
     """Run the node until ROS shuts down."""
+    give_back()
     rospy.init_node("lidar_mapping")
     host = RosHost(OUTPUTS, "mapping")
     core = LidarMapping(read_settings(MappingSettings()), host)
