@@ -32,7 +32,7 @@ CLOUD = "/lidar/points"
 CLOUD_BYTES = 1 << 23
 POSE_LATE_S = 0.05  # behind a sweep, at which a pose still tells where it was made: 0.1 m at 2 m/s
 NO_MOUNT = "the driver has another frame_id than /tf_static", "nobody publishes /tf_static"
-OBSTACLE = Output("~obstacle", Obstacle, tcp_nodelay=True)
+OBSTACLE = Output("~obstacle", Obstacle, tcp_nodelay=True, taken="/uav_guidance/taken")
 OUTPUTS = (OBSTACLE, HEALTH)
 
 

@@ -14,6 +14,7 @@ class Output:
     """A topic that a core publishes; ``~`` begins the names of its own.
 
     ``shared``: other nodes publish it, too. What a record has there stands in a replay.
+    ``taken``: the topic on which the reader says what it has taken; a measurement is dealt with when it has. Messages have a header.
     """
 
     topic: str
@@ -22,6 +23,7 @@ class Output:
     latch: bool = False
     tcp_nodelay: bool = False
     shared: bool = False
+    taken: str = ""
 
 
 @dataclass(frozen=True)

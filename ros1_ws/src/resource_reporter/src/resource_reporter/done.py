@@ -4,30 +4,37 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from functools import partial
+from typing import Protocol
 
 import rospy
 from std_msgs.msg import Header
-
-from resource_reporter.reporter import ResourceReporter
 
 NS = 1_000_000_000
 QUEUE = 20  # ticks or measurements; a simulator that waits for them never has so many under way
 
 
+class Settling(Protocol):
+    """Something that a node has told others: it is settled when they know it."""
+
+    def when_settled(self, job: Callable[[], None]) -> None:
+        """Do a job once others know all that was told so far."""
+
+
 class DoneReporter:
     """Publishes ``~done``, a Header with the stamp of each measurement, or tick of the clock, that the node has dealt with.
 
-    It is dealt with when the skillsets know of the states that the node has reported by then: a transition that crosses a busy machine
-    takes no simulated time. Make it when the node listens to all that it works on: a simulator may take it for ready from then on.
+    It is dealt with when others know what the node has told by then, as the skillsets the states that a ``ResourceReporter`` reports: what
+    crosses a busy machine takes no simulated time. Make it when the node listens to all that it works on: a simulator may take it for
+    ready from then on.
     """
 
-    def __init__(self, *reporters: ResourceReporter) -> None:
-        self._reporters = reporters
+    def __init__(self, *told: Settling) -> None:
+        self._told = told
         self._publisher = rospy.Publisher("~done", Header, queue_size=QUEUE, tcp_nodelay=True)
 
     def done(self, stamp_ns: int) -> None:
         """Tell that nothing is left to do for the measurement, or the tick, of ``stamp_ns``."""
         job: Callable[[], None] = partial(self._publisher.publish, Header(stamp=rospy.Time(*divmod(stamp_ns, NS))))
-        for reporter in self._reporters:
-            job = partial(reporter.when_settled, job)
+        for each in self._told:
+            job = partial(each.when_settled, job)
         job()

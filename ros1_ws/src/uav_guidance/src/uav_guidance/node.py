@@ -6,12 +6,13 @@ import contextlib
 import logging
 import threading
 import time
+from functools import partial
 from typing import Any
 
 import rospy
 from geometry_msgs.msg import PoseStamped
 from rosgraph_msgs.msg import Clock
-from std_msgs.msg import String
+from std_msgs.msg import Header, String
 from tf2_msgs.msg import TFMessage
 from uav_msgs.msg import GuidanceState, MappingState, Obstacle
 from uav_msgs.srv import (
@@ -88,6 +89,7 @@ class GuidanceNode:
         self._told = rospy.Publisher("~told", String, queue_size=10)
         self._pose = rospy.Publisher("~pose", PoseStamped, queue_size=10)
         self._tf = rospy.Publisher("/tf", TFMessage, queue_size=10)
+        self._taken = rospy.Publisher("~taken", Header, queue_size=10, tcp_nodelay=True)
         self._stepped_ns = self._done_ns = 0
         self._link = Link(
             settings.url,
@@ -97,7 +99,7 @@ class GuidanceNode:
             on_idle=self._report_done,
         )
         for topic in ("/zed_depth/obstacle", "/lidar_obstacles/obstacle"):
-            RawSubscriber(Input(topic, Obstacle, self._on_obstacle, _on_garbage, BUFFER_BYTES, queue_size=5))
+            RawSubscriber(Input(topic, Obstacle, partial(self._on_obstacle, topic), _on_garbage, BUFFER_BYTES, queue_size=5))
         RawSubscriber(Input("/lidar_mapping/state", MappingState, self._on_mapping, warn_of_garbage, BUFFER_BYTES))
         transforms = Input("/tf", TFMessage, self._on_transforms, warn_of_garbage, BUFFER_BYTES, TRANSFORMS_WAITING, about=MAP.encode())
         RawSubscriber(transforms)
@@ -180,9 +182,10 @@ class GuidanceNode:
 
     # ---- what comes in -------------------------------------------------------------------------------------------------
 
-    def _on_obstacle(self, message: Obstacle) -> None:
+    def _on_obstacle(self, topic: str, message: Obstacle) -> None:
         with self._changed:
             self._guidance.on_obstacle(sighting(message, self._guidance.correction), _now_s())
+        self._taken.publish(Header(stamp=message.header.stamp, frame_id=rospy.resolve_name(topic)))
 
     def _on_mapping(self, message: MappingState) -> None:
         with self._changed:

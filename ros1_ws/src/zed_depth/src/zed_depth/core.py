@@ -37,7 +37,7 @@ IMAGE_BYTES = 1 << 22
 INFO_BYTES = 1 << 16
 SIDES = ("left", "right")
 DEPTH, CONFIDENCE, POINTS = Output("~depth", Image), Output("~confidence", Image), Output("~points", PointCloud2)
-OBSTACLE = Output("~obstacle", Obstacle, tcp_nodelay=True)
+OBSTACLE = Output("~obstacle", Obstacle, tcp_nodelay=True, taken="/uav_guidance/taken")
 OUTPUTS = (DEPTH, CONFIDENCE, POINTS, OBSTACLE, HEALTH)
 
 

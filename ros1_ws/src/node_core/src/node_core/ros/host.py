@@ -10,6 +10,7 @@ from typing import TYPE_CHECKING, Any
 import rospy
 
 from node_core.core import Switched
+from node_core.ros.receipts import Receipts
 from node_core.ros.subscription import RawSubscriber
 from node_core.ros.switch import EnableSwitch
 from node_core.ros.worker import NewestWorker
@@ -32,6 +33,7 @@ class RosHost:
     def __init__(self, outputs: Sequence[Output], *skillsets: str) -> None:
         send_directly()
         self._publishers = {each.topic: _publisher(each) for each in outputs}
+        self._receipts = {each.topic: Receipts(each.taken, each.topic) for each in outputs if each.taken}
         self._subscribers: dict[str, RawSubscriber] = {}
         self._reporters = {skillset: ResourceReporter(skillset) for skillset in skillsets}
         self._done: DoneReporter | None = None
@@ -46,7 +48,7 @@ class RosHost:
             self._subscribers[each.topic] = RawSubscriber(each)
         # reset: a clock that jumps back (a bag played again) must not end the timer's thread.
         self._timers = [rospy.Timer(rospy.Duration.from_sec(period_s), _job(work), reset=True) for period_s, work in core.timers]
-        self._done = DoneReporter(*self._reporters.values())
+        self._done = DoneReporter(*self._reporters.values(), *self._receipts.values())
 
     def now_ns(self) -> int:
         """Return the ROS clock."""
@@ -54,6 +56,8 @@ class RosHost:
 
     def publish(self, topic: str, message: Any) -> None:
         """Publish on an output."""
+        if topic in self._receipts:
+            self._receipts[topic].sent(message.header.stamp.to_nsec())
         self._publishers[topic].publish(message)
 
     def wanted(self, topic: str) -> bool:
