@@ -14,6 +14,7 @@ from __future__ import annotations
 
 from collections.abc import Collection, Iterable, Iterator, Mapping, Sequence
 from fnmatch import fnmatchcase
+from functools import lru_cache
 from typing import NamedTuple
 
 from alula.missions.director import Outcome as Ended
@@ -201,8 +202,8 @@ class MissionSteps:
         shown = f"{resource} {event.result}"
         uses = self._left(state.state, target.state)
         showing = [name for name in state.faults if _any(self._faults[name].states, f"{resource} {event.source}")]
-        if any(_any((*one.states, *one.later), shown) for one in self._faults.values()):
-            if any(_any((*self._faults[name].states, *self._faults[name].later), shown) for name in state.faults):
+        if any(_brings(one, shown) for one in self._faults.values()):
+            if any(_brings(self._faults[name], shown) for name in state.faults):
                 yield Step(Kind.ANY, shown, target, uses=uses)
         elif showing:
             yield from (Step(Kind.MENDED, name, target._replace(faults=state.faults - {name}), uses=uses) for name in showing)
@@ -246,7 +247,7 @@ def _touches(fault: FaultEffects, system: System) -> bool:
     skills: dict[str, Skill] = {f"{leaf.skillset}.{leaf.model.name}": leaf.model for leaf in system.leaves}
     ends = [f"{name} {one.name}" for name, skill in skills.items() for one in skill.results]
     ends += [f"{name} {one.name}" for name, skill in skills.items() for one in skill.invariants]
-    shown = any(_any((*fault.states, *fault.later), text) for text in resources)
+    shown = any(_brings(fault, text) for text in resources)
     return shown or any(_any(fault.ends, text) for text in (*ends, *(f"{name} {Happens.FAIL.value}" for name in skills)))
 
 
@@ -279,8 +280,14 @@ def _shows(effects: FaultEffects, event: Event) -> bool:
     return event.kind in {Happens.RESULT, Happens.BREAK, Happens.FAIL} and _any(effects.ends, f"{event.skill} {word}")
 
 
-def _any(patterns: Iterable[str], text: str) -> bool:
+@lru_cache(maxsize=1 << 14)  # a search asks the same few thousand pairs in each of its situations
+def _any(patterns: frozenset[str], text: str) -> bool:
     return any(fnmatchcase(text, pattern) for pattern in patterns)
+
+
+def _brings(effects: FaultEffects, shown: str) -> bool:
+    """Tell whether a fault brings about a state, or what is done about it does."""
+    return _any(effects.states, shown) or _any(effects.later, shown)
 
 
 def _complete(several: Sequence[Sequence[Asked]]) -> bool:
