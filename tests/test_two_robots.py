@@ -107,7 +107,7 @@ def test_the_branch_by_which_the_other_robot_goes_there_is_written_again(tmp_pat
     repair = search.run().repair
     assert repair is not None
     assert (repair.branch.size, repair.left) == (1, ())
-    assert "rover_base.drive_to comes later, and is for arrival, too." in " ".join(repair.text.split())
+    assert "rover_base.drive_to comes later, for the same arrival." in " ".join(repair.text.split())
     mission.write_text(repair.text)
     checked = command("check", str(mission), "--json", "--time", "600", fleet=fleet)
     assert checked.returncode == 0, checked.stdout + checked.stderr

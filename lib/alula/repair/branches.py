@@ -4,8 +4,8 @@ from __future__ import annotations
 
 import copy
 import re
-from collections.abc import Iterator
-from dataclasses import dataclass
+from collections.abc import Iterator, Sequence
+from dataclasses import dataclass, replace
 from enum import IntEnum
 from textwrap import wrap
 
@@ -57,6 +57,23 @@ class Branch:
         """How many nodes it has."""
         use = sum(one.tag != HOLE for one in self.use.iterate()) if self.around or self.tree is None else 0
         return use + (0 if self.tree is None else sum(1 for _ in self.tree.iterate()))
+
+    def within(self, most_nodes: int, *, shortest: bool = False) -> Branch | None:
+        """Return it with no more nodes than these, if that is possible: then its condition notes what a script notes otherwise.
+
+        ``shortest``: it does so in any case, as others share these nodes.
+        """
+        fits = self.size <= most_nodes
+        if fits and not shortest:
+            return self
+        if self.tree is None or [one.tag for one in self.tree.children[:2]] != ["ScriptCondition", "Script"]:
+            return self if fits else None
+        top = clone(self.tree)
+        condition, script = top.children[:2]
+        condition.set("_onSuccess", script.get("code"))
+        top.content.remove(script)
+        shorter = replace(self, tree=top)
+        return shorter if shorter.size <= most_nodes else None
 
     @property
     def order(self) -> tuple[int, int]:
@@ -222,9 +239,15 @@ def comment_lines(text: str, width: int) -> list[str]:
 
 def _lines_of_tree(branch: Branch) -> list[str]:
     assert branch.tree is not None  # noqa: S101 - who asks has one
-    said = [f"{STEP}{line}" for one in branch.why for line in wrap(_said(one), WIDTH - 2 * len(STEP))]
-    comment = ["<!--", *said, "-->"] if said else []
-    return [*comment, *tree_lines(branch.use_id, branch.tree)]
+    return [*_comment(branch.why), *tree_lines(branch.use_id, branch.tree)]
+
+
+def _comment(why: Sequence[str]) -> list[str]:
+    """Return a comment of one line, if it fits there, else each sentence on its own."""
+    whole = comment_lines(" ".join(why), WIDTH - len(STEP))
+    if len(whole) <= 1:
+        return whole
+    return ["<!--", *(f"{STEP}{line}" for one in why for line in wrap(_said(one), WIDTH - 2 * len(STEP))), "-->"]
 
 
 def _said(text: str) -> str:

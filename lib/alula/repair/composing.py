@@ -10,7 +10,7 @@ from alula.model.model import Parameter
 from alula.model.units import told_unit
 from alula.repair.branches import node
 from alula.repair.courses import Course, Courses, Here, Wanted
-from alula.repair.naming import Vocabulary, in_short, told_states
+from alula.repair.naming import Vocabulary, told_states
 from alula.repair.purposes import Purpose
 from alula.trees.attributes import node_name, type_name
 from alula.trees.document import Element
@@ -86,11 +86,10 @@ class Sources:
         return found[0] if found else None
 
 
-def opening(condition: str, name: str, code: str) -> Element:
-    """Return what a branch begins with: a script, which runs only where a condition is true, if there is one."""
-    if not condition:
-        return node("Script", name="degraded", code=code)
-    return node("ScriptCondition", name=name, code=condition, _onSuccess=code)
+def opening(condition: str, name: str, code: str) -> list[Element]:
+    """Return what a branch begins with: a script, behind a condition, if there is one."""
+    script = node("Script", name="degraded", code=code)
+    return [node("ScriptCondition", name=name, code=condition), script] if condition else [script]
 
 
 def first_skills(element: Element, skills: Collection[str]) -> set[str]:
@@ -198,12 +197,12 @@ class Composer:
         """Return nodes that run one after another while others fill their roles, once these make progress; the first that ends ends it."""
         if not watching:
             return nodes[0]
-        name = in_short([node_name(one) for one in nodes if one.tag != "Awaits"])
+        named = dict.fromkeys(node_name(one) for one in nodes if one.tag != "Awaits")
+        name = next(iter(named)) if len(named) == 1 else "all of it"
         sees = " && ".join(f"progress({one.tag}) >= 1" for one in watching)
         wait = node("WaitFor", name=self.sources.words.wait(sees, f"there is {filled}"), if_=sees)
-        inner = node("Sequence", wait, *nodes, name=f"with {filled}")
-        called = f"{' and '.join(node_name(one) for one in watching)} and {name}"
-        return node("Parallel", *watching, inner, name=called, success_count="1", failure_count="1")
+        inner = node("Sequence", wait, *nodes, name=f"once there is {filled}")
+        return node("Parallel", *watching, inner, name=f"{name} with {filled}", success_count="1", failure_count="1")
 
 
 def _filled(purpose: Purpose) -> str:

@@ -3,12 +3,14 @@
 from __future__ import annotations
 
 import re
+from collections.abc import Sequence
 from dataclasses import dataclass
 from fnmatch import fnmatchcase
 
 from alula.prove.mission.system import System
+from alula.repair.naming import listed, sentence, told_failure, told_state
 from alula.repair.purposes import broken_by
-from alula.repair.subject import Subject
+from alula.repair.subject import Subject, texts_of
 from alula.trees.node import Node
 
 _DEGRADED = re.compile(r"\bdegraded\s*:=")
@@ -18,7 +20,8 @@ _DEGRADED = re.compile(r"\bdegraded\s*:=")
 class Failing:
     """What is to be answered: a leaf, and the states with which its skill can't run (``skillset.resource``, state).
 
-    ``results`` are those by which the fault ends it, and the conditions by which it has it refused or ended.
+    ``results`` are those by which the fault ends it, and the conditions by which it has it refused or ended. ``shown`` is the fault in
+    words of the models, with which a comment begins.
     """
 
     leaf: Node
@@ -26,6 +29,7 @@ class Failing:
     states: tuple[tuple[str, str], ...] = ()
     fault: str = ""
     results: tuple[str, ...] = ()
+    shown: str = ""
 
     @property
     def degrades(self) -> bool:
@@ -35,8 +39,12 @@ class Failing:
     @property
     def situation(self) -> str:
         """Return it as a comment in the mission says it."""
-        by = f" (fault {self.fault})" if self.fault else ""
-        return f"When '{self.leaf.name}' fails{by}"
+        return sentence(self.reason)
+
+    @property
+    def reason(self) -> str:
+        """Return the states with which its skill can't run, else how it fails."""
+        return self.shown or told_failure(self.leaf.name, self.results)
 
     @property
     def words(self) -> str:
@@ -50,6 +58,7 @@ def failing_by(fault: str, subject: Subject, system: System) -> list[Failing]:
     effects = subject.faults[fault]
     states = [tuple(one.rsplit(" ", 1)) for one in sorted(effects.states)]
     found: dict[int, Failing] = {}
+    texts = texts_of(subject.files.documents[0].root)
     for leaf in system.leaves:
         name = f"{leaf.skillset}.{leaf.model.name}"
         mine = tuple((at.partition(".")[2], state) for at, state in states if at.partition(".")[0] == leaf.skillset)
@@ -60,5 +69,13 @@ def failing_by(fault: str, subject: Subject, system: System) -> list[Failing]:
         results = tuple(one for one in ends if any(fnmatchcase(f"{name} {one}", end) for end in effects.ends))
         if (broken or results) and leaf in system.trees[0].nodes:
             full = tuple((f"{leaf.skillset}.{at}", state) for at, state in broken)
-            found.setdefault(id(leaf.wiring.element), Failing(leaf, name, full, fault, results))
+            found.setdefault(id(leaf.wiring.element), Failing(leaf, name, full, fault, results, _shown(full, texts)))
     return list(found.values())
+
+
+def _shown(states: Sequence[tuple[str, str]], texts: Sequence[str]) -> str:
+    """Return the states with which a skill can't run, in the author's spelling; nothing where there are none."""
+    several: dict[str, list[str]] = {}
+    for at, state in states:
+        several.setdefault(at, []).append(state)
+    return listed((told_state(at, *ones, texts=texts) for at, ones in several.items()), "or") if several else ""

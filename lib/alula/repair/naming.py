@@ -18,6 +18,8 @@ from alula.trees.document import Element
 _WORD = re.compile(r"[A-Za-z]+")
 _TIMES = {1: "one chance", 2: "two chances", 3: "three chances"}
 _WHERE = frozenset({"to", "into", "onto", "out", "around", "along", "through", "past", "behind", "up", "down", "back", "home", "there"})
+MOST_NAMED = 3
+"""How many results of a skill are named side by side."""
 _OFTEN = {1: "once", 2: "twice", 3: "three times"}
 
 
@@ -33,7 +35,7 @@ class Renaming:
         gone = [one for one in was if one not in now]
         come = [one for one in now if one not in was]
         self._words: Mapping[str, str] = {gone[0]: come[0] if come else ""} if len(gone) == 1 and len(come) <= 1 else {}
-        self._spelled = {word: _spelled(word, texts) for word in come}
+        self._spelled = {word: spelled(word, texts) for word in come}
 
     def name(self, text: str) -> str:
         """Return a node's name with the other words."""
@@ -48,7 +50,7 @@ class Renaming:
         return "_".join(word for word in (self._words.get(part, part) for part in parts) if word)
 
 
-def _spelled(word: str, texts: Iterable[str]) -> str:
+def spelled(word: str, texts: Iterable[str]) -> str:
     """Return how a word is written most often, but in names of code."""
     found = Counter(match[0] for text in texts for match in re.finditer(rf"(?<![\w.'{{]){word}(?![\w.}}])", text, re.IGNORECASE))
     return max(found, key=lambda one: (found[one], one)) if found else word
@@ -79,10 +81,24 @@ class Vocabulary:
         return next((node_name(one) for one in asking if one.get("name")), otherwise)
 
 
-def told_state(resource: str, state: str) -> str:
-    """Return a state as a person tells it: ``the pose is good`` for ``base.pose_status``, GOOD."""
-    words = resource.rpartition(".")[2].removesuffix("_status").removesuffix("_state").replace("_", " ")
-    return f"the {words} is {state if state == 'OK' else state.lower().replace('_', ' ')}"
+def told_state(resource: str, *states: str, texts: Sequence[str] = ()) -> str:
+    """Return a state as a person tells it: ``the pose is good`` for ``base.pose_status``, GOOD; of several, one of them.
+
+    ``texts`` say how the author spells the resource's words.
+    """
+    words = [spelled(one, texts) for one in told_resource(resource).split()]
+    either = listed((one if one == "OK" else one.lower().replace("_", " ") for one in states), "or")
+    return f"the {' '.join(words)} is {either}"
+
+
+def told_resource(resource: str) -> str:
+    """Return a resource's name as words: ``pose`` for ``base.pose_status``."""
+    return resource.rpartition(".")[2].removesuffix("_status").removesuffix("_state").replace("_", " ")
+
+
+def told_failure(name: str, results: Sequence[str]) -> str:
+    """Return how a node fails that ends with one of these results: ``'drive' ends as BLOCKED``, or that it does, of many results."""
+    return f"'{name}' ends as {listed(results, 'or')}" if 0 < len(results) <= MOST_NAMED else f"'{name}' fails"
 
 
 def told_states(several: Iterable[tuple[str, str]]) -> str:
@@ -104,6 +120,17 @@ def often_when(attempts: int, results: Iterable[str]) -> str:
     """Return what a node is called that runs another one so often at most, as long as it ends with one of these results."""
     ends = " or ".join(one.lower().replace("_", " ") for one in results)
     return f"{_OFTEN.get(attempts, f'{attempts} times')} when {ends}"
+
+
+def listed(several: Iterable[str], word: str = "and") -> str:
+    """Return words as a list: ``a, b and c``."""
+    *others, last = several
+    return f"{', '.join(others)} {word} {last}" if others else last
+
+
+def sentence(text: str) -> str:
+    """Return words with a capital letter at their beginning."""
+    return text[:1].upper() + text[1:]
 
 
 def in_short(steps: Sequence[str]) -> str:

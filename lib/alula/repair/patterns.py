@@ -59,7 +59,8 @@ class Patterns:
             places = places[: next((number for number, one in enumerate(places) if one.name == within), len(places))]
         then = {**(states or {}), **dict(reversed(failing.states))}
         found = [one for place in places for one in self._at(place, failing, then)]
-        unique = {one.key: one for one in found if one.size <= self._most_nodes}
+        fitting = (one.within(self._most_nodes, shortest=self._most_nodes < MOST_NODES) for one in found)
+        unique = {one.key: one for one in fitting if one is not None}
         return sorted(unique.values(), key=lambda one: one.order)
 
     def all_stand_ins(self, failing: Failing) -> list[Purpose]:
@@ -147,12 +148,12 @@ class Patterns:
             failed = node("ScriptCondition", name=f"{failing.leaf.name} failed", code=f"failed_first({failing.skill})")
             stopping = node("Script", name="stopping", code="@stopping := true")
             top = node("Sequence", failed, stopping, stop, name=f"rest without {plain(failing.skill)}")
-            why = (f"{failing.situation}: the mission is degraded, and comes to rest.",)
+            why = (f"{failing.situation}: nothing more is done, the mission comes to rest, and is degraded.",)
             yield self._subtree(f"rest_without_{failing.skill.rpartition('.')[2]}", top, place, why, Rank.ENDS_WELL)
         stopping = node("Script", name="stopping", code="@stopping := true")
         give_up = node("Sequence", node("NoteReason", name="note why"), stopping, stop, name="give up")
         top = node("ForceFailure", give_up, name="the mission fails")
-        why = (f"{failing.situation}, and nothing else is left to be done: the mission comes to rest and is given up.",)
+        why = (f"What nothing else answers ends here, as when {failing.reason}: come to rest, then give up.",)
         yield self._subtree("give_up", top, place, why, Rank.GIVES_UP, "given up")
 
     def _subtree(self, tree: str, top: Element, place: Node, why: tuple[str, ...], rank: Rank, name: str = "") -> Branch:

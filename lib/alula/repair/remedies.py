@@ -2,16 +2,16 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Mapping
+from collections.abc import Iterator, Mapping, Sequence
 from itertools import islice
 
 from alula.missions.skill_types import OUTCOME_PORT
 from alula.model.expressions import And
 from alula.repair.branches import FALLBACKS, HOLE, Branch, Rank, node
-from alula.repair.composing import Composer, Sources, first_skills, opening
+from alula.repair.composing import Composer, Sources, opening
 from alula.repair.courses import Course, Courses, Here, States, initial_states
 from alula.repair.failing import Failing
-from alula.repair.naming import another, chances, plain, told_state
+from alula.repair.naming import another, chances, listed, plain, told_resource, told_state
 from alula.repair.purposes import Purpose, Purposes, asked_of_others
 from alula.repair.subject import Subject
 from alula.trees.attributes import node_name, type_name
@@ -115,8 +115,8 @@ class Remedies:
         instead = [one for one in later if one.achieves and one.roles & roles and one.skillset.name not in skillsets]
         if instead:
             (first, *_), name = instead, node_name(place.wiring.element)
-            role = " and ".join(sorted(first.roles & roles))
-            why = f"{failing.situation}: {first.name} comes later, and is for {role}, too."
+            role = listed(told_resource(one) for one in sorted(first.roles & roles))
+            why = f"{failing.situation}: go on without '{name}'; {first.name} comes later, for the same {role}."
             script = node("Script", name=f"not done: {name}", code="@degraded := true")
             yield Branch(script, None, place.wiring.element.place, (why,), rank=Rank.LEAVES_OUT)
 
@@ -145,55 +145,46 @@ class Remedies:
 
     def _before_the_next_round(self, place: Node, failing: Failing, course: Course, steps: list[Element]) -> Branch:
         """Return the course as another child of a Fallback that a loop ticks again when it has succeeded."""
-        needed, name = self._guard(course.steps[0], steps[0])
-        after: list[Element] = []
+        condition, name, after = "", "", list[Element]()
         entry = pointer(failing.leaf.wiring.element.get(OUTCOME_PORT), OUTCOME_PORT)
         if entry and failing.results:
-            mine = " || ".join(f"{entry} == '{one}'" for one in failing.results)
-            needed, name = f"({mine}) && {needed}" if needed else mine, name or f"is for {plain(failing.skill)}"
+            condition = " || ".join(f"{entry} == '{one}'" for one in failing.results)
+            name = f"{plain(failing.skill)} has failed"
             after = [node("Script", name="it may go on", code=f"{entry} := ''")]
-        top = node("Sequence", opening(needed, name, "@degraded := true"), *steps, *after, name=_words(course))
-        use = node("SubTree", ID=self._tree(course), name=_words(course), _autoremap="true")
-        return Branch(use, top, place.wiring.element.place, _why(failing, course))
+        words = f"{plain(course.steps[-1].name)} and go on"
+        top = node("Sequence", *opening(condition, name, "@degraded := true"), *steps, *after, name=words)
+        use = node("SubTree", ID=self._tree(words), name=words, _autoremap="true")
+        return Branch(use, top, place.wiring.element.place, _why(failing, course, steps, "then on with the work"))
 
     def _again_after(self, place: Node, failing: Failing, course: Course, steps: list[Element]) -> Branch:
         """Return a retry around the node and the course, which is done after each failure."""
         element = place.wiring.element
-        tree, words = self._tree(course), _words(course)
-        begin = opening(*self._guard(course.steps[0], steps[0]), "@degraded := true")
-        top = node("Sequence", begin, *steps, name=words)
-        use = node("SubTree", ID=tree, name=words, _autoremap="true")
-        name = f"{node_name(element)}, or {plain(course.steps[-1].name)} first"
-        fallback = node("Fallback", node(HOLE, name=node_name(element)), node("ForceFailure", use, name="then again"), name=name)
         last = course.steps[-1]
+        words = plain(last.name)
+        top = node("Sequence", *opening("", "", "@degraded := true"), *steps, name=words)
+        use = node("SubTree", ID=self._tree(words), name=words, _autoremap="true")
+        name = f"{node_name(element)}, or {words} first"
+        fallback = node("Fallback", node(HOLE, name=node_name(element)), node("ForceFailure", use, name="then again"), name=name)
         needed = _needed(last)
         again = chances(self._attempts, node_name(element) if place is failing.leaf else "")
         if needed:
             retry = node("RetryAfter", fallback, name=again, attempts=str(self._attempts), wait=AGAIN_S, if_=needed)
         else:
             retry = node("RetryUntilSuccessful", fallback, name=again, num_attempts=str(self._attempts))
-        return Branch(retry, top, element.place, _why(failing, course), around=True)
+        return Branch(retry, top, element.place, _why(failing, course, steps, "then it gets another chance"), around=True)
 
-    def _tree(self, course: Course) -> str:
-        return another("_and_".join("_".join(plain(one.name).split()) for one in course.steps), self._subject.files.trees)
-
-    def _guard(self, purpose: Purpose, step: Element) -> tuple[str, str]:
-        """Return when a course is begun, and what that is called; one whose first skill is started at once is refused by itself."""
-        if first_skills(step, self._purposes.known) == {purpose.name}:
-            return "", ""
-        return _needed(purpose), f"can {self._sources.words.leaf(purpose.name)}"
+    def _tree(self, words: str) -> str:
+        return another("_".join(words.split()), self._subject.files.trees)
 
     def _end(self, place: Node, failing: Failing, purpose: Purpose, step: Element, name: str, code: str, rank: Rank) -> Branch:
         """Return a step as a branch that is for the failed one alone: where what shows the fault is not there, it fails."""
         shown = " || ".join(f"{at} == {state}" for at, state in failing.states)
         told = " or ".join(told_state(at, state) for at, state in failing.states)
-        top = node("Sequence", opening(shown, told, code), step, name=name)
-        tree = another("_".join(name.split()), self._subject.files.trees)
-        ends = "" if rank is Rank.GOES_ON else "the mission ends, degraded, at the place that it calls safe: "
-        roles = " and ".join(role.name for role in purpose.skill.needs)
-        needs = f", which needs {roles} meanwhile" if roles else ""
-        why = (f"{failing.situation}: {ends}{purpose.skill.name}{needs}.",)
-        return Branch(node("SubTree", ID=tree, name=name, _autoremap="true"), top, place.wiring.element.place, why, rank=rank)
+        top = node("Sequence", *opening(shown, told, code), step, name=name)
+        ends = "" if rank is Rank.GOES_ON else " to the safe place, and end there, degraded"
+        why = (f"{failing.situation}: {plain(purpose.name)}{ends}.", *_beside([purpose], [step]))
+        use = node("SubTree", ID=self._tree(name), name=name, _autoremap="true")
+        return Branch(use, top, place.wiring.element.place, why, rank=rank)
 
 
 def _needed(purpose: Purpose) -> str:
@@ -207,15 +198,14 @@ def _begins_again(place: Node) -> bool:
     return outer is not None and loop is not None and outer.wiring.element.tag in FALLBACKS and loop.wiring.element.tag == LOOP
 
 
-def _words(course: Course) -> str:
-    return " and ".join(plain(one.name) for one in course.steps)
+def _why(failing: Failing, course: Course, steps: Sequence[Element], then: str) -> tuple[str, ...]:
+    names = ", ".join(plain(one.name) for one in course.steps)
+    return (f"{failing.situation}: {names}, {then}.", *_beside(course.steps, steps))
 
 
-def _why(failing: Failing, course: Course) -> tuple[str, ...]:
-    names = ", then ".join(one.skill.name for one in course.steps)
-    brings = "brings" if len(course.steps) == 1 else "bring"
-    return (f"{failing.situation}: {names} {brings} about what it needs, and it gets another chance.", *_told(course.steps))
-
-
-def _told(steps: tuple[Purpose, ...]) -> list[str]:
-    return [f"{one.skill.name} needs {' and '.join(role.name for role in one.skill.needs)} meanwhile." for one in steps if one.skill.needs]
+def _beside(needing: Sequence[Purpose], steps: Sequence[Element]) -> list[str]:
+    """Return why skills run beside others: ``scan gives the dock its sight``."""
+    beside = {node_name(one) for step in steps for part in step.iterate() if part.tag == "Parallel" for one in part.children[:-1]}
+    for_skills = listed(dict.fromkeys(plain(one.name) for one in needing if one.skill.needs)) if beside else ""
+    roles = listed(dict.fromkeys(told_resource(role.name) for one in needing for role in one.skill.needs)) if beside else ""
+    return [f"'{listed(sorted(beside))}' is the {roles} that {for_skills} needs."] if beside else []

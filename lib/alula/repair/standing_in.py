@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Collection, Iterable, Iterator, Mapping, Sequence
+from collections.abc import Collection, Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from itertools import islice, product
 
@@ -12,7 +12,7 @@ from alula.prove.mission.accepted import DESCRIPTION
 from alula.repair.branches import Branch, clone, node, parent_of
 from alula.repair.composing import Sources, first_skills, opening
 from alula.repair.failing import Failing
-from alula.repair.naming import Renaming, another, assigned, told_state
+from alula.repair.naming import Renaming, another, assigned, listed, plain, sentence, told_resource, told_state
 from alula.repair.purposes import Purpose, Purposes, asked_of_others, broken_by, shows_done
 from alula.repair.subject import Subject, texts_of
 from alula.trees.attributes import is_port, node_name, type_name
@@ -84,7 +84,7 @@ class StandIns:
             name = f"{self._sources.words.leaf(instead[failing.skill].name)} instead"
         elif name == node_name(made.top):
             name = f"{name} instead"
-        top = node("Sequence", opening(*self._guard(made.top, instead), "@degraded := true"), made.top, name=name)
+        top = node("Sequence", *opening(*self._guard(made.top, instead), "@degraded := true"), made.top, name=name)
         tree_name = renaming.identifier(place.get("ID"))
         if not tree_name or tree_name in self._trees:
             tree_name = "_".join(name.lower().split())
@@ -163,7 +163,6 @@ class _Making:
                 leaves.append(one)
             for one in list(top.iterate()):
                 _rename(one, renaming, name, purpose.name)
-        why = [f"{_and(f'{purpose.skill.name} in the place of {_short(name)}' for name, purpose in instead.items())}."]
         for name, purpose in instead.items():
             for holder in held[name] or ():
                 for leaf in [one for one in leaves if one.tag == purpose.name]:
@@ -171,20 +170,19 @@ class _Making:
                     if added is None:
                         return None
                     leaves += added
-                (resource,) = holder.holds
-                brought = self._purposes.bringers(holder)[:1] if bringing else []
-                after = "".join(f", after {one.skill.name}" for one in brought)
-                why.append(f"{holder.skill.name} holds {resource} meanwhile{after}.")
         names = assigned([(one.tag, node_name(one)) for one in leaves], self._subject.names_asked())
         for number, name in names.items():
             leaves[number].set("name", name)
+        why = [f"{listed(dict.fromkeys(node_name(one) for one in leaves if one.tag in {each.name for each in instead.values()}))}."]
         for parallel, leaf in self._parallels:
-            holding, within = parallel.children
-            parallel.set("name", f"{node_name(holding)} and {node_name(leaf)}")
-            within.set("name", f"then {node_name(leaf)}")
+            (held_by,) = self._purposes.known[type_name(parallel.children[0])].holds
+            parallel.set("name", f"{node_name(leaf)} with the {told_resource(held_by)} held")
+            parallel.children[1].set("name", "once it is held")
+            skill = sentence(plain(leaf.tag))
+            why.append(f"{skill} leaves the {told_resource(held_by)} free: {node_name(parallel.children[0])} meanwhile.")
         if once and not self._unless_done(top):
             return None
-        return _Made(top.children[0], (*why, "What is done already is left out.") if once else tuple(why))
+        return _Made(top.children[0], (*dict.fromkeys(why), "What is done already is left out.") if once else tuple(dict.fromkeys(why)))
 
     def _unless_done(self, top: Element) -> bool:
         """Have what can't be started again once it is done left out then; tell whether there is anything of that kind."""
@@ -244,14 +242,6 @@ def _ends_it(purpose: Purpose, resource: Resource) -> bool:
 def _is_broken(purpose: Purpose, at: str, state: str) -> bool:
     skillset, _, resource = at.partition(".")
     return purpose.skillset.name == skillset and broken_by(purpose.skill, resource, state) is not None
-
-
-def _short(skill: str) -> str:
-    return skill.rpartition(".")[2]
-
-
-def _and(several: Iterable[str]) -> str:
-    return " and ".join(several)
 
 
 def _rename(element: Element, renaming: Renaming, old: str, new: str) -> None:

@@ -107,7 +107,7 @@ def test_else_it_gives_up_its_task_and_the_other_one_goes_there(fleet: Path) -> 
     answer = repaired(subject(fleet), "carrier_base.turn")
     assert answer.repair is not None
     assert answer.repair.branch.as_xml().splitlines()[-1] == '<Script name="not done: scout looks" code="@degraded := true"/>'
-    assert "carrier_base.drive comes later, and is for arrival, too. -->" in " ".join(answer.repair.text.split())
+    assert "go on without 'scout looks'; carrier_base.drive comes later, for the same arrival. -->" in " ".join(answer.repair.text.split())
 
 
 @pytest.mark.parametrize(("first", "then"), [("scout", "scout"), ("carrier", "scout")])
@@ -130,7 +130,7 @@ def test_what_nobody_knows_fails_nothing(fleet: Path, middle: str) -> None:
 
 def test_names_with_two_hyphens_are_no_end_of_a_comment(fleet: Path) -> None:
     path = subject(fleet).path
-    path.write_text(path.read_text().replace("scout's eyes", "the eyes --> of it"))
+    path.write_text(path.read_text().replace("scout looks", "the eyes --> of it"))
     answer = repaired(Subject.read(path, pytest.fail), "carrier_base.turn")
     assert answer.repair is not None
     assert "'the eyes - -> of it'" in answer.repair.text

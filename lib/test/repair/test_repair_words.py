@@ -47,15 +47,14 @@ def test_a_branch_has_the_words_of_the_models(tmp_path: Path, monkeypatch: pytes
     assert branch(subject, "laser") == WRITTEN
 
 
-WRITTEN = """<!--
-When 'scan' fails (fault laser): creep, which needs touch meanwhile.
--->
+WRITTEN = """<!-- The laser is broken: creep. 'feel' is the touch that creep needs. -->
 <BehaviorTree ID="creep_instead">
 <Sequence name="creep instead">
-<ScriptCondition name="the laser is broken" code="eyes.laser == BROKEN" _onSuccess="@degraded := true"/>
-<Parallel name="feel and creep" success_count="1" failure_count="1">
+<ScriptCondition name="the laser is broken" code="eyes.laser == BROKEN"/>
+<Script name="degraded" code="@degraded := true"/>
+<Parallel name="creep with touch" success_count="1" failure_count="1">
 <eyes.feel name="feel"/>
-<Sequence name="with touch">
+<Sequence name="once there is touch">
 <WaitFor name="there is touch" if="progress(eyes.feel) &gt;= 1"/>
 <base.creep name="creep" to="{goal}"/>
 </Sequence>
@@ -76,7 +75,7 @@ def test_the_robots_other_missions_say_what_things_are_called(tmp_path: Path, mo
     assert '<eyes.feel name="feel ahead"/>' in text
     assert '<WaitFor name="the bumper feels" ' in text
     assert '<base.creep name="creep along" to="{goal}"/>' in text
-    assert '<Parallel name="feel ahead and creep along" ' in text
+    assert '<Parallel name="creep along with touch" ' in text
 
 
 def test_a_skill_that_nobody_names_is_called_by_its_name() -> None:
