@@ -85,17 +85,29 @@ def flown() -> list[tuple[int, np.ndarray, np.ndarray, np.ndarray]]:
     return rows
 
 
-def findings(*, fx: float = 240.0, baseline_m: float = 0.12, drift: float = 0.0, poses: bool = True, until: int = VIEWS) -> list:
-    """Return what the rig says of the flight, with this camera_info and an autopilot whose ways are so much too long."""
+def take_infos(rig, *, fx: float = 240.0, baseline_m: float = 0.12, right_cx: float = 239.5) -> None:
+    for side, shift, cx in (("left", 0.0, 239.5), ("right", -fx * baseline_m, right_cx)):
+        P = [fx, 0.0, cx, shift, 0.0, fx, 134.5, 0.0, 0.0, 0.0, 1.0, 0.0]  # noqa: N806 -- the message's name
+        rig.take_info(side, CameraInfo(width=480, height=270, P=P))
+
+
+def findings(*, drift: float = 0.0, poses: bool = True, until: int = VIEWS, changes=None, **infos: float) -> list:
+    """Return what the rig says of the flight, with this camera_info and an autopilot whose ways are so much too long.
+
+    ``changes`` are other camera_infos by the number of the pair before which they come.
+    """
     rows = flown()[:until]
     known = {stamp_ns: pose.copy() for stamp_ns, _, _, pose in rows}
     for pose in known.values():
         pose[0, 3] *= 1.0 + drift
     rig = StereoRig(ZedSettings(), known.get if poses else (lambda _stamp_ns: None))
-    for side, shift in (("left", 0.0), ("right", -fx * baseline_m)):
-        P = [fx, 0.0, 239.5, shift, 0.0, fx, 134.5, 0.0, 0.0, 0.0, 1.0, 0.0]  # noqa: N806 -- the message's name
-        rig.take_info(side, CameraInfo(width=480, height=270, P=P))
-    return [rig.finding(StereoPair(stamp_ns, left, right)) for stamp_ns, left, right, _ in rows]
+    take_infos(rig, **infos)
+    found = []
+    for k, (stamp_ns, left, right, _) in enumerate(rows):
+        if changes and k in changes:
+            take_infos(rig, **changes[k])
+        found.append(rig.finding(StereoPair(stamp_ns, left, right)))
+    return found
 
 
 @pytest.mark.parametrize("drift", [-0.05, 0.0, 0.05])
@@ -134,3 +146,30 @@ def test_a_wrong_scale_is_forgotten_when_motion_shows_a_right_one() -> None:
         judged.append(judge.finding.verdict)
     # Half of the last six estimates accuse, more than half acquit.
     assert judged == [Verdict.OK] * 12 + [Verdict.BROKEN] * 11 + [Verdict.OK] * 7
+
+
+CHANGED = {
+    "baseline": ({"baseline_m": 0.18}, "the baseline from 0.120 to 0.180 m"),
+    "focal length": ({"fx": 312.0}, "the focal length from 240.0 to 312.0 px"),
+    "principal point": ({"right_cx": 249.5}, "the distance of both principal points from 0.0 to -10.0 px"),
+}
+
+
+@pytest.mark.parametrize("name", CHANGED)
+def test_a_camera_info_that_changes_in_flight_is_not_believed_until_the_earlier_one_is_back(name) -> None:
+    changed, sentence = CHANGED[name]
+    found = findings(changes={6: changed, 14: {}})
+    assert [finding.ok for finding in found] == [True] * 6 + [False] * 8 + [True] * 10
+    assert (found[6].verdict, found[6].fault) == (Verdict.UNKNOWN, FaultKind.INFO)
+    assert found[6].reason.startswith(f"camera_info has changed while images came, {sentence}: ")
+
+
+def test_a_camera_info_that_is_mended_in_flight_is_believed_once_motion_shows_that_it_is_right() -> None:
+    found = findings(baseline_m=0.15, changes={3: {}})
+    assert found[2].ok
+    assert found[3].verdict is Verdict.UNKNOWN
+    assert found[-1].ok
+
+
+def test_a_camera_info_of_the_same_camera_is_no_other_one() -> None:
+    assert all(finding.ok for finding in findings(changes={6: {"baseline_m": 0.121}, 9: {"fx": 242.0}}))

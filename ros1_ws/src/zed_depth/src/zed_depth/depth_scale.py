@@ -60,6 +60,11 @@ class ScaleJudge:
         self.finding: Finding = FINE
         """What was found last: a wrong scale stays wrong while the vehicle stands, until motion shows otherwise."""
 
+    @property
+    def judged(self) -> bool:
+        """Whether there are enough estimates."""
+        return len(self._estimates) >= self._limits.estimates
+
     def compare(self, views: Compared, geometry: StereoGeometry) -> None:
         """Take two views of a vehicle that moved in between."""
         near = views.seen.disparity_px - geometry.offset_px >= LEAST_DISPARITY_PX
@@ -73,7 +78,7 @@ class ScaleJudge:
         known.append((stamp_ns, scale))
         while len(known) > limits.estimates or not 0 <= stamp_ns - known[0][0] <= limits.window_s * NS:
             known.popleft()
-        if len(known) < limits.estimates:
+        if not self.judged:
             return
         error = float(np.median([each for _, each in known])) - 1.0
         if abs(error) <= limits.max_error:

@@ -16,6 +16,7 @@ from zed_depth.feature_motion import Compared, Views
 from zed_depth.fixed_columns import fixed_columns_finding
 from zed_depth.image_fit import fit_of
 from zed_depth.image_health import SHARPNESS_FELL, ImageJudge
+from zed_depth.info_change import change_finding
 from zed_depth.stereo import DisparityRange, StereoMatcher, depth_of
 from zed_depth.torn_images import TornJudge
 from zed_depth.vergence import VergenceJudge, VergenceLimits
@@ -65,6 +66,9 @@ class StereoRig:
     depth or a parallax than in the pair before, the pair is in doubt, and so are those after it until both images were found to fit again.
     Where depths are measured, each pair is judged by whether its images fit each other at them, else a pair of every ``view_period_s`` is.
     ``camera_pose`` tells the left camera's pose, without which the scale of the depths can't be judged.
+
+    A camera_info that changes after good pairs makes the rig unknown, until the earlier one is back, or the vehicle's motion has shown
+    that the depths are right with the new one.
     """
 
     def __init__(self, settings: ZedSettings, camera_pose: CameraPose = lambda _stamp_ns: None) -> None:
@@ -78,6 +82,8 @@ class StereoRig:
         self._matching = Lock()
         self._calibration: StereoCalibration | None = None
         self._info_finding = unsure(FaultKind.INFO, "no camera_info of both sides yet")
+        self._good_calibration: StereoCalibration | None = None  # that of the last good pair
+        self._change = FINE  # of the calibration, from that one on
         self._matcher: tuple[StereoCalibration, StereoMatcher, Mask | None] | None = None
         self._view = FINE
         self._view_ns: int | None = None
@@ -112,6 +118,8 @@ class StereoRig:
             finding = broken(FaultKind.INFO, str(error))
         with self._lock:
             self._calibration, self._info_finding, self._view_ns = calibration, finding, None
+            good = self._good_calibration
+            self._change = FINE if good is None or calibration is None else change_finding(good, calibration)
             self._valid, self._fit, self._matched_ns = FINE, FINE, None
             self._shares, self._sample, self._doubted_ns = {}, None, None
         self._begin_motion()
@@ -137,7 +145,10 @@ class StereoRig:
         if prepared is not None:
             self._view_checked(pair.stamp_ns, prepared, calibration.geometry)
         with self._lock:
-            return first_trouble(self._view, self._vergence.finding, self._scale.finding, self._fit, self._valid)
+            finding = first_trouble(self._view, self._vergence.finding, self._scale.finding, self._fit, self._valid)
+            if finding.ok and (self._change.ok or (self._scale.judged and self._vergence.judged)):
+                self._good_calibration, self._change = calibration, FINE
+            return first_trouble(finding, self._change)
 
     def _view_checked(self, stamp_ns: int, images: tuple[Gray, Gray], geometry: StereoGeometry) -> None:
         """Hold both images (h, w) against each other, and their features against those of views before."""

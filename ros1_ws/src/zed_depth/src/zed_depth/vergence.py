@@ -68,6 +68,11 @@ class VergenceJudge:
         self.finding: Finding = FINE
         """What was found last: what is turned stays so until a knock, or motion, shows otherwise."""
 
+    @property
+    def judged(self) -> bool:
+        """Whether the motion has told enough estimates."""
+        return len(self._estimates) >= self._limits.estimates
+
     def look(self, stamp_ns: int, landmarks: Landmarks, right: Gray, geometry: StereoGeometry, camera_pose: CameraPose) -> bool | None:
         """Take a view's features, and its right image by the light of the left one; return whether there was a knock since the last judged.
 
@@ -105,7 +110,7 @@ class VergenceJudge:
         known.append((stamp_ns, offset_px))
         while len(known) > limits.estimates or not 0 <= stamp_ns - known[0][0] <= limits.window_s * NS:
             known.popleft()
-        if len(known) < limits.estimates:
+        if not self.judged:
             return
         middle = float(np.median([each for _, each in known]))
         if abs(middle) > limits.max_px:
