@@ -22,7 +22,7 @@ Come = Callable[[int, int, Outcome], tuple[int, ...]]
 
 
 class Group(NamedTuple):
-    """Situations at rest: each choice of ``managers``, sorted by how soon they come; ``region`` has them all."""
+    """Situations at rest: each choice of ``managers``, sorted by how soon they come; ``region`` is the first that has them all."""
 
     region: int
     memory: int
@@ -63,8 +63,9 @@ class Ending:
         self._regions = regions
         self._memories = regions.system.ticker.memories
         self._come = come
-        self.groups = list(groups)
-        self._sets: list[Sets] = [tuple(regions.same(frozenset(one)) for one in group.managers) for group in self.groups]
+        self.groups: list[Group] = []
+        self._sets: list[Sets] = []
+        self._keep(groups)
         self._ways: list[_Way] = []
         self._coming: dict[tuple[int, int, frozenset[int]], tuple[frozenset[int], frozenset[tuple[int, ...]]]] = {}
         """By a skillset's place, the identity of an outcome and managers before it, what of each of them has to be in a target."""
@@ -73,6 +74,16 @@ class Ending:
         self._sure: defaultdict[int, list[Sets]] = defaultdict(list)
         self._tried: dict[int, int | None] = {}
         """By the identity of ways how many of the groups that are sure were tried as targets; None: one is."""
+
+    def _keep(self, groups: Iterable[Group]) -> None:
+        """Keep each group once: regions that differ in what is not at rest have the same ones."""
+        known: set[tuple[int, Sets]] = set()
+        for group in groups:
+            sets = tuple(self._regions.same(frozenset(one)) for one in group.managers)
+            if (group.memory, sets) not in known:
+                known.add((group.memory, sets))
+                self.groups.append(group)
+                self._sets.append(sets)
 
     def doubtful(self, values: Values, deadline: Deadline) -> list[Group]:
         """Return those in doubt while data have these values, in their order; raises OutOfTimeError."""

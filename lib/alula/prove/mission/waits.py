@@ -7,10 +7,11 @@ at situations at rest, from one tick to the next: the mission never ends after o
 from __future__ import annotations
 
 from collections import deque
-from collections.abc import Iterable, Iterator, Mapping
+from collections.abc import Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from functools import partial
 from itertools import product
+from typing import NamedTuple
 
 from alula.common.graphs import reachable_from
 from alula.prove.limits import Deadline, OutOfTimeError
@@ -19,7 +20,7 @@ from alula.prove.mission.ending import Ending, Group
 from alula.prove.mission.fitting import Values, agree, all_values, answers
 from alula.prove.mission.measured import DATA
 from alula.prove.mission.oracle import Answer, Asked, Question
-from alula.prove.mission.regions import Regions
+from alula.prove.mission.regions import Closure, Regions
 from alula.prove.mission.state import Event, State
 from alula.prove.mission.ticking import Outcome
 from alula.prove.mission.words import choice
@@ -35,6 +36,13 @@ class _AfterTick:
     come: tuple[dict[int, tuple[int, ...]], ...]
 
 
+class _Resting(NamedTuple):
+    """Managers at rest of one skillset, sorted by how soon they come: those that live, and those that have died."""
+
+    alive: tuple[int, ...]
+    dead: tuple[int, ...]
+
+
 class Waits:
     """The situations at rest in which a mission can be, and those after which it never ends."""
 
@@ -42,6 +50,8 @@ class Waits:
         self._regions = regions
         self._system = regions.system
         self._calm = calm_of(regions.system, terminating=True)
+        self._resting_in: dict[int, _Resting] = {}
+        """By the identity of closures."""
         self._at_rest: dict[tuple[int, int], tuple[int, ...]] = {}
         self._after_ticks: dict[int, _AfterTick] = {}
         """By the identity of what a tick comes to, which the ticker keeps: these are asked for of millions of situations."""
@@ -118,12 +128,20 @@ class Waits:
             deadline.check()
             if not self._system.ticker.memories[region.memory].started or self._over(region.memory):
                 continue
-            resting = [
-                sorted((one for one in closure.all if self._rests(place, one)), key=closure.depth.__getitem__)
-                for place, closure in enumerate(region.closures)
-            ]
-            for choices in self._one_dead(resting):
-                yield Group(number, region.memory, tuple(map(tuple, choices)))
+            resting = [self._resting_of(place, closure) for place, closure in enumerate(region.closures)]
+            for choices in _one_dead(resting):
+                yield Group(number, region.memory, choices)
+
+    def _resting_of(self, place: int, closure: Closure) -> _Resting:
+        """Return the managers at rest of those that can come of others; the regions keep the closures, which are few."""
+        known = self._resting_in.get(id(closure))
+        if known is None:
+            rests = sorted((one for one in closure.all if self._rests(place, one)), key=closure.depth.__getitem__)
+            living = [self._system.managers_of(one).states is not None for one in rests]
+            alive = tuple(one for one, lives in zip(rests, living, strict=True) if lives)
+            dead = tuple(one for one, lives in zip(rests, living, strict=True) if not lives)
+            known = self._resting_in[id(closure)] = _Resting(alive, dead)
+        return known
 
     def _situations(self, groups: Iterable[Group], found: dict[State, int], deadline: Deadline) -> None:
         """Add those of groups, each with the first region that has it."""
@@ -133,15 +151,6 @@ class Waits:
                 if (group.memory, managers) not in found:
                     found[State(group.memory, managers)] = group.region
                     deadline.check()
-
-    def _one_dead(self, resting: list[list[int]]) -> Iterator[list[list[int]]]:
-        """Yield the managers that live, and with those of one skillset dead."""
-        alive = [[one for one in several if self._system.managers_of(one).states is not None] for several in resting]
-        yield alive
-        for place, several in enumerate(resting):
-            dead = [one for one in several if one not in alive[place]]
-            if dead:
-                yield [*alive[:place], dead, *alive[place + 1 :]]
 
     def _explore(self, todo: list[State], deadline: Deadline, values: Values) -> None:
         """Look at what comes after situations while data have these values."""
@@ -216,3 +225,12 @@ class Waits:
             seen = reachable_from([number], lambda one: (after for event, after in moves(place, one) if self._calm(event)))
             self._at_rest[key] = tuple(one for one in sorted(seen) if self._rests(place, one))
         return self._at_rest[key]
+
+
+def _one_dead(resting: Sequence[_Resting]) -> Iterator[tuple[tuple[int, ...], ...]]:
+    """Yield the managers that live, and with those of one skillset dead."""
+    alive = tuple(one.alive for one in resting)
+    yield alive
+    for place, one in enumerate(resting):
+        if one.dead:
+            yield (*alive[:place], one.dead, *alive[place + 1 :])
