@@ -106,6 +106,15 @@ def test_groups_after_which_a_mission_surely_ends_hide_no_wait(tree: str, tmp_pa
     assert found() == by_groups
 
 
+def test_situations_at_rest_of_several_regions_are_looked_at_once(tmp_path: Path) -> None:
+    regions = Regions(System.of(MissionFile.read(written(tmp_path, "", TREE), skillsets(), NO_PART), LOOKED_AT), Deadline.after(100.0))
+    regions.explore()
+    looked = Waits(regions)
+    groups = list(looked._groups(Deadline.after(100.0)))
+    again = [group._replace(region=group.region + len(groups)) for group in groups]
+    assert Ending(regions, [*groups, *again], looked._at_rest_after).groups == groups
+
+
 def test_what_every_end_brings_needs_no_search(tmp_path: Path) -> None:
     regions = Regions(System.of(MissionFile.read(written(tmp_path, "", TREE), skillsets(), NO_PART), LOOKED_AT), Deadline.after(100.0))
     regions.explore()
