@@ -358,6 +358,6 @@ def test_an_encoder_is_heard_of_while_simulated_time_stands_and_tells_nothing_ne
     heard: list[VideoState] = []
     subscriber = rospy.Subscriber("/video_stream/state", VideoState, heard.append)
     until(lambda: len(heard) > HEARD, what="it is heard of by the monotonic clock")
-    assert len({one.header.stamp for one in heard}) == 1
+    assert len({one.header.stamp for one in heard[2:]}) == 1, "the first ones may be of ticks that were under way"
     assert all(one.streaming for one in heard)
     subscriber.unregister()
