@@ -68,7 +68,10 @@ def leave(node: Any) -> None:
 
 
 def stop_discovery(node: Any) -> bool:
-    """Have the nodes of a context learn no more of others; return whether that was done: not where the DDS is another one."""
+    """Have all nodes of a context learn no more of others, for good; return whether that was done: not where the DDS is another one.
+
+    `leave` does it where the context ends. In a context that goes on, no later node would find a service or a topic.
+    """
     library = _library()
     if library is None:
         return False

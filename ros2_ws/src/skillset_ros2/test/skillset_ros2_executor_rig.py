@@ -24,7 +24,7 @@ from rclpy.waitable import NumberOfEntities  # noqa: E402
 from std_msgs.msg import String  # noqa: E402
 from std_srvs.srv import Trigger  # noqa: E402
 
-from alula.common.fast_dds import stop_discovery  # noqa: E402
+from alula.common.fast_dds import leave  # noqa: E402
 from alula_testing.waits import until  # noqa: E402
 from skillset_ros2 import ActionClient  # noqa: E402
 from skillset_ros2.executor import LastingWaitable, RclpyExecutor, SparingExecutor  # noqa: E402
@@ -46,8 +46,9 @@ def kind(request):
 def context(ros2_domain):
     context = Context()
     rclpy.init(context=context)
+    first = make_node(context, "first")
     yield context
-    context.try_shutdown()
+    leave(first)
 
 
 def make_node(context, name):
@@ -58,7 +59,6 @@ def make_node(context, name):
 def node(context):
     node = make_node(context, "served")
     yield node
-    stop_discovery(node)
     node.destroy_node()
 
 
@@ -66,7 +66,6 @@ def node(context):
 def other(context):
     node = make_node(context, "other")
     yield node
-    stop_discovery(node)
     node.destroy_node()
 
 

@@ -12,7 +12,6 @@ from py_trees.behaviour import Behaviour  # noqa: E402
 from py_trees.common import Status  # noqa: E402
 from rclpy.parameter import Parameter  # noqa: E402
 
-from alula.common.fast_dds import stop_discovery  # noqa: E402
 from alula.missions.blackboard import Blackboard  # noqa: E402
 from alula.missions.conditions import Condition  # noqa: E402
 from alula.missions.director import Outcome  # noqa: E402
@@ -82,7 +81,6 @@ def begun(ros2_domain, tmp_path):
 
     yield begin
     for node in nodes:
-        stop_discovery(node)
         node.destroy_node()
 
 
