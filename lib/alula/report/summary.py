@@ -16,7 +16,7 @@ from alula.common.run_log import ACT, read
 from alula.common.scenarios import load_scenario
 from alula.report.ends import read_end, true_reason, with_dead
 from alula.report.facts import Death, RunFacts
-from alula.report.files import Problems, ReportError, mapping, read_json, sequence
+from alula.report.files import Problems, ReportError, finite, mapping, read_json, sequence
 from alula.report.history import History
 from alula.report.mock_account import MockSummary
 from alula.report.observed import Observed
@@ -102,9 +102,13 @@ def came_back(history: History, observed: Observed, phases: Phases) -> bool | No
 
 
 def duration_s(history: History, observed: Observed, phases: Phases) -> float | None:
-    """Return seconds from the departure until the robot was back, or to the last thing that was recorded if it never was."""
+    """Return seconds from the departure until the robot was back, or to the last thing that was recorded if it never was.
+
+    Of a robot without a state of departure: from the mission's start to its end, by its own account.
+    """
     if not phases.departed:
-        return None
+        start_s, end_s = (finite(history.mission.get(name)) for name in ("start_s", "end_s"))
+        return None if home() is not None or start_s is None or end_s is None else round(end_s - start_s, 3)
     ends = [history.last_s, observed.last_s]
     end_s = phases.back_s or max((end for end in ends if end is not None), default=None)
     return phases.since(end_s)

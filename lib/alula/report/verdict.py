@@ -153,7 +153,7 @@ def verdict_lines(summary: Mapping[str, Any], died: Sequence[Death], out: Path) 
     lines += [f"  it still waited for {wait}" for wait, over in read_waits(out).items() if not over]
     if summary.get("mock"):
         lines += mock_lines(summary)
-    elif summary.get("landed") is not None or summary.get("distance_m") is not None:  # else nothing is known of a way
+    elif any(summary.get(name) is not None for name in ("landed", "duration_s", "distance_m")):
         lines += world_lines(summary)
     lines += task_lines(summary)
     recovery = summary.get("recovery") or {}
