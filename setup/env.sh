@@ -12,7 +12,6 @@ unset PYTHONDONTWRITEBYTECODE
 export OMP_NUM_THREADS="${OMP_NUM_THREADS:-1}" OPENBLAS_NUM_THREADS="${OPENBLAS_NUM_THREADS:-1}"
 export MPLBACKEND=Agg
 _path=/usr/local/sbin:/usr/local/bin:/usr/sbin:/usr/bin:/sbin:/bin _robot=""
-robot_packages1=""
 # The ROS that this installation stands on, where it has none of its own; what a robot names below itself begins with that.
 [ ! -f "$ALULA_STATE/given$1.env" ] || . "$ALULA_STATE/given$1.env"
 if [ -n "$ALULA_ROBOT_STATE" ] && [ -x "$ALULA_ROBOT_STATE/venv$1/bin/python3" ]; then
@@ -25,7 +24,7 @@ export PATH="${_robot:+$_robot/venv$1/bin:}$ALULA_STATE/venv$1/bin:${ALULA_UNDER
 case "$1" in
   1)
     export ROS_VERSION=1 ROS_PYTHON_VERSION=3 ROS_ETC_DIR="${ROS_ETC_DIR:-/etc/ros}"
-    export ROS_PACKAGE_PATH="${robot_packages1:+$robot_packages1:}$ALULA_STATE/ros1/src:${ALULA_UNDERLAY_PACKAGES:+$ALULA_UNDERLAY_PACKAGES:}/usr/share"
+    export ROS_PACKAGE_PATH="${_robot:+$_robot/ros1/src:}$ALULA_STATE/ros1/src:${ALULA_UNDERLAY_PACKAGES:+$ALULA_UNDERLAY_PACKAGES:}/usr/share"
     export CMAKE_PREFIX_PATH="${_robot:+$_robot/ros1/devel:}$ALULA_STATE/ros1/devel:$_below/usr"
     # As a workspace's own set-up does: nodes of Alula, which run under its Python, load the robot's messages by their names.
     [ -z "$_robot" ] || export PYTHONPATH="$_robot/ros1/devel/lib/python3/dist-packages"

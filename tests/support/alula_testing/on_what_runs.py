@@ -41,7 +41,7 @@ def fly_on_what_runs(robot: Path, run: Run, environment: dict[str, str]) -> None
         "ROS_HOME": str(robot / ".ros"),
         "ALULA_ROBOT": str(robot),
     }
-    launch = [str(ALULA_ROOT / "setup/in_ros1"), "roslaunch", "-p", str(port), "ros1_ws/src/rover_base/launch/base.launch"]
+    launch = [str(ALULA_ROOT / "setup/in_ros1"), "roslaunch", "-p", str(port), "rover_base", "base.launch"]
     state = robot / ".alula/up/robot/state.json"
     with (robot / "base.log").open("wb") as log:
         base = subprocess.Popen(launch, cwd=robot, env={**environment, **graph}, stdout=log, stderr=log, start_new_session=True)
