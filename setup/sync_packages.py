@@ -31,7 +31,7 @@ def normalized(name: str) -> str:
 
 
 def applies(marker: str, python: tuple[int, int]) -> bool:
-    """Tell whether a pin is for this version of Python: ``python_version < "3.12"``, ``python_version >= "3.12"`` or nothing."""
+    """Return whether a pin is for this version of Python: ``python_version < "3.12"``, ``python_version >= "3.12"`` or nothing."""
     match = MARKER.fullmatch(marker)
     if match is None:
         raise SystemExit(f"error: the condition '{marker}' of a pin is not known; write python_version < \"3.12\", or >=")
@@ -48,7 +48,7 @@ def read_pins(path: Path, python: tuple[int, int] = sys.version_info[:2], *, run
 
 
 def whole(distribution: Distribution) -> bool:
-    """Tell whether all files that pip recorded are still there; compiled ones are made again when they are needed."""
+    """Return whether all files that pip recorded are still there; compiled ones are made again when they are needed."""
     # Not by `files`: since Python 3.12 that leaves out what is missing.
     recorded = (row[0] for row in csv.reader((distribution.read_text("RECORD") or "").splitlines()))
     return all(Path(str(distribution.locate_file(file))).exists() for file in recorded if not file.endswith(".pyc"))

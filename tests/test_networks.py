@@ -9,7 +9,7 @@ from alula_testing.waits import HANGS_S
 
 
 def reaches(one, other):
-    """Tell whether a connection to a closed port is refused, which takes a packet there and one back."""
+    """Return whether a connection to a closed port is refused, which takes a packet there and one back."""
     probe = f"exec 3<>/dev/tcp/{other.address}/9"
     done = subprocess.run(one.command("timeout", "0.5", "bash", "-c", probe), capture_output=True, text=True, check=False)
     return "refused" in done.stderr

@@ -153,12 +153,12 @@ class AttachedSupervisor:
 
     @property
     def _told_to_end(self) -> bool:
-        """Tell whether somebody, or the run's limit, wants the run to end."""
+        """Return whether somebody, or the run's limit, wants the run to end."""
         return self._asked is not None or self.front_died or self._over_time
 
     @property
     def _over_time(self) -> bool:
-        """Tell whether the mission has lasted for as long as it may."""
+        """Return whether the mission has lasted for as long as it may."""
         return bool(self._spec.limit_s) and (self._clock.now_s or 0.0) - self._began_s > self._spec.limit_s
 
     def _note_abort(self) -> None:

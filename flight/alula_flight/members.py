@@ -46,12 +46,12 @@ class Member:
 
     @property
     def lives(self) -> bool:
-        """Tell whether it was started, and has not ended."""
+        """Return whether it was started, and has not ended."""
         return self.process is not None and self.process.poll() is None
 
     @property
     def has_begun(self) -> bool:
-        """Tell whether it starts its robot: it refuses nothing any more of what it is asked."""
+        """Return whether it starts its robot: it refuses nothing any more of what it is asked."""
         return (self.folder / FILE).exists()
 
     @property

@@ -37,7 +37,7 @@ class MissionClock:
 
     @property
     def simulated(self) -> bool:
-        """Tell whether it is known to be ``/clock``."""
+        """Return whether it is known to be ``/clock``."""
         return bool(self._simulated)
 
     def _tick(self, message: Any) -> None:
@@ -52,12 +52,12 @@ class MissionClock:
 
     @property
     def began(self) -> bool:
-        """Tell whether it is known."""
+        """Return whether it is known."""
         return self.now_s is not None
 
     @property
     def stands_still(self) -> bool:
-        """Tell whether the clock has not moved for so long that nothing will move it any more."""
+        """Return whether the clock has not moved for so long that nothing will move it any more."""
         timeout_s = STANDSTILL_TIMEOUT_S if self.began else START_TIMEOUT_S
         return self.simulated and time.monotonic() - self._moved > timeout_s
 

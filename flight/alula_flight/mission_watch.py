@@ -30,6 +30,6 @@ class MissionWatch:
 
     @property
     def silent(self) -> bool:
-        """Tell whether the mission has been heard, and has not for so long that it decides nothing any more."""
+        """Return whether the mission has been heard, and has not for so long that it decides nothing any more."""
         now_s = self._clock.now_s
         return self._heard_s is not None and now_s is not None and now_s - self._heard_s > SILENT_S

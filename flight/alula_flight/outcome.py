@@ -44,7 +44,7 @@ def finish(spec: RunSpec, mission_exit: int | None, monitor: Monitor | None = No
 
 
 def is_recorded(spec: RunSpec) -> bool:
-    """Tell whether the functional layer is recorded in a run; on a deployment it need not be."""
+    """Return whether the functional layer is recorded in a run; on a deployment it need not be."""
     if not spec.deployment:
         return True
     try:

@@ -25,7 +25,7 @@ class Started(Protocol):
     respawn_delay: float
 
     def is_alive(self) -> bool:
-        """Tell whether it runs."""
+        """Return whether it runs."""
 
 
 @dataclass(frozen=True)
@@ -63,12 +63,12 @@ class ProcessFaults:
 
     @property
     def asked(self) -> bool:
-        """Tell whether there are any."""
+        """Return whether there are any."""
         return bool(self._faults)
 
     @property
     def counts(self) -> bool:
-        """Tell whether it is known when the robot departed."""
+        """Return whether it is known when the robot departed."""
         return self._departed_s is not None
 
     def departed(self, at_s: float) -> None:

@@ -81,7 +81,7 @@ def perceive(bag: Path, folder: Path, given: Arguments, *options: str) -> Path:
 
 
 def of_a_node(text: str) -> bool:
-    """Tell whether ``NODE.NAME=VALUE`` is about a node, and not a parameter of the mission."""
+    """Return whether ``NODE.NAME=VALUE`` is about a node, and not a parameter of the mission."""
     return "." in text.partition("=")[0]
 
 

@@ -138,7 +138,7 @@ class Supervisor:
 
     @property
     def front_died(self) -> bool:
-        """Tell whether the front, which makes the report, has died."""
+        """Return whether the front, which makes the report, has died."""
         return self._front_died
 
     def run(self) -> int:
@@ -203,7 +203,7 @@ class Supervisor:
 
     @property
     def _over_time(self) -> bool:
-        """Tell whether the run has lasted for as long as it may, by the mission clock."""
+        """Return whether the run has lasted for as long as it may, by the mission clock."""
         now_s = self._clock.now_s
         if not self._spec.limit_s or now_s is None:
             return False
@@ -244,7 +244,7 @@ class Supervisor:
 
     @property
     def _told_to_end(self) -> bool:
-        """Tell whether somebody, or the run's limit, wants the run to end."""
+        """Return whether somebody, or the run's limit, wants the run to end."""
         return self._asked_to_end is not None or self._front_died or self._over_time
 
     def _look(self) -> None:

@@ -158,7 +158,7 @@ def _entry(one: Name, told: dict[str, str]) -> Iterator[str]:
 
 
 def _is_hooks(node: ast.ClassDef) -> bool:
-    """Tell whether a class is a base of hooks: managers call its methods, and a robot sets its attributes."""
+    """Return whether a class is a base of hooks: managers call its methods, and a robot sets its attributes."""
     return any(ast.unparse(base) == "SkillHooks" for base in node.bases)
 
 

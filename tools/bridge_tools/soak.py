@@ -80,7 +80,7 @@ class SoakFigures:
 
     @property
     def good(self) -> bool:
-        """Tell whether nothing was lost and nothing grew."""
+        """Return whether nothing was lost and nothing grew."""
         lost = self.up.lost + self.down.lost + self.up.disorder + self.down.disorder + len(self.failures)
         return lost == 0 and self.up.sent > 0 and self.calls > 0 and self.grown_mb < GROWTH_LIMIT_MB
 
@@ -185,7 +185,7 @@ class Ends:
         self._down.publish(self._string(data=text))
 
     def connected(self) -> bool:
-        """Tell whether the bridge is at both steady topics."""
+        """Return whether the bridge is at both steady topics."""
         return bool(self._up.get_num_connections() and self._down.get_subscription_count())
 
     def call(self) -> None:

@@ -41,5 +41,5 @@ class Mocks:
 
 
 def differs(row: Mapping[str, Any], mocked: Mocked) -> bool:
-    """Tell whether a flight ended otherwise than over mocks."""
+    """Return whether a flight ended otherwise than over mocks."""
     return bool(row["outcome"] != mocked.outcome)

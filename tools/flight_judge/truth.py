@@ -93,7 +93,7 @@ def truth_of(folder: Path) -> Truth:
 
 
 def at_rest(poses: list[tuple[float, float, float, float]]) -> bool | None:
-    """Tell whether a vehicle with these poses (seconds, map ENU in metres) stands in the end; None: there are none."""
+    """Return whether a vehicle with these poses (seconds, map ENU in metres) stands in the end; None: there are none."""
     if not poses:
         return None
     last = [pose for pose in poses if pose[0] >= poses[-1][0] - REST_S]

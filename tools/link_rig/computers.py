@@ -258,7 +258,7 @@ class Mission:
 
     @property
     def ended(self) -> bool:
-        """Tell whether `alula run` has ended, and all that it has started."""
+        """Return whether `alula run` has ended, and all that it has started."""
         return self._run.poll() is not None and not self._processes
 
     @property

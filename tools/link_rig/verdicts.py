@@ -232,7 +232,7 @@ def _moved_unheard(poses: Sequence[Pose], beats: Sequence[float], still: Still) 
 
 
 def _moves(before: Pose, pose: Pose, still: Still) -> bool:
-    """Tell whether the robot moved, rose or turned between two moments."""
+    """Return whether the robot moved, rose or turned between two moments."""
     lasted_s = pose.stamp_s - before.stamp_s
     moved_m = math.hypot(pose.x - before.x, pose.y - before.y, max(0.0, pose.z - before.z))
     return moved_m > still.m_s * lasted_s or abs(math.remainder(pose.theta - before.theta, math.tau)) > still.rad_s * lasted_s

@@ -33,7 +33,7 @@ def good_logs(flights: int, chance: random.Random) -> Iterator[tuple[Skillset, l
 
 
 def asks_data(skillset: Skillset) -> bool:
-    """Tell whether data or durations decide anything: to prove that such a log is legal, an engine would need their values."""
+    """Return whether data or durations decide anything: to prove that such a log is legal, an engine would need their values."""
     invariants = [one for skill in skillset.skills for one in skill.invariants]
     asked = [one.condition for skill in skillset.skills for one in skill.preconditions] + [one.condition for one in invariants]
     return any(map(data_of, asked)) or any(map(waits, invariants))

@@ -25,7 +25,7 @@ class Count:
 
 
 def conforms(skillset: Skillset, log: Sequence[EngineEvent]) -> bool:
-    """Tell whether a log conforms."""
+    """Return whether a log conforms."""
     monitor = SkillsetMonitor(skillset)
     return all(monitor.take(event) is None for event in log)
 

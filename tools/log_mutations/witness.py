@@ -49,7 +49,7 @@ def stimuli_of(skillset: Skillset, log: Sequence[EngineEvent]) -> list[Stimulus]
 
 
 def legal(skillset: Skillset, log: Sequence[EngineEvent]) -> bool:
-    """Tell whether an engine can be brought to tell this log; False may also mean that the search has not found how."""
+    """Return whether an engine can be brought to tell this log; False may also mean that the search has not found how."""
     stimuli = stimuli_of(skillset, log)
     return stimuli is not None and [_key(event) for event in _played(skillset, stimuli)][: len(log)] == [_key(event) for event in log]
 

@@ -85,7 +85,7 @@ def _places(one: ast.AST, *, in_loop: bool) -> Iterator[tuple[str, Change]]:
 
 
 def _may_go(one: object, *, in_loop: bool) -> bool:
-    """Tell whether a class goes without a statement: a call, or, where no loop needs it, an assignment to what the node has already."""
+    """Return whether a class goes without a statement: a call, or, where no loop needs it, an assignment to what the node has already."""
     if isinstance(one, ast.Expr):
         return isinstance(one.value, ast.Call) and not ast.unparse(one).startswith("super().__init__(")
     return isinstance(one, ast.Assign | ast.AugAssign) and not in_loop and ast.unparse(one).startswith("self.")

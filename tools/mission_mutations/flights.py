@@ -62,7 +62,7 @@ class Campaigned:
 
     @property
     def again(self) -> bool:
-        """Tell whether it is worth to be flown again."""
+        """Return whether it is worth to be flown again."""
         return False
 
     def as_dict(self) -> dict[str, object]:

@@ -90,7 +90,7 @@ class Verdict:
 
     @property
     def again(self) -> bool:
-        """Tell whether it is worth to be judged again."""
+        """Return whether it is worth to be judged again."""
         return self.verdict == MISSED
 
     def as_dict(self) -> dict[str, object]:
@@ -217,7 +217,7 @@ class Judge:
         return "" if changed is None else f"{changed}: {before.get(changed)} becomes {after.get(changed)}"
 
     def _run_of_one_alone(self, looked: Looked) -> bool:
-        """Tell whether a run of one of both flies, and the other leaves it."""
+        """Return whether a run of one of both flies, and the other leaves it."""
         for one, other in ((looked, self.original), (self.original, looked)):
             for run in differing(one.seen, other.seen, CANDIDATES):
                 if self._flown(run, one, one) and not self._flown(run, one, other):

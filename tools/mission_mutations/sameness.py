@@ -60,11 +60,11 @@ class Edge:
     way: tuple[Outcome, Sets]
 
     def like(self, other: Edge) -> bool:
-        """Tell whether both ask for the same, with some managers that are the same, and the same answers of what nobody knows."""
+        """Return whether both ask for the same, with some managers that are the same, and the same answers of what nobody knows."""
         return self.asked == other.asked and self._meets(other)
 
     def unlike(self, other: Edge) -> bool:
-        """Tell whether the same managers and answers can lead to both, and they ask for something else, or end otherwise."""
+        """Return whether the same managers and answers can lead to both, and they ask for something else, or end otherwise."""
         return self.asked != other.asked and self._meets(other)
 
     def _meets(self, other: Edge) -> bool:
@@ -189,12 +189,12 @@ class Seen:
         return (node.name, *_attributes(element))
 
     def _computes(self, node: Node, script: Attribute) -> bool:
-        """Tell whether a script writes values that the search does not keep as they are."""
+        """Return whether a script writes values that the search does not keep as they are."""
         parts = [part for statement in statements_of(script.value) for part in walk(statement)]
         return any(not self._kept(node, part) for part in parts if isinstance(part, Assignment))
 
     def _kept(self, node: Node, part: Assignment) -> bool:
-        """Tell whether an entry gets a value of the file, and never any other."""
+        """Return whether an entry gets a value of the file, and never any other."""
         key = node.blackboard.where(part.target.name) if isinstance(part.target, Name) else None
         reads = self._system.reads
         others = reads.counted.union(reads.flows, *reads.flows.values())
@@ -241,7 +241,7 @@ class Seen:
 
 
 def same(one: Seen, other: Seen) -> bool:
-    """Tell whether it is shown that two missions do the same."""
+    """Return whether it is shown that two missions do the same."""
     if (one.values, one.needs) != (other.values, other.needs):
         return False
     return _Both(one, other).same()
@@ -322,7 +322,7 @@ def _chosen(outcome: Outcome) -> Mapping[Question, tuple[Answer, ...]]:
 
 
 def _agree(one: Mapping[Question, tuple[Answer, ...]], other: Mapping[Question, tuple[Answer, ...]]) -> bool:
-    """Tell whether two ticks can have been given the same answers, though one has asked more than the other."""
+    """Return whether two ticks can have been given the same answers, though one has asked more than the other."""
     return all(a == b for question in one.keys() & other.keys() for a, b in zip(one[question], other[question], strict=False))
 
 

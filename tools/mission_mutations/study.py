@@ -40,7 +40,7 @@ class Judged(Protocol):
 
     @property
     def again(self) -> bool:
-        """Tell whether it is worth to be judged again."""
+        """Return whether it is worth to be judged again."""
 
     def as_dict(self) -> Mapping[str, object]:
         """Return it as JSON has it."""

@@ -38,15 +38,15 @@ class ActionlibServerEnd:
         self._ends = (self._goals, self._cancels, self._status, self._feedback, self._result)
 
     def present(self) -> bool:
-        """Tell whether all five topics have a peer."""
+        """Return whether all five topics have a peer."""
         return all(end.peers() > 0 for end in self._ends)
 
     def gone(self) -> bool:
-        """Tell whether the server's status has no publisher any more."""
+        """Return whether the server's status has no publisher any more."""
         return self._status.peers() == 0
 
     def late(self) -> bool:
-        """Tell whether a result may come late that the server has sent while it was away."""
+        """Return whether a result may come late that the server has sent while it was away."""
         return self._result.late()
 
     def send_goal(self, name: str, payload: bytes) -> None:

@@ -137,11 +137,11 @@ class Ros2ServerEnd:
         self._status = node.create_subscription(GoalStatusArray, self._status_name, self._take_status, qos_profile_action_status_default)
 
     def present(self) -> bool:
-        """Tell whether all services are there."""
+        """Return whether all services are there."""
         return all(client.service_is_ready() for client in (self._goals, self._results, self._cancels))
 
     def has_come(self) -> bool:
-        """Tell whether a server has come since this was last asked: its publisher is a new one."""
+        """Return whether a server has come since this was last asked: its publisher is a new one."""
         before = self._seen
         self._seen = frozenset(bytes(info.endpoint_gid) for info in self._node.get_publishers_info_by_topic(self._status_name))
         return bool(self._seen - before)

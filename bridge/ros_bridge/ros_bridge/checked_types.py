@@ -89,7 +89,7 @@ class CheckedTypes:
         self._refused.add(topic)
 
     def has_version_of(self, header: Mapping[str, str]) -> bool:
-        """Tell whether the topic of a subscriber's header crosses with the definition that the subscriber has."""
+        """Return whether the topic of a subscriber's header crosses with the definition that the subscriber has."""
         answer = self._answers.get(header.get("topic", ""), NOTHING)
         return answer.md5sum == header.get("md5sum")
 

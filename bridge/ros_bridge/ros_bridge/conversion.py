@@ -185,13 +185,13 @@ class Types:
                 self._last_told[name] = ros1
 
     def knows_ros1(self, ros1_name: str) -> bool:
-        """Tell whether ROS 1's own definition of a type is at hand, without asking a publisher."""
+        """Return whether ROS 1's own definition of a type is at hand, without asking a publisher."""
         with self._lock:
             own = (self._ros1_files, self._noetic)
             return ros1_name in self._last_told or any(source.message(ros1_name) is not None for source in own)
 
     def bulky(self, ros2_name: str) -> bool:
-        """Tell whether messages of a ROS 2 type, once paired, can be large: whether there is an array of bytes without an end."""
+        """Return whether messages of a ROS 2 type, once paired, can be large: whether there is an array of bytes without an end."""
         with self._lock:
             return _has_byte_arrays(self._ros2.fielddefs, msg_name(ros2_name), set())
 

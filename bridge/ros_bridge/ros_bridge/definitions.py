@@ -97,7 +97,7 @@ class DefinitionFiles:
         return next((text for folder in self._modules for text in _from_modules(folder / package, short)), None)
 
     def has_service(self, name: str) -> bool:
-        """Tell whether a service ``package/Name`` is here."""
+        """Return whether a service ``package/Name`` is here."""
         return self.message(name + HALVES[0]) is not None
 
     def places(self) -> str:

@@ -225,7 +225,7 @@ class Discovery:
         return True
 
     def _keeps_peers(self, spec: Spec) -> bool:
-        """Tell whether ROS 1 subscribers that a restarted master has forgotten are still connected."""
+        """Return whether ROS 1 subscribers that a restarted master has forgotten are still connected."""
         route = self._table.running().get(spec) if spec in self._kept_after_loss and isinstance(spec, TopicRoute) else None
         return route is not None and cast("TopicBridge", route).target_peers() > 0
 

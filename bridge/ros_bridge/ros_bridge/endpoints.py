@@ -104,7 +104,7 @@ class Ros1Subscriber(_Endpoint):
             return 0 if self._handle is None else int(self._native.route_source_peers(self._handle))
 
     def late(self) -> bool:
-        """Tell whether something may come late that a publisher has sent while it was away."""
+        """Return whether something may come late that a publisher has sent while it was away."""
         with self._lock:
             return self._handle is not None and bool(self._native.route_late_peers(self._handle))
 

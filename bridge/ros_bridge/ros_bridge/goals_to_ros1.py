@@ -40,13 +40,13 @@ class ActionlibServer(Protocol):
     """The server in ROS 1, as far as the goals need it."""
 
     def present(self) -> bool:
-        """Tell whether all five topics have a peer that listens or speaks."""
+        """Return whether all five topics have a peer that listens or speaks."""
 
     def gone(self) -> bool:
-        """Tell whether the server's status has no publisher any more."""
+        """Return whether the server's status has no publisher any more."""
 
     def late(self) -> bool:
-        """Tell whether a result may come late that the server has sent while it was away."""
+        """Return whether a result may come late that the server has sent while it was away."""
 
     def send_goal(self, name: str, payload: bytes) -> None:
         """Publish a goal under this id; ``payload`` is the serialized ROS 1 goal."""
@@ -100,7 +100,7 @@ class GoalToRos1:
 
     @property
     def open(self) -> bool:
-        """Tell whether the goal has been neither rejected nor ended."""
+        """Return whether the goal has been neither rejected nor ended."""
         return self.ended_s is None
 
 
@@ -123,7 +123,7 @@ class GoalsToRos1:
 
     @property
     def busy(self) -> bool:
-        """Tell whether a goal is open."""
+        """Return whether a goal is open."""
         with self.lock:
             return any(goal.open for goal in self._goals.values())
 
@@ -210,7 +210,7 @@ class GoalsToRos1:
             self._move(goal, TO_ROS2[status.status])
 
     def knows(self, status: GoalStatus) -> bool:
-        """Tell whether a status is about a goal of this bridge."""
+        """Return whether a status is about a goal of this bridge."""
         with self.lock:
             return self._find(status) is not None
 

@@ -34,10 +34,10 @@ class Ros2Server(Protocol):
     """The server in ROS 2, as far as the goals need it; what it says comes back in ``on_answer``, ``on_status`` and so on."""
 
     def present(self) -> bool:
-        """Tell whether all its services are there."""
+        """Return whether all its services are there."""
 
     def has_come(self) -> bool:
-        """Tell whether a server has come since this was last asked."""
+        """Return whether a server has come since this was last asked."""
 
     def send_goal(self, goal: bytes, payload: bytes) -> None:
         """Ask the server to accept a goal."""
@@ -85,7 +85,7 @@ class GoalToRos2:
 
     @property
     def open(self) -> bool:
-        """Tell whether the goal has not ended."""
+        """Return whether the goal has not ended."""
         return self.ended_s is None
 
     @property
@@ -113,7 +113,7 @@ class GoalsToRos2:
 
     @property
     def busy(self) -> bool:
-        """Tell whether a goal is open."""
+        """Return whether a goal is open."""
         with self.lock:
             return any(goal.open for goal in self._goals.values())
 
@@ -200,7 +200,7 @@ class GoalsToRos2:
                     goal.ended_in_ros2_s = now_s
 
     def knows(self, goal_uuid: bytes) -> bool:
-        """Tell whether an id is that of a goal of this bridge."""
+        """Return whether an id is that of a goal of this bridge."""
         with self.lock:
             return goal_uuid in self._by_uuid
 

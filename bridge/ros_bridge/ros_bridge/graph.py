@@ -12,7 +12,7 @@ ACTION_PARTS = ("goal", "cancel", "status", "feedback", "result")
 
 
 def is_bridge(node: str) -> bool:
-    """Tell whether a node (its full name) is a bridge: two of them must not take each other's publications for foreign ones."""
+    """Return whether a node (its full name) is a bridge: two of them must not take each other's publications for foreign ones."""
     return node.rpartition("/")[2] in BRIDGE_NODES
 
 

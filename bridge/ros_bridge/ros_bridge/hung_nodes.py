@@ -25,7 +25,7 @@ class HungNodes:
         self._hung: dict[str, _Hung] = {}
 
     def may_be_asked(self, node: str) -> bool:
-        """Tell whether a node has answered the last time, or its pause is over."""
+        """Return whether a node has answered the last time, or its pause is over."""
         with self._lock:
             return node not in self._hung or self._clock_s() >= self._hung[node].until_s
 

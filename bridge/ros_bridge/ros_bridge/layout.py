@@ -115,7 +115,7 @@ def _sequence(body: list[Operation]) -> Iterable[Operation]:
 
 
 def _is_block(body: list[Operation]) -> bool:
-    """Tell whether elements lie one behind the other without padding between them."""
+    """Return whether elements lie one behind the other without padding between them."""
     return len(body) == 1 and body[0].code is Code.FIXED and body[0].b % body[0].a == 0
 
 

@@ -60,11 +60,11 @@ class TypeRules:
         return next((rule.fields for rule in self._rules if (rule.ros1, rule.ros2) == (ros1_type, ros2_type)), {})
 
     def only_told(self, ros1_type: str, ros2_type: str) -> bool:
-        """Tell whether the fields that a rule maps between two types are all that cross."""
+        """Return whether the fields that a rule maps between two types are all that cross."""
         return next((rule.complete for rule in self._rules if (rule.ros1, rule.ros2) == (ros1_type, ros2_type)), False)
 
     def related(self, ros1_type: str, ros2_type: str) -> bool:
-        """Tell whether the two are one type in the rules' eyes."""
+        """Return whether the two are one type in the rules' eyes."""
         return self.to_ros2(ros1_type) == ros2_type or any((rule.ros1, rule.ros2) == (ros1_type, ros2_type) for rule in self._rules)
 
 

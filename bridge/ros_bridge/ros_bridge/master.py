@@ -122,7 +122,7 @@ def wait_for_master(master: Connection, caller_id: str, stop: threading.Event) -
 
 
 def answers(master: Connection, caller_id: str) -> bool:
-    """Tell whether a master answers."""
+    """Return whether a master answers."""
     try:
         master.call("getPid", caller_id)
     except OSError:

@@ -47,7 +47,7 @@ MAKERS: dict[type, Maker] = {TopicRoute: topics.make, ServiceRoute: services.mak
 
 
 def may_send_bulk(config: BridgeConfig, types: Types) -> bool:
-    """Tell whether large messages may be sent in ROS 2: images, clouds, or whatever discovery finds."""
+    """Return whether large messages may be sent in ROS 2: images, clouds, or whatever discovery finds."""
     for spec in config.topics:
         with suppress(BridgeError):  # told when the route is opened
             if spec.direction is Direction.ROS1_TO_ROS2:

@@ -92,7 +92,7 @@ class Pairing:
         return self._codec1.write(msg_name(ros1_type), value)
 
     def same_layout(self, ros1_type: str, ros2_type: str) -> bool:
-        """Tell whether both put the same fields in the same order; some may have been renamed, and ``Header.seq`` is known."""
+        """Return whether both put the same fields in the same order; some may have been renamed, and ``Header.seq`` is known."""
         key = (ros1_type, ros2_type)
         if key not in self._same:
             self._same[key] = self._lie_alike(ros1_type, ros2_type)

@@ -35,7 +35,7 @@ def read_ros2_graph(node: Node) -> Ros2Graph:
 
 
 def all_named(node: Node) -> bool:
-    """Tell whether the node of each publisher and subscription of messages that DDS has seen is known."""
+    """Return whether the node of each publisher and subscription of messages that DDS has seen is known."""
     asked = (node.get_publishers_info_by_topic, node.get_subscriptions_info_by_topic)
     ends = (info for name, _ in node.get_topic_names_and_types() for ask in asked for info in ask(name))
     return not any(info.node_name == UNNAMED and "/msg/" in info.topic_type for info in ends)

@@ -110,7 +110,7 @@ class RouteTable:
                     self._give_up(spec, error)
 
     def started(self, spec: Spec) -> bool:
-        """Tell whether a route forwards messages."""
+        """Return whether a route forwards messages."""
         with self._lock:
             return spec in self._started
 

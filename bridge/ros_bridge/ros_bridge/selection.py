@@ -35,12 +35,12 @@ ROS2_NAME = re.compile(r"(/[A-Za-z_][A-Za-z0-9_]*)+")
 
 
 def is_ros1_name(name: str) -> bool:
-    """Tell whether ROS 1 can have an absolute name."""
+    """Return whether ROS 1 can have an absolute name."""
     return ROS1_NAME.fullmatch(name) is not None
 
 
 def is_ros2_name(name: str) -> bool:
-    """Tell whether ROS 2 can have an absolute name: no part of it begins with a digit."""
+    """Return whether ROS 2 can have an absolute name: no part of it begins with a digit."""
     return ROS2_NAME.fullmatch(name) is not None
 
 
@@ -60,7 +60,7 @@ class Selection:
     parameters: bool = True
 
     def selects(self, ros1_name: str, ros2_name: str) -> bool:
-        """Tell whether a pair of names is to be bridged."""
+        """Return whether a pair of names is to be bridged."""
         names = (ros1_name, ros2_name)
         if not _matches(names, self.include) or _matches(names, self.exclude):
             return False

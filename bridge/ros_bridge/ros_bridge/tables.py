@@ -32,7 +32,7 @@ class Rates:
 
 
 def to_ros2(spec: Spec) -> bool:
-    """Tell whether messages go, or calls are answered, from ROS 1 towards ROS 2."""
+    """Return whether messages go, or calls are answered, from ROS 1 towards ROS 2."""
     return spec.direction is Direction.ROS1_TO_ROS2 if isinstance(spec, TopicRoute) else spec.server is RosVersion.ROS1
 
 

@@ -48,7 +48,7 @@ class Sent:
 
 
 def feedback_arrives(client):
-    """Tell whether a goal brings its answers and feedback.
+    """Return whether a goal brings its answers and feedback.
 
     A reader that has found its writer may still be unknown to it: rmw_fastrtps drops an answer after 0.1 s of that, and rclpy's
     client does not ask again.

@@ -45,7 +45,7 @@ def world(ros2_domain):
 
 
 def works(node):
-    """Tell whether a callback runs."""
+    """Return whether a callback runs."""
     called = threading.Event()
     timer = node.create_timer(0.01, called.set)
     done = called.wait(HANGS_S)

@@ -277,7 +277,7 @@ class _Look:
 
 
 def _may_be_unheard(topic: str) -> bool:
-    """Tell whether a topic of ours is there for whoever wants it: the managers' states and heartbeats, and those of a mission."""
+    """Return whether a topic of ours is there for whoever wants it: the managers' states and heartbeats, and those of a mission."""
     return topic.endswith((STATES, "/alive")) or topic == "/mission/heartbeat"
 
 

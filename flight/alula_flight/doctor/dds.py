@@ -83,7 +83,7 @@ def look_at_multicast(address: str) -> Finding:
 
 
 def multicast_flag(interface: str) -> bool:
-    """Tell whether an interface says that it takes multicast."""
+    """Return whether an interface says that it takes multicast."""
     with socket.socket(socket.AF_INET, socket.SOCK_DGRAM) as one:
         answer = fcntl.ioctl(one, INTERFACE_FLAGS, struct.pack("16sH14s", interface.encode()[:15], 0, b""))
     return bool(struct.unpack("16sH14s", answer)[1] & MULTICAST_FLAG)

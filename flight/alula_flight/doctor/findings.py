@@ -55,7 +55,7 @@ def problem(area: str, what: str, remedy: str) -> Finding:
 
 
 def any_problem(findings: Iterable[Finding]) -> bool:
-    """Tell whether one of them has to be mended."""
+    """Return whether one of them has to be mended."""
     return any(one.level is Level.PROBLEM for one in findings)
 
 

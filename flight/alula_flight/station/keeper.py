@@ -96,7 +96,7 @@ class Kept:
 
     @property
     def differs(self) -> bool:
-        """Tell whether what runs is not what the deployment, its models and its code say by now."""
+        """Return whether what runs is not what the deployment, its models and its code say by now."""
         return self.state.process is not None and bool(differences(self.state, self.part))
 
     @property

@@ -55,12 +55,12 @@ class Station:
 
     @staticmethod
     def keeper_lives(state: StationState) -> bool:
-        """Tell whether something keeps the parts up."""
+        """Return whether something keeps the parts up."""
         return living(state.keeper, state.keeper_start) is not None
 
     @property
     def is_up(self) -> bool:
-        """Tell whether something keeps its parts up."""
+        """Return whether something keeps its parts up."""
         return self.keeper_lives(StationState.load(self.folder))
 
     @property

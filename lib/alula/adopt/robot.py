@@ -87,7 +87,7 @@ def robot_from_trees(name: str, mains: Sequence[TreeFiles], folder: Path, wrong:
 
 
 def _is_sound(files: TreeFiles, wrong: Callable[[TreeError], object]) -> bool:
-    """Tell whether a main tree can be put together with its subtrees: none of them contains itself, and it is no giant."""
+    """Return whether a main tree can be put together with its subtrees: none of them contains itself, and it is no giant."""
     found: list[Problem] = []
     verify(files, known_palette([files]), found.append, of_others=True)
     endless = [FileError(one) for one in found if one.code in ENDLESS]

@@ -45,7 +45,7 @@ class ResourceOf:
 
     @property
     def asks_entries(self) -> bool:
-        """Tell whether an argument is an entry, so that its answer hangs on what that holds."""
+        """Return whether an argument is an entry, so that its answer hangs on what that holds."""
         return any("{" in value for _, value in self.arguments)
 
 
@@ -101,7 +101,7 @@ def arguments(node: Element) -> Arguments:
 
 
 def _is_asked(one: NodeType) -> bool:
-    """Tell whether a node is a condition that tells yes or no; one that writes entries, too, has to be a skill."""
+    """Return whether a node is a condition that tells yes or no; one that writes entries, too, has to be a skill."""
     return one.category is Category.CONDITION and all(port.direction is Direction.INPUT for port in one.ports.values())
 
 

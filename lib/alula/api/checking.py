@@ -95,7 +95,7 @@ def robot_models(robot: RobotFolder) -> list[str]:
 
 
 def is_mission(path: str) -> bool:
-    """Tell whether a file is a mission, by its name."""
+    """Return whether a file is a mission, by its name."""
     return path.endswith(ENDINGS)
 
 
@@ -255,7 +255,7 @@ _UNKNOWN = frozenset({"ALU601", "ALU607"})
 
 
 def _is_known(file: CheckedMission, mission: MissionFile) -> bool:
-    """Tell whether the runs of a tree of another program are looked at: it is named, has a main tree, and lacks no node and no entry."""
+    """Return whether the runs of a tree of another program are looked at: it is named, has a main tree, and lacks no node and no entry."""
     return file.named and bool(mission.files.main) and not any(one.code in _UNKNOWN for one in file.findings)
 
 
@@ -285,7 +285,7 @@ class _Robot:
         return library if scenario is None or not scenario.library else library.extended(scenario.library)
 
     def has(self, path: Path, source: bytes) -> bool:
-        """Tell whether a file is a mission of this robot: it lies in its folder, or names a skillset or a node of it."""
+        """Return whether a file is a mission of this robot: it lies in its folder, or names a skillset or a node of it."""
         if self.root is None or self.root in path.resolve().parents:
             return self.root is not None
         names = [f"{one.name}." for one in self.skillsets] + [f"<{name_in_files(node)}" for node in (self.part.nodes if self.part else ())]

@@ -106,7 +106,7 @@ def cover(rows: Iterable[Row], ways: Iterable[Way], answers: Sequence[MissionAns
 
 
 def is_troubled(row: Row) -> bool:
-    """Tell whether something is wrong with a run, whatever failed in it."""
+    """Return whether something is wrong with a run, whatever failed in it."""
     unfinished = row["outcome"] in {"not_started", "running", None}
     wrong = row["open"] or row["collisions"] or row["landed"] is False or row["problems"]
     return bool(unfinished or wrong or not row["conforms"] or row["exit_code"] not in {None, CODE_OF.get(str(row["outcome"]))})

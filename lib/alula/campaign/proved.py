@@ -150,7 +150,7 @@ def _ends(system: System, leaf: int) -> Iterator[End]:
 
 
 def _brings(system: System, row: Row, effects: EffectsByFault, fault: str, end: End) -> bool:
-    """Tell whether a fault can bring about this end: by itself, or by a state in which a condition does not hold."""
+    """Return whether a fault can bring about this end: by itself, or by a state in which a condition does not hold."""
     known, (state, result) = effects.known[fault], end
     if any(fnmatchcase(f"{row.skill} {result or state}", pattern) for pattern in known.ends):
         return True

@@ -60,7 +60,7 @@ def _mocked(planned: PlannedRun, behaviour: tuple[str, ...]) -> Row:
 
 
 def came_back(events: Sequence[EngineEvent]) -> bool | None:
-    """Tell whether the robot came back to its state of departure; None where it never left it, or need not be brought back by the mission.
+    """Return whether the robot came back to its state of departure; None where it never left it, or the mission need not bring it back.
 
     Others have to when it was taken from the mission while it was away; nobody has to when it rests where it may be left.
     """

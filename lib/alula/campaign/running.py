@@ -110,7 +110,7 @@ class _Workers:
             yield from done
 
     def _alive(self) -> bool:
-        """Tell whether any process of a worker lives: one that dies in its first moment is not started again by Dask."""
+        """Return whether any process of a worker lives: one that dies in its first moment is not started again by Dask."""
         return any(worker.pid and psutil.pid_exists(worker.pid) for worker in self.cluster.workers.values())
 
 

@@ -109,7 +109,7 @@ def _json(text: bytes) -> Any:
 
 
 def _is_row(row: Any, numbers: Collection[int]) -> bool:
-    """Tell whether this is what the coverage needs of one of these runs."""
+    """Return whether this is what the coverage needs of one of these runs."""
     return isinstance(row, dict) and row.keys() >= COLUMNS and isinstance(row["run"], int) and row["run"] in numbers
 
 

@@ -81,7 +81,7 @@ def _perhaps_unwritten(access: Access, writer: Access) -> Problem:
 
 
 def goes_back(wiring: Wiring) -> bool:
-    """Tell whether a child of a node may be ticked after another one that stands behind it."""
+    """Return whether a child of a node may be ticked after another one that stands behind it."""
     return wiring.ticking.goes_back(len(wiring.children))
 
 
@@ -147,6 +147,6 @@ def _same_type(one: str, other: str) -> bool:
 
 
 def _readable(written: str, read: str) -> bool:
-    """Tell whether a value goes into a port: numbers and texts are converted as it is read, others have to be of its type."""
+    """Return whether a value goes into a port: numbers and texts are converted as it is read, others have to be of its type."""
     basic = {*TYPES, NUMBER, TEXT, UNKNOWN}
     return written == read or not written or not read or (written in basic and read in basic)

@@ -38,7 +38,7 @@ class _Guard:
 
 
 def exclude(one: Wiring, other: Wiring, scripts: Scripts, names: Collection[str]) -> bool:
-    """Tell whether the two can't both begin: whatever values entries have, a condition of one of them is not met."""
+    """Return whether the two can't both begin: whatever values entries have, a condition of one of them is not met."""
     guards = [*_guards(one, scripts), *_guards(other, scripts)]
     if {guard.wiring for guard in guards} != {one, other}:
         return False

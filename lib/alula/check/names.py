@@ -124,7 +124,7 @@ class NameRules:
                     yield in_value("ALU615", attribute, (node.offset, node.end), message, "ask for data in conditions")
 
     def _asked_only(self, value: Node, name: Node) -> bool:
-        """Tell whether a name is but an argument, such as that of `fresh`."""
+        """Return whether a name is but an argument, such as that of `fresh`."""
         return any(isinstance(call, Call) and any(one is name for one in call.arguments) for call in walk(value))
 
     def _states(self, attribute: Attribute, node: Comparison) -> Iterator[Problem]:

@@ -87,5 +87,5 @@ def several_run(root: Wiring, reach: Reach, excluded: Callable[[Wiring, Wiring],
 
 
 def is_parallel(wiring: Wiring) -> bool:
-    """Tell whether a node ticks several children at once."""
+    """Return whether a node ticks several children at once."""
     return wiring.ticking.order is Order.AT_ONCE

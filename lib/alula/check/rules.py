@@ -74,7 +74,7 @@ def _wrong_unit(attribute: Attribute, written: str, expected: str) -> Problem:
 
 
 def _deals(parent: Wiring, child: Wiring) -> bool:
-    """Tell whether a node does something about the failure of a child other than to fail, too."""
+    """Return whether a node does something about the failure of a child other than to fail, too."""
     place = parent.children.index(child)
     if "_onFailure" in child.element.attributes:
         return True
@@ -106,7 +106,7 @@ def _clashes(parallel: Wiring, leaf: Wiring, skill: Skill, others: list[tuple[Wi
 
 
 def _at_once(parallel: Wiring, leaf: Wiring) -> bool:
-    """Tell whether nothing but sequences, of which it is the first, and no condition stands between the leaf and the Parallel."""
+    """Return whether nothing but sequences, of which it is the first, and no condition stands between the leaf and the Parallel."""
     guards = {"_skipIf", "_while", "_successIf", "_failureIf"}
     if guards & set(leaf.element.attributes):
         return False

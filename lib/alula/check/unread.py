@@ -46,7 +46,7 @@ def _unread(access: Access, names: list[str]) -> Problem:
 
 
 def _reads_anything(wiring: Wiring) -> bool:
-    """Tell whether a node may read entries that its element does not name."""
+    """Return whether a node may read entries that its element does not name."""
     return wiring.type.unknown or takes_script_from_entry(wiring.element, wiring.type)
 
 

@@ -134,7 +134,7 @@ class Checkout:
             self._run("robot.sh", "--quiet")
 
     def has(self, step: str) -> bool:
-        """Tell whether a step of the set-up was done once."""
+        """Return whether a step of the set-up was done once."""
         return (self.state / "stamps" / step).exists()
 
     def _run(self, script: str, *words: str) -> None:

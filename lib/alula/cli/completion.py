@@ -87,7 +87,7 @@ def _add_all(command: Command, parser: ArgumentParser, here: Checkout | None, wo
 
 
 def _may_be_own(parser: ArgumentParser, words: Sequence[str]) -> bool:
-    """Tell whether a line may hold an option of the robot's own, or is about to: only then the robot is asked, which takes a moment."""
+    """Return whether a line may hold an option of the robot's own, or is about to: only then the robot is asked, which takes a moment."""
     known = {name for action in parser._actions for name in action.option_strings}  # noqa: SLF001  (as above)
     return words[-1].startswith("-") or any(word.startswith("--") and word.partition("=")[0] not in known for word in words)
 

@@ -37,7 +37,7 @@ class Parser(argparse.ArgumentParser):
         return [name for action in self._actions for name in action.option_strings if name.startswith("--")]
 
     def _is_unknown(self, word: str) -> bool:
-        """Tell whether a word looks like an option, and is the beginning of none that there is."""
+        """Return whether a word looks like an option, and is the beginning of none that there is."""
         option = word.partition("=")[0]
         return len(option) > len("--") and option.startswith("--") and not any(name.startswith(option) for name in self._known())
 

@@ -40,7 +40,7 @@ def run(options: argparse.Namespace, enums: Mapping[str, float]) -> int:
 
 
 def _has_trees(place: str) -> bool:
-    """Tell whether missions are meant: a file of one, or a folder that has no models."""
+    """Return whether missions are meant: a file of one, or a folder that has no models."""
     return is_mission(place) or (Path(place).is_dir() and models_in(place) == [place])
 
 

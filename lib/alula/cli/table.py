@@ -53,7 +53,7 @@ class Command:
 
     @property
     def anywhere(self) -> bool:
-        """Tell whether a pip installation has it, too."""
+        """Return whether a pip installation has it, too."""
         return bool(self.module) or self.name in _OF_THE_FRONT
 
     @property

@@ -137,7 +137,7 @@ RESERVED = ("bridge", MANAGERS, "recorder", "page", "mission")
 
 
 def makes_hooks(words: Sequence[str]) -> bool:
-    """Tell whether what serves a skillset is the maker of its hooks, and no command."""
+    """Return whether what serves a skillset is the maker of its hooks, and no command."""
     return len(words) == 1 and _FACTORY.fullmatch(words[0]) is not None
 
 
@@ -208,7 +208,7 @@ def _check_reach(deployment: Deployment, ros1: Mapping[str, Located], ros2: Mapp
 
 
 def is_loopback(host: str) -> bool:
-    """Tell whether a host is this computer by an address that no other one reaches."""
+    """Return whether a host is this computer by an address that no other one reaches."""
     if host == "localhost":
         return True
     try:

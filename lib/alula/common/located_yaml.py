@@ -51,12 +51,12 @@ class Located:
 
     @property
     def is_mapping(self) -> bool:
-        """Tell whether it has keys."""
+        """Return whether it has keys."""
         return isinstance(self._node, yaml.MappingNode)
 
     @property
     def is_list(self) -> bool:
-        """Tell whether it has elements."""
+        """Return whether it has elements."""
         return isinstance(self._node, yaml.SequenceNode)
 
     @property

@@ -69,7 +69,7 @@ def _claimed(port: int) -> socket.socket | None:
 
 
 def udp_port_is_free(port: int, address: str = "127.0.0.1") -> bool:
-    """Tell whether a UDP port of this machine can be bound at this moment."""
+    """Return whether a UDP port of this machine can be bound at this moment."""
     with socket.socket(socket.AF_INET, socket.SOCK_DGRAM) as probe:
         try:
             probe.bind((address, port))
@@ -158,7 +158,7 @@ def _lock(domain: int, namespace: str) -> tuple[socket.socket, ...]:
 
 
 def is_claimed(domain: int) -> bool:
-    """Tell whether a run on this machine holds the domain."""
+    """Return whether a run on this machine holds the domain."""
     with socket.socket(socket.AF_INET, socket.SOCK_STREAM) as probe:
         try:
             probe.bind(("127.0.0.1", _claim_port(domain)))

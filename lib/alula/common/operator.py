@@ -24,7 +24,7 @@ class Act:
 
 
 def is_operator(request: FaultRequest) -> bool:
-    """Tell whether it is the operator who acts, and nothing fails."""
+    """Return whether it is the operator who acts, and nothing fails."""
     return request.what == OPERATOR
 
 

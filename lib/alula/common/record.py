@@ -342,7 +342,7 @@ class RecordFollower:
 
 
 def _fits(content: bytes, length: int) -> bool:
-    """Tell whether the lengths in a chunk agree with that of its record, as far as it was written."""
+    """Return whether the lengths in a chunk agree with that of its record, as far as it was written."""
     if len(content) < _CHUNK_HEAD.size:
         return length >= _CHUNK_HEAD.size + _LENGTH.size
     *_, name = _CHUNK_HEAD.unpack_from(content)

@@ -32,7 +32,7 @@ class Run:
 
     @property
     def live(self) -> bool:
-        """Tell whether the domain is held, and by this run: domains are used again, and what is sent there reaches the run that has it.
+        """Return whether the domain is held, and by this run: domains are used again, and what is sent there reaches the run that has it.
 
         A domain that no run is given by itself, which a deployment may have, can't be held.
         """
@@ -54,7 +54,7 @@ def up_folder() -> Path:
 
 
 def is_deployment(folder: Path) -> bool:
-    """Tell whether a folder that is shown as a run is that of a deployment."""
+    """Return whether a folder that is shown as a run is that of a deployment."""
     try:
         return folder.parent == up_folder()
     except RobotError:

@@ -41,7 +41,7 @@ class Interrupts:
 
     @property
     def asked(self) -> bool:
-        """Tell whether the end was requested."""
+        """Return whether the end was requested."""
         return bool(self._received)
 
     @property
@@ -51,7 +51,7 @@ class Interrupts:
 
     @property
     def at_once(self) -> bool:
-        """Tell whether the end was requested twice: at once."""
+        """Return whether the end was requested twice: at once."""
         return len(self._received) > 1
 
     def _note(self, received: signal.Signals) -> None:

@@ -12,7 +12,7 @@ from urllib.parse import parse_qs, urlsplit
 
 
 def is_loopback(host: str) -> bool:
-    """Tell whether an address or name means this machine alone."""
+    """Return whether an address or name means this machine alone."""
     if host == "localhost":
         return True
     try:
@@ -55,7 +55,7 @@ class Admission:
         return ""
 
     def brings_token(self, target: str) -> bool:
-        """Tell whether an address is the page's with the token in it, as the console printed it: the first load, which gets a cookie."""
+        """Return whether an address is the page's with the token in it, as the console printed it: the first load, which gets a cookie."""
         asked = urlsplit(target)
         return bool(self.token) and asked.path == "/" and self._is_token(parse_qs(asked.query).get("token", [""])[0])
 
@@ -65,7 +65,7 @@ class Admission:
         return f"{self._name}={self.token}; Path=/; HttpOnly; SameSite=Strict{'; Secure' if self.tls else ''}"
 
     def may_command(self, peer: str) -> bool:
-        """Tell whether a peer may do more than watch: without TLS the network could read the token of a peer that is elsewhere."""
+        """Return whether a peer may do more than watch: without TLS the network could read the token of a peer that is elsewhere."""
         return self.tls is not None or is_loopback(peer)
 
     @property

@@ -144,7 +144,7 @@ def _runs_of(folders: set[Path]) -> set[Run]:
 
 
 def is_live(folder: Path) -> bool:
-    """Tell whether a run is under way."""
+    """Return whether a run is under way."""
     try:
         return not (folder / "summary.json").exists() and load_run(folder).live
     except NoRunError:

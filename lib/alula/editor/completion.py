@@ -105,7 +105,7 @@ class _Context:
         return None
 
     def _names_effect(self, last: str) -> bool:
-        """Tell whether the name of an effect comes next."""
+        """Return whether the name of an effect comes next."""
         words = [token.text for token in self._before[-2:]]
         if self._paper:
             return words in (["violation", "="], ["apply", "="]) or (last == "success" and self._innermost() == "precondition")

@@ -113,7 +113,7 @@ def _checked(file: ModelFile) -> ModelFile:
 
 
 def is_mission(uri: str) -> bool:
-    """Tell whether a document is a mission: all others are models."""
+    """Return whether a document is a mission: all others are models."""
     return uri.endswith(SUFFIX)
 
 

@@ -220,7 +220,7 @@ class TreeFolder:
 
 
 def _remaps_all(use: Element, entry: str) -> bool:
-    """Tell whether an entry of a subtree is the one of that name around it."""
+    """Return whether an entry of a subtree is the one of that name around it."""
     return use.get(AUTOREMAP).lower() in ON and entry not in use.attributes
 
 

@@ -72,7 +72,7 @@ def _move(source: Path, target: Path) -> None:
 
 
 def _holds(out: Path, entry: str, texts: Mapping[str, str]) -> bool:
-    """Tell whether an entry holds exactly these texts (what Python and editors leave aside does not count)."""
+    """Return whether an entry holds exactly these texts (what Python and editors leave aside does not count)."""
     place = out / entry
     if place.is_file():
         present = {entry}

@@ -39,7 +39,7 @@ def formatted(text: str) -> str:
 
 
 def _in_comment(line: str, *, inside: bool) -> bool:
-    """Tell whether a `/* ... */` goes on behind this line."""
+    """Return whether a `/* ... */` goes on behind this line."""
     while True:
         if inside:
             _, found, line = line.partition("*/")

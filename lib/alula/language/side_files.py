@@ -38,7 +38,7 @@ def load_types(path: Path) -> tuple[dict[str, RosType], list[Diagnostic]]:
 
 
 def _may_be(ros: RosType) -> bool:
-    """Tell whether there may be such a message: of the packages that each ROS brings along it is known, or sourced there."""
+    """Return whether there may be such a message: of the packages that each ROS brings along it is known, or sourced there."""
     if ros.name in standard_messages().get(ros.package, {ros.name}):
         return True
     prefixes = filter(None, os.environ.get("AMENT_PREFIX_PATH", "").split(os.pathsep))

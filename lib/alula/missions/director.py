@@ -66,12 +66,12 @@ class Mission(Protocol):
 
     @property
     def degraded(self) -> bool:
-        """Tell whether it was accomplished in another way than the best."""
+        """Return whether it was accomplished in another way than the best."""
         ...
 
     @property
     def stopping(self) -> bool:
-        """Tell whether the tree has the robot brought to rest by now, so that an abort has nothing to add."""
+        """Return whether the tree has the robot brought to rest by now, so that an abort has nothing to add."""
         ...
 
     def conditions(self) -> list[Condition]:

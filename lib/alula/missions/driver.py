@@ -165,7 +165,7 @@ class MissionDriver:
 
     @property
     def abort_asked(self) -> bool:
-        """Tell whether the next tick has the robot come to rest."""
+        """Return whether the next tick has the robot come to rest."""
         return bool(self._aborts)
 
     def abort(self, reason: str) -> str:
@@ -200,7 +200,7 @@ class MissionDriver:
 
     @property
     def settled(self) -> bool:
-        """Tell whether the events of all that has ended are here; a result may come before its event."""
+        """Return whether the events of all that has ended are here; a result may come before its event."""
         return self.record is None or not self.record.unended
 
     def finish(self, end: End) -> None:

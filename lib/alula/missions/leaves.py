@@ -107,7 +107,7 @@ class SkillLeaf(Behaviour, Generic[Board]):  # type: ignore[misc]  # py_trees is
 
     @property
     def interrupted(self) -> bool:
-        """Tell whether the tree has asked for the end of its execution."""
+        """Return whether the tree has asked for the end of its execution."""
         return self._interrupted
 
     def recall(self, handle: SkillHandle | None, *, interrupted: bool) -> None:

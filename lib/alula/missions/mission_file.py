@@ -184,12 +184,12 @@ class MissionTrees:
 
     @property
     def degraded(self) -> bool:
-        """Tell whether it was accomplished in another way than the best."""
+        """Return whether it was accomplished in another way than the best."""
         return bool(self._board.get(DEGRADED))
 
     @property
     def stopping(self) -> bool:
-        """Tell whether the tree has the robot brought to rest by now."""
+        """Return whether the tree has the robot brought to rest by now."""
         return bool(self._board.get(STOPPING))
 
     def conditions(self) -> list[Condition]:

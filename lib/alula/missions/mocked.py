@@ -37,7 +37,7 @@ KILLED = "killed"
 
 
 def kills_managers(fault: FaultRequest, skillsets: Collection[str]) -> bool:
-    """Tell whether a fault ends the managers of one of these skillsets."""
+    """Return whether a fault ends the managers of one of these skillsets."""
     return fault.what in skillsets and fault.how == KILLED
 
 

@@ -56,7 +56,7 @@ def _with_robot(palette: Palette, skillsets: Sequence[Skillset], part: MissionPa
 
 
 def _is_another(declared: NodeType | None, known: NodeType) -> bool:
-    """Tell whether a declaration is of another node: of another category, or with ports that this one has not."""
+    """Return whether a declaration is of another node: of another category, or with ports that this one has not."""
     if declared is None:
         return False
     ports = ((port, known.ports.get(port.name)) for port in declared.ports.values())

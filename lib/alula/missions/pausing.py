@@ -64,7 +64,7 @@ class _Hold:
 
     @property
     def asked(self) -> bool:
-        """Tell whether its answer is still to come, or it is to be asked again."""
+        """Return whether its answer is still to come, or it is to be asked again."""
         return not self._handle.done and (not self._answer.done or (self._refused and self._tries < TRIES))
 
     @property

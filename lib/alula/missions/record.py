@@ -88,7 +88,7 @@ class MissionRecord:
     # --- what the mission comes to know ------------------------------------------------------------------------------
 
     def _is_earlier(self, event: EngineEvent) -> bool:
-        """Tell whether an event was before the mission; where the wall clock was set back since, it may seem to be of the future."""
+        """Return whether an event was before the mission; where the wall clock was set back since, it may seem to be of the future."""
         if self._since_ns is None or event.skillset in self._own:
             return False
         earlier = not self._since_ns <= event.stamp_ns <= self._clock_ns() + FUTURE_NS

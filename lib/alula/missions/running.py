@@ -27,7 +27,7 @@ class Standstill:
         self._since = wall_s()
 
     def lasts(self, now_s: float) -> bool:
-        """Tell whether the mission clock has stood still for longer than the timeout."""
+        """Return whether the mission clock has stood still for longer than the timeout."""
         if now_s != self._last:
             self._last, self._since = now_s, self._wall_s()
         return self._wall_s() - self._since > self._timeout_s

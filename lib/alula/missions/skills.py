@@ -90,7 +90,7 @@ class SkillNode(Action):
 
     @property
     def running(self) -> bool:
-        """Tell whether its execution is RUNNING."""
+        """Return whether its execution is RUNNING."""
         handle = self.leaf.handle
         return handle is not None and handle.state is ExecutionState.RUNNING
 

@@ -24,7 +24,7 @@ class Client(Protocol):
 
     @property
     def ready(self) -> bool:
-        """Tell whether it can be called."""
+        """Return whether it can be called."""
         ...
 
     @property
@@ -84,7 +84,7 @@ class MissionClient:
 
     @property
     def ready(self) -> bool:
-        """Tell whether it can be called."""
+        """Return whether it can be called."""
         if self.client.ready and not self._follows_data:
             self._follows_data = True
             self._follow_data()

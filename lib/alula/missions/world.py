@@ -43,7 +43,7 @@ class World:
         return self._measured(data, name) if data in self._data else None
 
     def fresh(self, data: str) -> bool:
-        """Tell whether a data has a value that is not stale; raises ValueError where there is no such data."""
+        """Return whether a data has a value that is not stale; raises ValueError where there is no such data."""
         if data not in self._data:
             msg = f"there is no data {data}"
             raise ValueError(msg)

@@ -97,7 +97,7 @@ class MockRobot(MockState):
             self._do(delay_s, job)
 
     def holds(self, skillset: str) -> bool:
-        """Tell whether a fault holds a resource of this skillset."""
+        """Return whether a fault holds a resource of this skillset."""
         return any(place[0] == skillset for place in self._held) or any(other.holds(skillset) for other in self._beside)
 
     # --- the clock's part --------------------------------------------------------------------------------------------

@@ -10,12 +10,12 @@ from alula.model.model import Resource, Skillset, Transition
 
 
 def breaks(skillset: Skillset, resource: Resource, transition: Transition) -> bool:
-    """Tell whether a transition can make an invariant false that was not."""
+    """Return whether a transition can make an invariant false that was not."""
     return any(can_break(skillset, one.condition, resource, transition) for skill in skillset.skills for one in skill.invariants)
 
 
 def can_break(skillset: Skillset, condition: Expression, resource: Resource, transition: Transition) -> bool:
-    """Tell whether a transition can make a condition false that was not."""
+    """Return whether a transition can make a condition false that was not."""
     names = list(dict.fromkeys(atom.resource for atom in atoms(condition) if isinstance(atom, ResourceIs)))
     if resource.name not in names:
         return False

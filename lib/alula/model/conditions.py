@@ -26,7 +26,7 @@ _COMPARE: dict[Comparison, Callable[[Any, Any], Any]] = {
 
 
 def judge(condition: Expression, states: States, data: Data) -> bool | None:
-    """Tell whether a condition is true, by Kleene's logic: None where that hangs on data without a fresh value, or a resource not given."""
+    """Return whether a condition is true (Kleene's logic); None where it depends on stale data, or on a resource not given."""
     match condition:
         case ResourceIs(resource=resource, state=state, negated=negated):
             known = states.get(resource)
@@ -50,7 +50,7 @@ def judge(condition: Expression, states: States, data: Data) -> bool | None:
 
 
 def holds(condition: Expression, states: States, data: Data) -> bool:
-    """Tell whether a condition is true.
+    """Return whether a condition is true.
 
     Raises:
         DataMissingError: that hangs on data without a fresh value (a negation of the unknown is unknown, too).

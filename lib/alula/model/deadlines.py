@@ -24,12 +24,12 @@ def nanoseconds(seconds: float) -> int:
 
 
 def waits(invariant: Invariant) -> bool:
-    """Tell whether the invariant may be false for a while."""
+    """Return whether the invariant may be false for a while."""
     return invariant.hold is not None and invariant.hold.for_s > 0
 
 
 def good(skill: Skill, invariant: Invariant, situation: Situation) -> bool:
-    """Tell whether an invariant counts as true now: its condition is, by values that need not recover first."""
+    """Return whether an invariant counts as true now: its condition is, by values that need not recover first."""
     if (skill.name, invariant.name) in situation.fallen:
         return False
     return judge(invariant.condition, situation.states, situation.data) is True
@@ -83,7 +83,7 @@ def due_ns(skillset: Skillset, situation: Situation) -> int | None:
 
 
 def is_due(execution: Running, invariant: Invariant, situation: Situation) -> bool:
-    """Tell whether an invariant that is not good has been so for as long as it may."""
+    """Return whether an invariant that is not good has been so for as long as it may."""
     if invariant.hold is None or not waits(invariant):
         return True
     since = situation.false_since[execution, invariant.name]
@@ -91,7 +91,7 @@ def is_due(execution: Running, invariant: Invariant, situation: Situation) -> bo
 
 
 def is_stuck(skill: Skill, execution: Running, situation: Situation) -> bool:
-    """Tell whether an execution has made no progress for as long as it may."""
+    """Return whether an execution has made no progress for as long as it may."""
     if execution.id not in situation.progressed or skill.progress is None or skill.progress.deadline_s is None:
         return False
     return situation.now_ns >= situation.progressed[execution.id] + nanoseconds(skill.progress.deadline_s)

@@ -71,7 +71,7 @@ class Resource:
     span: Span = field(default=NOWHERE, compare=False)
 
     def has_transition(self, source: str, target: str, *, extern: bool) -> bool:
-        """Tell whether the functional layer (extern) or a skill (not extern) may go from source to target."""
+        """Return whether the functional layer (extern) or a skill (not extern) may go from source to target."""
         return target in self._targets.get((source, extern), ())
 
     def targets(self, source: str, *, extern: bool) -> tuple[str, ...]:
@@ -268,7 +268,7 @@ class Skill:
         raise KeyError(f"skill {self.name} has no result {name}; it has {', '.join(r.name for r in self.results)}")
 
     def kind_of(self, result_name: str) -> ResultKind:
-        """Tell whether a result is a success or a failure; PLAIN: neither, the mission decides. Raise KeyError as ``result``.
+        """Return whether a result is a success or a failure; PLAIN: neither, the mission decides. Raise KeyError as ``result``.
 
         It is what it is called. Where no result of the skill is called either, as in the paper's listings, the first one is the
         success and the others are failures.

@@ -47,7 +47,7 @@ def over_approximate(skillset: Skillset) -> OverApproximation:
 
 
 def at_once(invariant: Invariant) -> bool:
-    """Tell whether resources alone decide about the invariant, at each step."""
+    """Return whether resources alone decide about the invariant, at each step."""
     return not waits(invariant) and not data_of(invariant.condition)
 
 

@@ -84,12 +84,12 @@ def parse_type(text: str) -> RosType | None:
 
 
 def is_field_name(name: str) -> bool:
-    """Tell whether a field of an interface may have this name (rosidl's rule), and a Python variable too."""
+    """Return whether a field of an interface may have this name (rosidl's rule), and a Python variable too."""
     return bool(_FIELD.fullmatch(name)) and not keyword.iskeyword(name)
 
 
 def is_package_name(name: str) -> bool:
-    """Tell whether a ROS package may have this name."""
+    """Return whether a ROS package may have this name."""
     return bool(_FIELD.fullmatch(name))
 
 

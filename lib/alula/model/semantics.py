@@ -229,7 +229,7 @@ def unmet_preconditions(skill: Skill, states: States, data: Data) -> Iterator[Un
 
 
 def is_ready(skill: Skill, states: States, data: Data) -> bool:
-    """Tell whether all preconditions hold; ``unmet_preconditions`` says which do not, and why, which takes longer."""
+    """Return whether all preconditions hold; ``unmet_preconditions`` says which do not, and why, which takes longer."""
     return all(judge(one.condition, states, data) is True for one in skill.preconditions)
 
 

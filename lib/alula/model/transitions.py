@@ -9,7 +9,7 @@ from alula.model.model import Effect, Resource
 
 
 def may_go(resource: Resource, source: str, target: str, *, any_transition: bool) -> bool:
-    """Tell whether a skill (or with ``any_transition`` an event) may have a resource go from source to target; staying is no change."""
+    """Return whether a skill (or with ``any_transition`` an event) may have a resource go from source to target; staying is no change."""
     if source == target or resource.has_transition(source, target, extern=False):
         return True
     return any_transition and resource.has_transition(source, target, extern=True)

@@ -104,15 +104,15 @@ class MissionSteps:
         return {name: known for name, known in found if known is not None}
 
     def holds(self, state: Place, condition: Expression) -> bool:
-        """Tell whether a condition of a mission's property is true."""
+        """Return whether a condition of a mission's property is true."""
         return true_in(self._system, condition, state.state)
 
     def may_end(self, state: Place, end: str) -> bool:
-        """Tell whether a fault is there that can bring about this end of an execution, ``skillset.skill END``."""
+        """Return whether a fault is there that can bring about this end of an execution, ``skillset.skill END``."""
         return any(_any(self._faults[name].ends, end) for name in state.faults)
 
     def comes_later(self, state: Place, shown: str) -> bool:
-        """Tell whether a state, ``skillset.resource STATE``, comes only of what is done about the faults that are there."""
+        """Return whether a state, ``skillset.resource STATE``, comes only of what is done about the faults that are there."""
         several = [self._faults[name] for name in state.faults]
         return any(_any(one.later, shown) for one in several) and not any(_any(one.states, shown) for one in several)
 
@@ -123,7 +123,7 @@ class MissionSteps:
         return () if event is None else tuple(words for one in _waited(event.choices)[1] if (words := choice(one)))
 
     def only_ends(self, fault: str) -> bool:
-        """Tell whether a fault is no more than bad ends of skills."""
+        """Return whether a fault is no more than bad ends of skills."""
         return not self._faults[fault].states
 
     def steps(self, state: Place) -> Iterator[Step[Place]]:
@@ -242,7 +242,7 @@ def achieved(skillset: str, skill: Skill) -> Iterator[tuple[str, str]]:
 
 
 def _touches(fault: FaultEffects, system: System) -> bool:
-    """Tell whether a fault shows anything in a mission's skillsets; one that does not is none of its faults."""
+    """Return whether a fault shows anything in a mission's skillsets; one that does not is none of its faults."""
     resources = [f"{of.name}.{one.name} {state}" for of in system.skillsets for one in of.resources for state in one.states]
     skills: dict[str, Skill] = {f"{leaf.skillset}.{leaf.model.name}": leaf.model for leaf in system.leaves}
     ends = [f"{name} {one.name}" for name, skill in skills.items() for one in skill.results]
@@ -286,12 +286,12 @@ def _any(patterns: frozenset[str], text: str) -> bool:
 
 
 def _brings(effects: FaultEffects, shown: str) -> bool:
-    """Tell whether a fault brings about a state, or what is done about it does."""
+    """Return whether a fault brings about a state, or what is done about it does."""
     return _any(effects.states, shown) or _any(effects.later, shown)
 
 
 def _complete(several: Sequence[Sequence[Asked]]) -> bool:
-    """Tell whether these ways of a tick are all of them; else one is missing, for it changes nothing: the tree waits."""
+    """Return whether these ways of a tick are all of them; else one is missing, for it changes nothing: the tree waits."""
     if not several or any(not asked for asked in several):
         return bool(several)
     first = {asked[0].question: asked[0].options for asked in several}

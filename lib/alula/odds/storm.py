@@ -29,7 +29,7 @@ class Number:
 
     @property
     def exact(self) -> bool:
-        """Tell whether there is no error."""
+        """Return whether there is no error."""
         return self.low == self.high
 
     @property

@@ -43,7 +43,7 @@ class Here:
         return frozenset(self.states.items()), self.facts
 
     def fulfils(self, wanted: Wanted) -> bool:
-        """Tell whether a condition is true; of data it is where a fact says so."""
+        """Return whether a condition is true; of data it is where a fact says so."""
         skillset, condition = wanted
         match condition:
             case ResourceIs(resource=name, state=state, negated=negated):
@@ -131,7 +131,7 @@ class Courses:
         return Here(states, here.facts | facts)
 
     def may_use(self, purpose: Purpose) -> bool:
-        """Tell whether a skill is one of those that courses are made of."""
+        """Return whether a skill is one of those that courses are made of."""
         return purpose in self._acting
 
     def providers(self, here: Here, role: str, needed: Purpose) -> list[Purpose]:
@@ -166,7 +166,7 @@ _BELOW = {Comparison.LT: True, Comparison.LE: True, Comparison.GT: False, Compar
 
 
 def _implies(fact: DataIs, asked: DataIs) -> bool:
-    """Tell whether a condition of data follows from another: the same one, or on the same side of a threshold that is further away."""
+    """Return whether a condition of data follows from another: the same one, or on the same side of a threshold that is further away."""
     if (fact.data, fact.path) != (asked.data, asked.path):
         return False
     if (fact.comparison, fact.value, fact.unit) == (asked.comparison, asked.value, asked.unit):

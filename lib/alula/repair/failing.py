@@ -33,7 +33,7 @@ class Failing:
 
     @property
     def degrades(self) -> bool:
-        """Tell whether the author says that the mission is degraded once it has failed: another end than giving up may be good then."""
+        """Return whether the author says that the mission is degraded once it has failed: another end than giving up may be good then."""
         return _DEGRADED.search(self.leaf.wiring.element.get("_onFailure")) is not None
 
     @property

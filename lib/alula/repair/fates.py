@@ -90,7 +90,7 @@ class Fate:
 
     @property
     def answered(self) -> bool:
-        """Tell whether it survives, at least under an assumption."""
+        """Return whether it survives, at least under an assumption."""
         return self.survives or bool(self.assuming)
 
     def as_dict(self) -> dict[str, object]:
@@ -220,7 +220,7 @@ class _Graph:
 
 
 def needs(steps: MissionSteps, skillsets: Sequence[Skillset], skill: str, deadline: Deadline) -> bool:
-    """Tell whether every run in which nothing fails, and the mission is accomplished, starts a skill; raises OutOfTimeError."""
+    """Return whether every run in which nothing fails, and the mission is accomplished, starts a skill; raises OutOfTimeError."""
     ends = _Ends.of(skillsets)
 
     def following(here: Here) -> Iterator[tuple[Step[Place], Here]]:

@@ -38,7 +38,7 @@ class Judgement:
 
     @property
     def clean(self) -> bool:
-        """Tell whether nothing was found."""
+        """Return whether nothing was found."""
         return all(one.code == BOUND for one in self.findings)
 
     def new(self, before: Judgement) -> list[Diagnostic]:
@@ -135,7 +135,7 @@ class Judge:
         return found
 
     def needs(self, text: str, skill: str) -> bool:
-        """Tell whether a text of the mission's file is accomplished only where a skill starts; raises OutOfTimeError."""
+        """Return whether a text of the mission's file is accomplished only where a skill starts; raises OutOfTimeError."""
         return needs(self._steps(text), self._subject.skillsets, skill, self._deadline)
 
     def fates(self, text: str) -> Callable[[Sequence[str], int | None], Fate | None]:

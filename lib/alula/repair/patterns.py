@@ -81,7 +81,7 @@ class Patterns:
                 yield f"{purpose.skillset.name}.{resource.name}", state  # type: ignore[union-attr]  # it has one
 
     def may_leave_out(self, failing: Failing) -> bool:
-        """Tell whether the mission may go on without what failed, as something else is for the same."""
+        """Return whether the mission may go on without what failed, as something else is for the same."""
         return any(True for place in self.places(failing.leaf) for _ in self._remedies.without(place, failing))
 
     def places(self, leaf: Node) -> Iterator[Node]:

@@ -73,7 +73,7 @@ class Stage:
     wanted: Wanted = ("", TRUE)
 
     def reached_by(self, course: Course) -> bool:
-        """Tell whether a course leads there."""
+        """Return whether a course leads there."""
         return self.role in course.steps[-1].roles if self.role else course.heres[-1].fulfils(self.wanted)
 
 

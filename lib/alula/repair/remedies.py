@@ -192,7 +192,7 @@ def _needed(purpose: Purpose) -> str:
 
 
 def _begins_again(place: Node) -> bool:
-    """Tell whether a node is in a Fallback that is ticked again when another of its children succeeds."""
+    """Return whether a node is in a Fallback that is ticked again when another of its children succeeds."""
     outer = place.parent
     loop = None if outer is None else outer.parent
     return outer is not None and loop is not None and outer.wiring.element.tag in FALLBACKS and loop.wiring.element.tag == LOOP

@@ -126,7 +126,7 @@ class Answer:
 
     @property
     def survives_already(self) -> bool:
-        """Tell whether there is nothing to repair."""
+        """Return whether there is nothing to repair."""
         return self.fate is not None and self.fate.answered
 
     @property
@@ -371,7 +371,7 @@ class Search:
         return [needed, *lines]
 
     def _can_be_left(self, failing: Failing) -> bool:
-        """Tell whether some skill brings about another state than the one that shows the fault: nobody knows what comes of that."""
+        """Return whether some skill brings about another state than the one that shows the fault: nobody knows what comes of that."""
         skills = [(of.name, one) for of in self._subject.skillsets for one in of.skills]
         brought = {pair for several in self._subject.brought.values() for pair in several}
         brought |= {pair for skillset, skill in skills for pair in achieved(skillset, skill)}

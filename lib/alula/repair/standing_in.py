@@ -69,7 +69,7 @@ class StandIns:
             yield from (self._as_branch(one, place, instead, failing) for one in islice(fitting, 1))
 
     def _has_what_it_needs(self, top: Element, place: Node, failing: Failing) -> bool:
-        """Tell whether each role that a skill needs is filled by another one, in the branch or beside it."""
+        """Return whether each role that a skill needs is filled by another one, in the branch or beside it."""
         inside = {type_name(one) for one in top.iterate()} & set(self._purposes.known)
         beside = {name for name in _run_beside(place) if name != failing.skill} & set(self._purposes.known)
         filled = {(one.robot, role) for one in map(self._purposes.known.__getitem__, inside | beside) for role in one.roles}
@@ -234,7 +234,7 @@ class _Making:
 
 
 def _ends_it(purpose: Purpose, resource: Resource) -> bool:
-    """Tell whether a skill has an invariant that a state of a resource breaks."""
+    """Return whether a skill has an invariant that a state of a resource breaks."""
     asked = (judge(one.condition, {resource.name: state}, NO_DATA) for one in purpose.skill.invariants for state in resource.states)
     return any(one is False for one in asked)
 

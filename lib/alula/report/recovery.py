@@ -105,7 +105,7 @@ def _moving(scenario: Scenario, history: History, observed: Observed, fallback_s
 
 
 def _is_one(execution: ExecutionRecord, skills: Collection[str]) -> bool:
-    """Tell whether an execution is of one of some skills, which a scenario names with their skillset or without."""
+    """Return whether an execution is of one of some skills, which a scenario names with their skillset or without."""
     return execution.skill in skills or f"{execution.skillset}.{execution.skill}" in skills
 
 

@@ -48,7 +48,7 @@ def duration_words(summary: Mapping[str, Any]) -> str:
 
 
 def was_ended(summary: Mapping[str, Any], ended: ReportedEnd | None) -> bool:
-    """Tell whether the mission came to no end of its own."""
+    """Return whether the mission came to no end of its own."""
     outcome, reason = summary.get("outcome"), str(summary.get("reason"))
     told = reason.startswith(TOLD_TO_END) or (ended is not None and reason == ended.sentence())
     return outcome in {None, "running"} or (outcome == "aborted" and told)

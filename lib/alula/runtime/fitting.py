@@ -21,7 +21,7 @@ def check_name(name: str, names: Collection[str], place: str) -> None:
 
 
 def is_number(value: Any) -> bool:
-    """Tell whether a value is one number; truth values and arrays are none."""
+    """Return whether a value is one number; truth values and arrays are none."""
     return hasattr(value, "__float__") and not isinstance(value, bool) and not getattr(value, "shape", ())
 
 

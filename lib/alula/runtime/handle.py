@@ -108,7 +108,7 @@ class Handle(Waitable, Generic[OutputsT, ResultT]):
 
     @property
     def done(self) -> bool:
-        """Tell whether the execution has ended and its outcome is known."""
+        """Return whether the execution has ended and its outcome is known."""
         return self.state.terminal
 
     @property

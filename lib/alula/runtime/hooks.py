@@ -22,7 +22,7 @@ def unwritten(hook: HookT) -> HookT:
 
 
 def is_written(hooks: SkillHooks, name: str) -> bool:
-    """Tell whether a hook does anything: whether it was overridden, or is not marked as ``unwritten``."""
+    """Return whether a hook does anything: whether it was overridden, or is not marked as ``unwritten``."""
     return not getattr(getattr(hooks, name), "unwritten", False)
 
 

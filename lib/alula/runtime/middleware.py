@@ -163,7 +163,7 @@ class ActionLink(Protocol):
 
     @property
     def connected(self) -> bool:
-        """Tell whether both directions are connected, so that no message is lost."""
+        """Return whether both directions are connected, so that no message is lost."""
         ...
 
     @property

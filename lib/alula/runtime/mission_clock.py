@@ -58,7 +58,7 @@ class MissionClock:
 
     @property
     def simulated(self) -> bool:
-        """Tell whether it is ``/clock``."""
+        """Return whether it is ``/clock``."""
         return self._simulated()
 
     def now_ns(self) -> int:

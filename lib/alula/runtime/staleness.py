@@ -22,7 +22,7 @@ def limit_ns(period_s: float | None) -> int | None:
 
 
 def is_stale(age_ns: int, period_s: float | None) -> bool:
-    """Tell whether a value of this age is stale."""
+    """Return whether a value of this age is stale."""
     limit = limit_ns(period_s)
     return limit is not None and age_ns > limit
 

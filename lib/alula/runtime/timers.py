@@ -20,7 +20,7 @@ class Timer:
 
     @property
     def pending(self) -> bool:
-        """Tell whether the job is still to come."""
+        """Return whether the job is still to come."""
         return self.job is not None
 
     def cancel(self) -> None:
@@ -53,7 +53,7 @@ class TimerQueue:
         return timer
 
     def is_next(self, timer: Timer) -> bool:
-        """Tell whether no other timer's moment comes before this one's."""
+        """Return whether no other timer's moment comes before this one's."""
         return bool(self._timers) and self._timers[0][2] is timer
 
     @property

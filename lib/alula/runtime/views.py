@@ -56,7 +56,7 @@ class DataFeed(Protocol):
 
     @property
     def stale(self) -> bool:
-        """Tell whether there is no value, or it is older than the model's period allows."""
+        """Return whether there is no value, or it is older than the model's period allows."""
         ...
 
     def on_sample(self, callback: Callable[[Sample], None]) -> Unsubscribe:
@@ -221,7 +221,7 @@ class DataView(Generic[ValueT]):
 
     @property
     def stale(self) -> bool:
-        """Tell whether there is no value, or it is older than the model's period allows."""
+        """Return whether there is no value, or it is older than the model's period allows."""
         return self._client.data_feed(self.name).stale
 
     def on_change(self, callback: Callable[[ValueT], None]) -> Unsubscribe:

@@ -133,7 +133,7 @@ class Pending(Waitable, Generic[T]):
 
     @property
     def done(self) -> bool:
-        """Tell whether the answer, or the reason why there is none, is here."""
+        """Return whether the answer, or the reason why there is none, is here."""
         return self._ended.is_set()
 
     @property

@@ -235,7 +235,7 @@ def scripts_of(element: Element, type_: NodeType | None) -> Iterator[Attribute]:
 
 
 def takes_script_from_entry(element: Element, type_: NodeType | None) -> bool:
-    """Tell whether a node runs a script that an entry holds: it may read and write anything."""
+    """Return whether a node runs a script that an entry holds: it may read and write anything."""
     return any(_is_in_entry(attribute) for attribute in _present(element, () if type_ is None else type_.scripts))
 
 
@@ -273,7 +273,7 @@ def _among(part: Part) -> frozenset[str] | None:
 
 
 def _may_be_state(part: Part, child: Part) -> bool:
-    """Tell whether a bare name stands beside a dotted one: `navigation.flight_status == IN_AIR`."""
+    """Return whether a bare name stands beside a dotted one: `navigation.flight_status == IN_AIR`."""
     if not isinstance(part, Comparison) or not isinstance(child, Name):
         return False
     return any(isinstance(other, Name) and "." in other.name for other in part.operands)

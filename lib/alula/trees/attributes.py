@@ -12,7 +12,7 @@ RESERVED = frozenset({"name", "ID", AUTOREMAP, *PRECONDITIONS, *POSTCONDITIONS})
 
 
 def is_port(attribute: str) -> bool:
-    """Tell whether an attribute of a node is a port: others are its name, conditions, or what an editor has noted (``_uid``)."""
+    """Return whether an attribute of a node is a port: others are its name, conditions, or what an editor has noted (``_uid``)."""
     return attribute[0].isalpha() and attribute not in RESERVED
 
 

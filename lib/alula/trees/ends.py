@@ -21,7 +21,7 @@ ANY_END: Ends = ENDS | SKIPS
 
 
 def goes_past(child: Ends, goes_on: Answer) -> bool:
-    """Tell whether a node that goes on after an answer may go on after this child."""
+    """Return whether a node that goes on after an answer may go on after this child."""
     return goes_on in child or SKIPPED in child
 
 

@@ -84,7 +84,7 @@ def _marks(trees: list[Element]) -> Iterator[Attribute | Element]:
 
 
 def _is_new(element: Element) -> bool:
-    """Tell whether only files of format 4 have such a node."""
+    """Return whether only files of format 4 have such a node."""
     if element.tag in NEW_TAGS or any(name.startswith("_") and name[1:2].isalpha() and name != "_uid" for name in element.attributes):
         return True
     return element.tag == "SubTree" and any(BRACES.fullmatch(one.value) for one in _remappings(element))

@@ -76,7 +76,7 @@ class _Entries:
         return next((one for one in types if one is not ANY), ANY)
 
     def is_written_first(self, key: str, element: Element) -> bool:
-        """Tell whether an element is the first to name an entry, others name it later, and none of them is known to write it."""
+        """Return whether an element is the first to name an entry, others name it later, and none of them is known to write it."""
         users = self.users[key]
         ports = [self.port(one, name) for one, name in users]
         is_known = any(port is not None and port.direction is not Direction.INPUT for port in ports)

@@ -116,7 +116,7 @@ class Library:
         return min(self.trees.get(name, ()), key=lambda one: _steps(folder, Path(one.place.path).parent.resolve()), default=None)
 
     def has_user(self, tree: Element) -> bool:
-        """Tell whether another file takes this very tree, and not one of the same name that stands nearer to it."""
+        """Return whether another file takes this very tree, and not one of the same name that stands nearer to it."""
         name = tree.get("ID")
         having = {Path(one.place.path).resolve() for one in self.trees.get(name, ())}
         taken = (self.tree(name, str(user)) for user in self.used.get(name, set()) - having)

@@ -30,7 +30,7 @@ class Reach:
         return ANY_END if known is None else known.may_end(wiring.ports.get, [self.ends(child) for child in wiring.children])
 
     def runs(self, wiring: Wiring) -> bool | None:
-        """Tell whether a node, or one below it, may take several ticks; None: nobody knows."""
+        """Return whether a node, or one below it, may take several ticks; None: nobody knows."""
         if wiring not in self._runs:
             answers = {wiring.may_run, *(self.runs(child) for child in wiring.children)}
             self._runs[wiring] = True if True in answers else None if None in answers else False

@@ -45,7 +45,7 @@ class Tree:
 
     @property
     def woken(self) -> bool:
-        """Tell whether a node gave the flow back in the last tick and wants the next at once; to tick late costs time and nothing else."""
+        """Return whether a node yielded in the last tick (`Node.give_way`) and wants the next one at once; a late tick costs time only."""
         return self._shared.woken
 
     def tick(self) -> Answer:

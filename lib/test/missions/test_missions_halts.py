@@ -52,7 +52,7 @@ class Flown:
 
     @property
     def stopped(self) -> bool:
-        """Tell whether the tree `stop_here` was flown to its end."""
+        """Return whether the tree `stop_here` was flown to its end."""
         return any(event.skill == "look" and event.state.value == "TERMINATED" for event in self.mission.events if hasattr(event, "skill"))
 
 

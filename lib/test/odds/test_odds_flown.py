@@ -64,7 +64,7 @@ def drones(others: Mapping[str, int] | None = None) -> tuple[Flights, Odds]:
 
 
 def within(odds: Odds, ends: list[Outcome]) -> bool:
-    """Tell whether how often each end was flown can come of its chances."""
+    """Return whether how often each end was flown can come of its chances."""
     assert set(ends) <= {Outcome.ACCOMPLISHED, Outcome.DEGRADED, Outcome.GIVEN_UP}
     for outcome in (Outcome.ACCOMPLISHED, Outcome.DEGRADED, Outcome.GIVEN_UP):
         known = odds.outcomes[outcome.value]

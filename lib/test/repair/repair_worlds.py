@@ -192,7 +192,7 @@ class Brute:
     fault: frozenset[tuple[str, str]]
 
     def can_run(self, skill: str) -> bool:
-        """Tell whether a skill can be started while the fault is there, which stays once it has come."""
+        """Return whether a skill can be started while the fault is there, which stays once it has come."""
         first: Situation = (tuple(one.initial for one in self.skillset.resources), frozenset(), False)
         seen, todo = {first}, deque([first])
         while todo:

@@ -91,7 +91,7 @@ def attack_impossible(subject: Subject, answer: Answer) -> None:
 
 
 def is_alike(one: Skill, other: Skill) -> bool:
-    """Tell whether a skill may do what another one does: it comes to an end as that one does, with the same inputs."""
+    """Return whether a skill may do what another one does: it comes to an end as that one does, with the same inputs."""
     return [ports.name for ports in one.inputs] == [ports.name for ports in other.inputs] and one.results == other.results
 
 

@@ -216,7 +216,7 @@ LISTS = ("1;2", "1;2;", "1 ;2", "1; 2", " 1;2", "1;;2", "")
 
 
 def loads(node):
-    """Tell whether BehaviorTree.CPP makes a tree of a node, and whether this library does."""
+    """Return whether BehaviorTree.CPP makes a tree of a node, and whether this library does."""
     behaviortreepy = pytest.importorskip("behaviortreepy")
     text = f'<root BTCPP_format="4"><BehaviorTree ID="m">{node}</BehaviorTree></root>'
     answers = []

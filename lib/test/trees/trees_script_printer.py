@@ -33,7 +33,7 @@ def _text(node: Node) -> str:
 
 
 def _stands_bare(node: Node) -> bool:
-    """Tell whether an operand of `&&` needs no brackets: a comparison, `!x`."""
+    """Return whether an operand of `&&` needs no brackets: a comparison, `!x`."""
     return isinstance(node, Comparison) or (isinstance(node, Prefix) and node.operator != "-")
 
 

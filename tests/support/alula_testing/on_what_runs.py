@@ -126,7 +126,7 @@ def _a_mission_dies(robot: Path, run: Run) -> None:
 
 
 def lives(pid: int) -> bool:
-    """Tell whether a process runs; one that nobody has asked for its end does not."""
+    """Return whether a process runs; one that nobody has asked for its end does not."""
     try:
         return bool(psutil.Process(pid).status() != psutil.STATUS_ZOMBIE)
     except psutil.NoSuchProcess:

@@ -27,7 +27,7 @@ def read_skill(cursor: Cursor) -> Skill:
 
 
 def ends_block(cursor: Cursor) -> bool:
-    """Tell whether something begins that can't stand inside a block of a skill: the block's `}` is missing."""
+    """Return whether something begins that can't stand inside a block of a skill: the block's `}` is missing."""
     progress = cursor.at("progress") and cursor.ahead().text == "=" and cursor.ahead(2).kind is Kind.NUMBER
     return progress or starts_block(cursor, BLOCKS) or starts_member(cursor, _OUTSIDE)
 

@@ -18,7 +18,7 @@ OUTSIDE = ("resource", "event", "skill", "property")
 
 
 def outside(cursor: Cursor) -> bool:
-    """Tell whether something begins that can only stand outside of the skill."""
+    """Return whether something begins that can only stand outside of the skill."""
     return starts_member(cursor, OUTSIDE)
 
 

@@ -52,7 +52,7 @@ def read_skill(cursor: Cursor) -> Skill:
 
 
 def _begins_block(cursor: Cursor) -> bool:
-    """Tell whether a line begins with `start r -> S`, `success ok {` or `input x: T`: an entry of no block begins with two names."""
+    """Return whether a line begins with `start r -> S`, `success ok {` or `input x: T`: an entry of no block begins with two names."""
     begins = cursor.here.text in BLOCKS and cursor.here.kind is Kind.NAME and cursor.here.line > cursor.previous.line
     return begins and cursor.ahead().kind is Kind.NAME and cursor.ahead(2).text in {"->", "{", ":"} and cursor.ahead().text != "guard"
 

@@ -51,11 +51,11 @@ class Cursor:
         return token
 
     def at(self, *texts: str) -> bool:
-        """Tell whether one of these punctuations or words comes next."""
+        """Return whether one of these punctuations or words comes next."""
         return self.here.text in texts and self.here.kind in {Kind.NAME, Kind.PUNCTUATION}
 
     def at_word(self, word: str) -> bool:
-        """Tell whether this word comes next in its meaning for the language, not as a name of an entry or state."""
+        """Return whether this word comes next in its meaning for the language, not as a name of an entry or state."""
         return self.at(word) and self.ahead().text not in {":", "->"}
 
     def accept(self, *texts: str) -> Token | None:
@@ -82,7 +82,7 @@ class Cursor:
         raise self.fail(kind.value)
 
     def same_line(self, offset: int = 0) -> bool:
-        """Tell whether the token that many places ahead stands on the line of the token read last."""
+        """Return whether the token that many places ahead stands on the line of the token read last."""
         return self.ahead(offset).line == self.previous.line
 
     def span(self, first: Token, last: Token | None = None) -> Span:
@@ -165,12 +165,12 @@ class Cursor:
 
 
 def starts_block(cursor: Cursor, words: Collection[str]) -> bool:
-    """Tell whether `word {` comes next, with one of these words."""
+    """Return whether `word {` comes next, with one of these words."""
     return cursor.here.text in words and cursor.here.kind is Kind.NAME and cursor.ahead().text == "{"
 
 
 def starts_member(cursor: Cursor, words: Collection[str]) -> bool:
-    """Tell whether `word name {` or `word name:` comes next, with one of these words, as in `skill takeoff {`."""
+    """Return whether `word name {` or `word name:` comes next, with one of these words, as in `skill takeoff {`."""
     if cursor.here.text not in words or cursor.here.kind is not Kind.NAME:
         return False
     return cursor.ahead().kind is Kind.NAME and cursor.ahead(2).text in {"{", ":"}

@@ -151,7 +151,7 @@ def _missing(wanted: tuple[Transition, ...], given: tuple[Transition, ...]) -> t
 
 
 def is_of_silence(transition: Transition, initial: str) -> bool:
-    """Tell whether `silence` in a resource with this initial state stands for the transition."""
+    """Return whether `silence` in a resource with this initial state stands for the transition."""
     return transition.extern and transition.target == initial
 
 

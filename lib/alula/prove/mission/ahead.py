@@ -57,7 +57,7 @@ class Looking:
         self._skips = {number for number, node in enumerate(self._nodes) if any(map(self._may_skip, self._below[number]))}
 
     def _plain(self, node: Node) -> bool:
-        """Tell whether all that a node asks for stands in the file."""
+        """Return whether all that a node asks for stands in the file."""
         of = node.wiring
         return of.type.name not in self.read.free and not takes_script_from_entry(of.element, of.type)
 
@@ -65,7 +65,7 @@ class Looking:
         return SKIPPED in self._reach.ends(self._nodes[number].wiring) or number in self._opaque
 
     def may_be_skipped(self, number: int) -> bool:
-        """Tell whether a node, or one below it, may be skipped, or asks for what is not known."""
+        """Return whether a node, or one below it, may be skipped, or asks for what is not known."""
         return number in self._skips
 
     def ahead(self, phase: str, *, stops: bool, values: Sequence[Mapping[str, Hashable]]) -> Ahead:

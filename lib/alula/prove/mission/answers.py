@@ -149,7 +149,7 @@ class Answers:
         return self._asking[region]
 
     def _gives_up(self, region: int, first: Ticked) -> bool:
-        """Tell whether a tick, or one of the next before anything is asked for, comes to a node by which the tree gives up."""
+        """Return whether a tick, or one of the next before anything is asked for, comes to a node by which the tree gives up."""
         seen: set[int] = {region}
         todo = [(region, first)]
         while todo:

@@ -15,7 +15,7 @@ NO_FAULTS: Faults = {}
 
 
 def true_in(system: System, condition: Expression, state: State, shown: frozenset[str] = frozenset()) -> bool:
-    """Tell whether a condition is true in a situation; ``shown`` are the faults that the step to it has shown."""
+    """Return whether a condition is true in a situation; ``shown`` are the faults that the step to it has shown."""
     match condition:
         case ResourceIs(resource=resource, state=value, negated=negated):
             return (system.resource(state, resource) == value) != negated

@@ -50,7 +50,7 @@ class _Way(NamedTuple):
             yield from part.outcomes()
 
     def leads_into(self, sets: Sets) -> bool:
-        """Tell whether all managers can come into a target."""
+        """Return whether all managers can come into a target."""
         return all(must <= target for must, target in zip(self.must, sets, strict=True)) and not any(
             target.isdisjoint(one) for several, target in zip(self.either, sets, strict=True) for one in several
         )

@@ -26,7 +26,7 @@ Values = Mapping[str, object]
 
 
 def fits(values: Values, question: Question, answer: Answer) -> bool:
-    """Tell whether values give an answer about data."""
+    """Return whether values give an answer about data."""
     _, name, symbol, other = question
     key = f"{name} {FRESH}" if symbol == FRESH else str(name)
     if symbol == FRESH or key not in values:

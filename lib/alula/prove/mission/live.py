@@ -264,7 +264,7 @@ class Liveness:
     # --- what a node reads and writes ------------------------------------------------------------------------------------
 
     def _hidden(self, node: Node) -> bool:
-        """Tell whether what is below a node may go on otherwise than is known here."""
+        """Return whether what is below a node may go on otherwise than is known here."""
         ticking = self._ticking(node)
         known = not node.children or ticking.tells_passed or ticking.order is Order.SINGLE
         return not known or self._looking.may_be_skipped(self._number[id(node)])
@@ -325,7 +325,7 @@ class Liveness:
 
 
 def _at_least_once(count: str) -> bool:
-    """Tell whether a port's text is a count with which the child is ticked; an entry may be any."""
+    """Return whether a port's text is a count with which the child is ticked; an entry may be any."""
     text = count.strip()
     return text == "-1" or (text.isdecimal() and int(text) > 0)
 

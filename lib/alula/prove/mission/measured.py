@@ -142,7 +142,7 @@ class Measurements:
 
     @property
     def any(self) -> bool:
-        """Tell whether any were asked in this tick."""
+        """Return whether any were asked in this tick."""
         return bool(self._known)
 
     def value(self, data: str) -> object | None:
@@ -207,7 +207,7 @@ class MeasuredNumber(UnknownNumber):
         return bool(self.oracle.choose((DATA, self.what, symbol, repr(other))))
 
     def near(self, other: float) -> bool:
-        """Tell whether it is equal to another, as scripts count."""
+        """Return whether it is equal to another, as scripts count."""
         if isinstance(other, UnknownNumber):
             raise UndecidedError(f"the data {self.what} is compared with {other.what}, which is not known either")
         low, high = other - EPSILON, other + EPSILON

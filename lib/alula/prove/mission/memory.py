@@ -217,7 +217,7 @@ class Keeper:
         )
 
     def _follows(self, number: int, node: SkillNode, ahead: Ahead, live: Live | None) -> bool:
-        """Tell whether an execution of a leaf matters: of one that was left, where a script asks whether it still runs."""
+        """Return whether an execution of a leaf matters: of one that was left, where a script asks whether it still runs."""
         handle = node.leaf.handle
         if handle is None or node.status is RUNNING:
             return handle is not None
@@ -239,7 +239,7 @@ class Keeper:
 
     @property
     def unknown(self) -> bool:
-        """Tell whether there is a value on the mission's blackboard that the search does not know."""
+        """Return whether there is a value on the mission's blackboard that the search does not know."""
         return any(
             entry.value == ANOTHER if type(entry.value) is str else is_unknown(entry.value)
             for board in self._boards

@@ -31,7 +31,7 @@ class Moment:
         self._not_passed = 0.0 if now else math.inf
 
     def reached(self, duration: float | str) -> bool:
-        """Tell whether so much time has passed since; the same answer for a whole tick, and for ever once it is yes.
+        """Return whether so much time has passed since; the same answer for a whole tick, and for ever once it is yes.
 
         Of a duration that is not known its name is given: it may be over in any tick.
         """
@@ -87,7 +87,7 @@ class Later:
 
     @property
     def over(self) -> bool:
-        """Tell whether it has come."""
+        """Return whether it has come."""
         return self.since.reached(self.duration)
 
     @property

@@ -54,7 +54,7 @@ class OwnNodes:
 
     @property
     def any_run(self) -> bool:
-        """Tell whether a class with children is run."""
+        """Return whether a class with children is run."""
         return any(not one.why_not for one in self.taken)
 
     @property
@@ -94,7 +94,7 @@ def own_nodes(robot: Robot, part: MissionPart, declared: Sequence[NodeType], why
 
 
 def has_children(category: Category, count: tuple[int, int | None] | None) -> bool:
-    """Tell whether a type of node may have children."""
+    """Return whether a type of node may have children."""
     return (count or CHILDREN[category])[1] != 0
 
 

@@ -92,7 +92,7 @@ class _Answers(Oracle):
 
 
 def _alike(chosen: Question, asked: Question) -> bool:
-    """Tell whether a choice of the search answers a comparison in which one number, which the search did not know, is known here."""
+    """Return whether a choice of the search answers a comparison in which one number, which the search did not know, is known here."""
     match chosen, asked:
         case ("compare", str(left), str(symbol), str(right)), ("compare", str(one), str(other_symbol), str(other)):
             straight = symbol == other_symbol and (left == one or right == other)

@@ -88,7 +88,7 @@ class Handle:
 
     @property
     def done(self) -> bool:
-        """Tell whether it has ended."""
+        """Return whether it has ended."""
         return self._seen[0] == "ended"
 
     @property
@@ -149,7 +149,7 @@ class Client:
 
     @property
     def ready(self) -> bool:
-        """Tell whether the managers are there."""
+        """Return whether the managers are there."""
         return bool(self._robot.oracle.look(("alive", self.skillset)))
 
     def follow(self, data: Collection[str]) -> None:

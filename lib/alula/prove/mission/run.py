@@ -40,5 +40,5 @@ class MissionFinding(Diagnostic):
 
     @property
     def playable(self) -> bool:
-        """Tell whether `check --play` plays it."""
+        """Return whether `check --play` plays it."""
         return self.run is not None

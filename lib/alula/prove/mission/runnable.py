@@ -233,7 +233,7 @@ class _Code:
 
     @staticmethod
     def _is_harmless(value: object) -> bool:
-        """Tell whether it is a function or a class of Python's or of ours that keeps nothing."""
+        """Return whether it is a function or a class of Python's or of ours that keeps nothing."""
         if isinstance(value, type) and f"{value.__module__}.".startswith(("builtins.", "alula.", "py_trees.")):
             return value in _BUILTINS or issubclass(value, Exception | Node | Status | Skipped)
         return any(value is one for one in _BUILTINS)

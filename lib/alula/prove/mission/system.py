@@ -166,12 +166,12 @@ class System:
         return None
 
     def may_abort(self, number: int) -> bool:
-        """Tell whether a mission with this memory can be aborted; one that has not begun just ends."""
+        """Return whether a mission with this memory can be aborted; one that has not begun just ends."""
         memory = self.ticker.memories[number]
         return memory.started and not memory.stops and memory.end is None
 
     def leaves_out(self, event: Event, memory: int) -> bool:
-        """Tell whether something can't happen to managers with this memory: when the mission is over, only what still runs goes on."""
+        """Return whether something can't happen to managers with this memory: when the mission is over, only what still runs goes on."""
         if event.kind is Kind.PAUSE:
             return not self.ticker.may_pause(memory)
         return event.leaf < 0 and self.ticker.memories[memory].end is not None
@@ -239,7 +239,7 @@ class System:
         return self.memory(state).end
 
     def started(self, state: State) -> bool:
-        """Tell whether the mission has begun: before that it waits for what it needs."""
+        """Return whether the mission has begun: before that it waits for what it needs."""
         return self.memory(state).started
 
     def resource(self, state: State, name: str) -> str | None:
@@ -249,7 +249,7 @@ class System:
         return self._steps[place].resource(self._managers[state.managers[place]], resource)
 
     def running(self, state: State, skill: str) -> bool:
-        """Tell whether an execution of ``skillset.skill`` runs in its managers."""
+        """Return whether an execution of ``skillset.skill`` runs in its managers."""
         skillset, _, name = skill.partition(".")
         skills = self._steps[self._place[skillset]].skills
         return any(one.phase == RUNNING and skills[one.leaf] == name for one in self.managers(state, skillset).executions)

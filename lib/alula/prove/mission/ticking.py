@@ -49,7 +49,7 @@ class Decision:
 
     @property
     def in_breadth(self) -> bool:
-        """Tell whether few such choices come before many: what a node does one after another leads to most things in many ways."""
+        """Return whether few such choices come before many: what a node does one after another leads to most things in many ways."""
         return self.question[0] == DOES
 
 
@@ -122,7 +122,7 @@ class Ticker:
             yield known
 
     def may_pause(self, memory: int) -> bool:
-        """Tell whether a mission with this memory can be paused."""
+        """Return whether a mission with this memory can be paused."""
         if memory not in self._pausing:
             self._oracle.begin(lambda _: None)
             self._keeper.put(self.memories[memory])
@@ -186,7 +186,7 @@ class Ticker:
             director.broken(f"the tree raised {type(error).__name__}: {error}")
 
     def _come_again(self, begin: int) -> bool:
-        """Tell whether all is as it was after other answers from the same question on: what follows from here follows from there, too."""
+        """Return whether all is as it was after other answers from the same question on: what follows from here follows from there, too."""
         asked = self._oracle.asked
         # What is asked of leaves and unknown values is chosen anew each time; all else has one answer for the whole tick.
         lasting = frozenset((one.question, one.answer) for one in asked[begin:] if one.question[0] not in CHOSEN_ANEW)
@@ -226,5 +226,5 @@ class Ticker:
 
 
 def _comes_of_misfit(error: BaseException | None) -> bool:
-    """Tell whether an error, or what it was raised of, is that of a value which a port can't read."""
+    """Return whether an error, or what it was raised of, is that of a value which a port can't read."""
     return error is not None and (isinstance(error, MisfitError) or _comes_of_misfit(error.__context__))

@@ -162,7 +162,7 @@ class UnknownText(str, StandIn):
         return unknown(self.oracle, self.what, type_)
 
     def says(self, number: float) -> bool:
-        """Tell whether it is a text for a number."""
+        """Return whether it is a text for a number."""
         return self._asked("a text for", f"{number:g}")
 
     def _asked(self, symbol: str, other: str) -> bool:
@@ -230,11 +230,11 @@ class NumberAsText(UnknownText):
         return made
 
     def says(self, number: float) -> bool:
-        """Tell whether it is this number."""
+        """Return whether it is this number."""
         return self.number == number
 
     def _decided(self, symbol: str, other: object) -> bool:
-        """Tell whether it is a text, which has to be written as numbers are."""
+        """Return whether it is a text, which has to be written as numbers are."""
         if symbol != "==" or not isinstance(other, str):
             raise UndecidedError(f"the letters of {self.what}, a number, are needed")
         # Those who compare it with a text that is known ask for the number next.
@@ -442,5 +442,5 @@ def any_value(oracle: Oracle, what: str, type_: PortType | None) -> object:
 
 
 def is_unknown(value: object) -> bool:
-    """Tell whether the search does not know a value."""
+    """Return whether the search does not know a value."""
     return isinstance(value, StandIn)

@@ -83,7 +83,7 @@ class _Seen:
         self._needed.setdefault(entry, set()).add(type_)
 
     def is_entry(self, name: str) -> bool:
-        """Tell whether a name in a script is an entry's."""
+        """Return whether a name in a script is an entry's."""
         return "." not in name and name not in self.numbers
 
     def _ports(self, wiring: Wiring) -> None:
@@ -163,7 +163,7 @@ class _InScript:
             self._seen.same(self._board.where(name.name), self._board.where(names[0].name))
 
     def _is_number(self, node: Node) -> bool:
-        """Tell whether it is a name that scripts have for a number."""
+        """Return whether it is a name that scripts have for a number."""
         return isinstance(node, Name) and node.name in self._seen.numbers
 
     def _need(self, name: Name, type_: PortType) -> None:

@@ -94,7 +94,7 @@ class Aftermath:
         return bool(after != self.bdd.false and self.bound.narrowed(after) != self.bdd.false)
 
     def _breaks_within(self, update: Update, skill: str) -> bool:
-        """Tell whether a violation can break an execution that none has broken before: its invariants were true."""
+        """Return whether a violation can break an execution that none has broken before: its invariants were true."""
         after = update.guard & ~self._broken[skill] & self.bdd.let(dict(update.values), self._broken[skill])
         return bool(after != self.bdd.false and after & self.bound.within(update.changed) != self.bdd.false)
 

@@ -101,7 +101,7 @@ def _about(skill: Skill) -> set[str]:
 
 
 def _alone(model: Encoded, skill: Skill) -> bool:
-    """Tell whether a skill's preconditions and invariants exclude each other: then it runs once at most."""
+    """Return whether a skill's preconditions and invariants exclude each other: then it runs once at most."""
     ready = model.all_of(model.term(p.condition) for p in skill.preconditions)
     return bool(ready & model.all_of(model.term(i.condition) for i in skill.invariants) == model.bdd.false)
 

@@ -214,7 +214,7 @@ def _data_of(conditions: Sequence[Expression]) -> set[str]:
 
 
 def _written(condition: Expression) -> bool:
-    """Tell whether a condition stands in the source: the `true` in place of one left out is no finding."""
+    """Return whether a condition stands in the source: the `true` in place of one left out is no finding."""
     return condition != TRUE or condition.span != NOWHERE
 
 

@@ -198,7 +198,7 @@ class _Player:
             self._world.settle(self._has_caught_up)
 
     def _has_caught_up(self) -> bool:
-        """Tell whether nothing is due in the managers, and each execution was asked for its progress within the period."""
+        """Return whether nothing is due in the managers, and each execution was asked for its progress within the period."""
         due_ns, now_ns = self._managers.engine.due_ns, self._world.now_ns
         return (due_ns is None or due_ns > now_ns) and all(
             now_ns - self._functions[one.skill].asked_ns.get(one.id, now_ns) < self._periods_s[one.skill] * 1e9

@@ -43,7 +43,7 @@ def _with(values: list[bool], true: Collection[int]) -> list[bool]:
 
 
 def true_in(system: TransitionSystem, condition: Expression, state: State) -> bool:
-    """Tell whether a condition over resources and executions is true in a situation."""
+    """Return whether a condition over resources and executions is true in a situation."""
     match condition:
         case ResourceIs(resource=resource, state=value, negated=negated):
             index = next(i for i, r in enumerate(system.skillset.resources) if r.name == resource)
@@ -105,7 +105,7 @@ def _avoiding(graph: Graph, goal: list[bool]) -> Callable[[int], Iterator[tuple[
 
 
 def _goes_on(graph: Graph, component: list[int], goal: list[bool]) -> bool:
-    """Tell whether a run can stay in a component: round a loop, or because nothing more can happen at all."""
+    """Return whether a run can stay in a component: round a loop, or because nothing more can happen at all."""
     inside = set(component)
     if any(edge.target in inside for number in component for edge in graph.edges[number]):
         return True

@@ -251,7 +251,7 @@ class Sets:
     # --- single situations ----------------------------------------------------------------------------------------
 
     def contains(self, situations: Any, state: State) -> bool:
-        """Tell whether a situation is in a set."""
+        """Return whether a situation is in a set."""
         return bool(self.bdd.let(self._values(state), situations) == self.bdd.true)
 
     def only(self, states: Iterable[State]) -> Any:

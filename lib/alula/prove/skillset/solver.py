@@ -44,7 +44,7 @@ class Solver:
     # --- questions ------------------------------------------------------------------------------------------------
 
     def possible(self, *terms: Any) -> bool:
-        """Tell whether all terms can be true at once; raise OutOfTimeError."""
+        """Return whether all terms can be true at once; raise OutOfTimeError."""
         self._solver.push()
         try:
             return self._check(self._solver, [*self._ranges, *terms])

@@ -180,7 +180,7 @@ class _Search:
         return None
 
     def _kept_by_few(self, begins: Any, goal: Any) -> bool:
-        """Tell whether a property holds even if only the skills around it have to end, in all that their bound allows.
+        """Return whether a property holds even if only the skills around it have to end, in all that their bound allows.
 
         Fewer skills that have to end, and more situations, allow more runs: where none of these is against the property, none is.
         """

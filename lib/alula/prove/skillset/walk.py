@@ -24,7 +24,7 @@ class Walker:
         self.sets = sets
 
     def reaches(self, goal: Any) -> bool:
-        """Tell whether some run comes to the goal."""
+        """Return whether some run comes to the goal."""
         return bool(self.sets.narrowed(goal) != self.sets.bdd.false and (self.sets.exact or self._rings(goal)))
 
     def to(self, goal: Any) -> list[Move] | None:

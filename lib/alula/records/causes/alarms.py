@@ -81,7 +81,7 @@ def _reported(skillset: Skillset) -> Iterator[tuple[Resource, str]]:
 
 @functools.cache
 def _breaks(resource: Resource, state: str, condition: Expression, skillset: Skillset) -> bool:
-    """Tell whether a condition is false with this state of a resource, whatever the others are."""
+    """Return whether a condition is false with this state of a resource, whatever the others are."""
     asked = dict.fromkeys(atom.resource for atom in atoms(condition) if isinstance(atom, ResourceIs))
     if resource.name not in asked:
         return False

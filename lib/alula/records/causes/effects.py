@@ -33,15 +33,15 @@ class FaultEffects:
     told: str = "failed"
 
     def shows(self, change: TransitionEvent) -> bool:
-        """Tell whether the functional layer can have reported the fault by this change of a resource."""
+        """Return whether the functional layer can have reported the fault by this change of a resource."""
         return _reported(change) and _any(self.states, f"{change.skillset}.{change.resource} {change.to_state}")
 
     def leads_to(self, change: TransitionEvent) -> bool:
-        """Tell whether the change can follow from the reaction to the fault."""
+        """Return whether the change can follow from the reaction to the fault."""
         return _reported(change) and _any(self.later, f"{change.skillset}.{change.resource} {change.to_state}")
 
     def stops(self, end: ExecutionEvent) -> bool:
-        """Tell whether an execution can end like this because of the fault."""
+        """Return whether an execution can end like this because of the fault."""
         return _any(self.ends, f"{end.skillset}.{end.skill} {end.result or end.state.value}")
 
     def named(self, name: Callable[[str], str]) -> FaultEffects:

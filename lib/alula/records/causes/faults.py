@@ -32,7 +32,7 @@ class Fault:
     injected: bool = True
 
     def holds(self, t_s: float) -> bool:
-        """Tell whether what happened at this time can follow from it."""
+        """Return whether what happened at this time can follow from it."""
         return self.at_s - EARLY_S <= t_s <= self.until_s + LATE_S
 
 

@@ -85,7 +85,7 @@ class Compared:
 
     @property
     def alike(self) -> bool:
-        """Tell whether all have decided the same."""
+        """Return whether all have decided the same."""
         return not any(self.differences)
 
     @property

@@ -83,7 +83,7 @@ class LoggedSteps:
                     yield stimulus
 
     def _in_time(self, belief: Belief, stimulus: Stimulus) -> bool:
-        """Tell whether an invariant can have been false for as long as it may."""
+        """Return whether an invariant can have been false for as long as it may."""
         invariant = self._invariant(stimulus) if stimulus.cause is Cause.BREAK else None
         if invariant is None or invariant.hold is None or not waits(invariant):
             return True

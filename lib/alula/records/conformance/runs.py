@@ -34,7 +34,7 @@ class ConformanceVerdict:
 
     @property
     def conforms(self) -> bool:
-        """Tell whether every event was allowed."""
+        """Return whether every event was allowed."""
         return not self.findings
 
     def as_dict(self) -> dict[str, object]:

@@ -106,7 +106,7 @@ def _complete(place: str, run: RecordedRun, matched: set[int]) -> Checked:
 
 
 def starts_or_ends(event: EngineEvent) -> bool:
-    """Tell whether an execution began to run, or ended."""
+    """Return whether an execution began to run, or ended."""
     return isinstance(event, ExecutionEvent) and (event.state is ExecutionState.RUNNING or event.state.terminal)
 
 

@@ -23,7 +23,7 @@ class Pattern:
     result: str = ""
 
     def fits(self, event: EngineEvent) -> bool:
-        """Tell whether an event is meant."""
+        """Return whether an event is meant."""
         if isinstance(event, TransitionEvent):
             subject, state, result = event.resource, event.to_state, ""
         else:

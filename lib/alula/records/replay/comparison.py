@@ -127,7 +127,7 @@ def _apart_in(then: RecordedDecision, now: RecordedDecision, recorded_id: str | 
 
 
 def alike(one: Any, other: Any) -> bool:
-    """Tell whether two values are the same, numbers within the tolerance."""
+    """Return whether two values are the same, numbers within the tolerance."""
     if isinstance(one, Mapping) and isinstance(other, Mapping):
         return one.keys() == other.keys() and all(alike(one[name], other[name]) for name in one)
     if isinstance(one, Sequence) and isinstance(other, Sequence) and not isinstance(one, str) and not isinstance(other, str):

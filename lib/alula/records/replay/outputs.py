@@ -19,7 +19,7 @@ def trace_of(result: Result, zero_s: float) -> list[dict[str, object]]:
 
 
 def same(recorded: Recorded, result: Result) -> bool:
-    """Tell whether the replay made the recorded decisions and came to the recorded outcome."""
+    """Return whether the replay made the recorded decisions and came to the recorded outcome."""
     ended_alike = result.end is None or not recorded.outcome or result.end.outcome.value == recorded.outcome
     return result.difference is None and ended_alike
 

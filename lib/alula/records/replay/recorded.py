@@ -119,7 +119,7 @@ class Recorded:
 
     @property
     def started(self) -> bool:
-        """Tell whether the mission ever began."""
+        """Return whether the mission ever began."""
         return any(entry.topic == TICKS and not entry.value.get("unmet") for entry in self.entries)
 
     @property

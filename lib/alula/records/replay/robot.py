@@ -189,14 +189,14 @@ class RecordedSkills(ReplayedRobot):
         return None if recorded_id is None else self._progress.get(recorded_id, 0.0)
 
     def stops_later(self, execution_id: str) -> bool:
-        """Tell whether the record has yet to say that an execution was interrupted."""
+        """Return whether the record has yet to say that an execution was interrupted."""
         recorded_id = self._recorded.get(execution_id)
         if recorded_id is None or recorded_id in self._passed:
             return False
         return self._answers[recorded_id].state is ExecutionState.INTERRUPTED
 
     def held(self, execution_id: str) -> bool:
-        """Tell whether an execution was paused in the record."""
+        """Return whether an execution was paused in the record."""
         return self._recorded.get(execution_id) in self._held
 
     # --- what the record tells ---------------------------------------------------------------------------------------
@@ -245,7 +245,7 @@ class RecordedSkills(ReplayedRobot):
     # --- inside ------------------------------------------------------------------------------------------------------
 
     def _explained(self, skillset: str) -> bool:
-        """Tell whether an execution of the skillset runs whose course is the recorded one."""
+        """Return whether an execution of the skillset runs whose course is the recorded one."""
         return any(
             answer.skillset == skillset and not execution.done
             for recorded_id, (execution, _) in self._running.items()

@@ -53,7 +53,7 @@ class Client:
 
     @property
     def ready(self) -> bool:
-        """Tell whether the managers are alive, known and can be called."""
+        """Return whether the managers are alive, known and can be called."""
         return self._connection.ready.is_set()
 
     @property

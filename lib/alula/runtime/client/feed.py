@@ -36,7 +36,7 @@ class Feed:
 
     @property
     def stale(self) -> bool:
-        """Tell whether there is no value, or it is older than the model's period allows."""
+        """Return whether there is no value, or it is older than the model's period allows."""
         sample = self._sample
         if sample is None:
             return True

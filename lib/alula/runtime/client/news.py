@@ -151,7 +151,7 @@ class ClientNews:
             self.connection.heard_states()
 
     def _is_old(self, states: ResourceStates) -> bool:
-        """Tell whether these states were known before; without a transition there may be a new reason."""
+        """Return whether these states were known before; without a transition there may be a new reason."""
         known = states.sequence == self.states_after and all(self.reasons.get(name) == one.reason for name, one in states.resources.items())
         return states.sequence < self.states_after or known
 

@@ -38,7 +38,7 @@ class Entry:
 
     @property
     def may_be_asked(self) -> bool:
-        """Tell whether ``progress`` may be called: it runs, no hook is being called, and none is to stop the function."""
+        """Return whether ``progress`` may be called: it runs, no hook is being called, and none is to stop the function."""
         return self.execution.state is ExecutionState.RUNNING and not (self.asking or self.dispatching or self.stop_hook)
 
 
@@ -71,7 +71,7 @@ class SkillsetContext:
 
     @property
     def elapsed(self) -> bool:
-        """Tell whether time alone has broken something."""
+        """Return whether time alone has broken something."""
         due = due_ns(self._skillset, self._situation)
         return due is not None and self._clock_ns() >= due
 

@@ -607,7 +607,7 @@ class SkillsetEngine:
             return dict(self._context.records.skills)
 
     def why(self, skill: str, inputs: object = None) -> Why:
-        """Tell whether a skill could start now, and if not, why; with inputs ``validate`` is asked, too (hooks in this process).
+        """Return whether a skill could start now, and if not, why; with inputs ``validate`` is asked, too (hooks in this process).
 
         Raises:
             KeyError: there is no such skill.

@@ -48,7 +48,7 @@ class ExecutionEvent:
 
     @property
     def failed(self) -> bool:
-        """Tell whether it is the end of an execution that failed: by a failure of the model, a violation, a refusal or an error."""
+        """Return whether it is the end of an execution that failed: by a failure of the model, a violation, a refusal or an error."""
         return self.result_kind is ResultKind.FAILURE if self.state is ExecutionState.TERMINATED else self.state in _FAILED
 
 

@@ -38,7 +38,7 @@ class HookCaller(Protocol):
         ...
 
     def written(self, skill: str, hook: str) -> bool:
-        """Tell whether the hook does anything (see ``hooks.is_written``): then it may wait; else it need not be called."""
+        """Return whether the hook does anything (see ``hooks.is_written``): then it may wait; else it need not be called."""
         ...
 
 
@@ -54,7 +54,7 @@ class LocalHooks:
         then(call_hook(self._hooks[execution.skill], execution, hook))
 
     def written(self, skill: str, hook: str) -> bool:
-        """Tell whether the hook is written."""
+        """Return whether the hook is written."""
         return is_written(self._hooks[skill], hook)
 
 

@@ -76,7 +76,7 @@ class RemoteHooks:
             process.call(hook, snapshot(execution), then)
 
     def written(self, skill: str, hook: str) -> bool:
-        """Tell whether the hook is written; of a process that has gone, it is taken for written, so that the call says so."""
+        """Return whether the hook is written; of a process that has gone, it is taken for written, so that the call says so."""
         process = self._processes.get(skill)
         return process is None or hook in process.written
 

@@ -37,7 +37,7 @@ class VirtualClock:
 
     @property
     def idle(self) -> bool:
-        """Tell whether nothing is to come."""
+        """Return whether nothing is to come."""
         return self._timers.due_ns is None
 
     def at(self, when_ns: int, job: Job) -> Timer:

@@ -40,7 +40,7 @@ class LocalManagers:
 
     @property
     def alive(self) -> bool:
-        """Tell whether they have not been killed."""
+        """Return whether they have not been killed."""
         return self._middleware.alive
 
     @property

@@ -40,7 +40,7 @@ class _Gate(Decorator):
         """Begin anew; the child is ticked in this tick."""
 
     def opens(self) -> bool:
-        """Tell whether the child is ticked again; asked in each tick but the first."""
+        """Return whether the child is ticked again; asked in each tick but the first."""
         raise NotImplementedError
 
     def passed(self) -> None:
@@ -63,7 +63,7 @@ class RateController(_Gate):
         self._since_ns = self.now_ns
 
     def opens(self) -> bool:
-        """Tell whether a period is over."""
+        """Return whether a period is over."""
         return (self.now_ns - self._since_ns) / NANOSECONDS * number(self, "hz") >= 1.0
 
     def passed(self) -> None:
@@ -90,7 +90,7 @@ class GoalUpdatedController(_Gate):
         self._goals = self._asked()
 
     def opens(self) -> bool:
-        """Tell whether there is another goal, once."""
+        """Return whether there is another goal, once."""
         before, self._goals = self._goals, self._asked()
         return before != self._goals
 

@@ -139,7 +139,7 @@ class Switch(Control):
 
 
 def equal(one: str, other: str, enums: object) -> bool:
-    """Tell whether two texts are the same text, the same enumerator, or the same number."""
+    """Return whether two texts are the same text, the same enumerator, or the same number."""
     if one == other:
         return True
     if isinstance(one, StandIn) or isinstance(other, StandIn):
@@ -149,7 +149,7 @@ def equal(one: str, other: str, enums: object) -> bool:
 
 
 def _said(unknown: StandIn, text: str, enums: object) -> bool:
-    """Tell whether a text that nobody knows says the number that another one says; of two that nobody knows, enough was asked."""
+    """Return whether a text that nobody knows says the number that another one says; of two that nobody knows, enough was asked."""
     number = None if isinstance(text, StandIn) else _number(text, enums)
     return number is not None and unknown.says(number)
 

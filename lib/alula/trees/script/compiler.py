@@ -169,7 +169,7 @@ _DECIDES = {"&&": 0.0, "||": 1.0}
 
 
 def _asks_only(node: Node) -> bool:
-    """Tell whether nothing but its value comes of an operand: a robot's resource or data is compared with the name of a state.
+    """Return whether nothing but its value comes of an operand: a robot's resource or data is compared with the name of a state.
 
     Where that decides nothing it is not asked, which nobody sees, and a search of all runs has less to look at.
     """

@@ -60,7 +60,7 @@ def signed_number(token: Token) -> Note:
 
 
 def extended(statements: Sequence[Node]) -> bool:
-    """Tell whether a script uses what no BT.CPP reads: dotted names, calls."""
+    """Return whether a script uses what no BT.CPP reads: dotted names, calls."""
     nodes = (node for statement in statements for node in walk(statement))
     return any(isinstance(node, Call) or (isinstance(node, Name) and "." in node.name) for node in nodes)
 

@@ -95,7 +95,7 @@ class Assignment:
 
     @property
     def replaces(self) -> bool:
-        """Tell whether the value takes the place of the entry's, which is not read."""
+        """Return whether the value takes the place of the entry's, which is not read."""
         return self.operator in {":=", "="}
 
 

@@ -30,7 +30,7 @@ class ValueMismatch(Exception):  # noqa: N818 - told to the user as a ScriptErro
 
 
 def is_number(value: Value) -> bool:
-    """Tell whether BT.CPP calculates with this value."""
+    """Return whether BT.CPP calculates with this value."""
     return isinstance(value, int | float)
 
 

@@ -75,7 +75,7 @@ def ways(system: System, steps: int) -> Iterator[list[tuple[Event, State]]]:
 
 
 def possible(run: list[tuple[Event, State]]) -> bool:
-    """Tell whether nothing but the engine decides whether a run happens.
+    """Return whether nothing but the engine decides whether a run happens.
 
     What a run of the search may do and no robot does: two times that are over in an order that no clock has, comparisons that one number
     can't meet all, and answers about a number that scripts compute, of which the search keeps no more than they compare it with.

@@ -235,7 +235,7 @@ def test_a_run_against_what_must_come_never_sees_it(seed: int, tmp_path: Path) -
 
 
 def waits_at_an_end(system: System, chance: random.Random, one: Property) -> bool:
-    """Tell whether a random run that goes on until the mission is over leaves something to come."""
+    """Return whether a random run that goes on until the mission is over leaves something to come."""
     assert one.consequence is not None
     state, waits = system.initial(), False
     for _ in range(400):

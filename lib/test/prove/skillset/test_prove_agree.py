@@ -197,7 +197,7 @@ class Bench:
 
 
 def asked(edge, stimulus):
-    """Tell whether the checker's step is what a stimulus asks for; a failure does what an interruption does."""
+    """Return whether the checker's step is what a stimulus asks for; a failure does what an interruption does."""
     kind = {"fail": "interrupt"}.get(stimulus[0], stimulus[0])
     return edge.kind.value in {kind, "interrupt"} and edge.subject[0] == stimulus[1]
 

@@ -298,5 +298,5 @@ def test_an_error_in_the_reporters_thread_ends_the_node(skillset, ros_master):
 
 
 def heard(reporter: ResourceReporter) -> bool:
-    """Tell whether the reporter has heard the skillset: from then on it waits for it. rospy counts a connection before it is made."""
+    """Return whether the reporter has heard the skillset: from then on it waits for it. rospy counts a connection before it is made."""
     return bool(reporter._ledger._actual)

@@ -143,7 +143,7 @@ class RclpyLink:
 
     @property
     def connected(self) -> bool:
-        """Tell whether the action is there; its other services are met when they are used first."""
+        """Return whether the action is there; its other services are met when they are used first."""
         return self._discovered()
 
     @property

@@ -50,7 +50,7 @@ class RestingGroup(MutuallyExclusiveCallbackGroup):  # type: ignore[misc]  # rcl
         self.resting: set[Any] = set()
 
     def can_execute(self, entity: Any) -> bool:
-        """Tell whether the executor should wait for an entity, and may call back. It is asked of each at each turn: no lock is taken."""
+        """Return whether the executor should wait for an entity, and may call back. It is asked of each at each turn: no lock is taken."""
         return entity not in self.resting and self._active_entity is None
 
 

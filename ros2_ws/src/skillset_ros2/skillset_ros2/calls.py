@@ -87,7 +87,7 @@ class Calls:
 
     @property
     def ready(self) -> bool:
-        """Tell whether the service is served."""
+        """Return whether the service is served."""
         return not self._closed and (self._met_unseen or bool(self._client.service_is_ready()))
 
     def call(self, request: Any, on_reply: OnReply, on_error: OnError, *, timeout_s: float, once: bool) -> Withdraw:

@@ -45,7 +45,7 @@ class EmptyWakes(LastingWaitable):
         self._begun_s = time.monotonic()
 
     def is_ready(self, wait_set: Any) -> bool:
-        """Tell whether the executor turns for nothing."""
+        """Return whether the executor turns for nothing."""
         empty = time.monotonic() - self._begun_s < AT_ONCE_S and not any(wait_set.get_ready_entities(kind) for kind in KINDS)
         self._row = self._row + 1 if empty else 0
         return self._row >= ROW

@@ -56,7 +56,7 @@ class RclpyExecutor(SingleThreadedExecutor):  # type: ignore[misc]  # rclpy has 
             return all(_over(task) or task.executing() for task, _, _ in self._tasks)
 
     def can_execute(self, entity: Any) -> bool:
-        """Tell whether to wait for an entity: not for an action that a thread has destroyed and will take off its node's list."""
+        """Return whether to wait for an entity: not for an action that a thread has destroyed and will take off its node's list."""
         return super().can_execute(entity) and not (isinstance(entity, Waitable) and _destroyed(entity))
 
     def wait_for_ready_callbacks(self, *args: Any, **kwargs: Any) -> Any:

@@ -102,7 +102,7 @@ class FunctionSkill(SkillHooks, Generic[CallT]):
 
     @property
     def stops_first(self) -> bool:
-        """Tell whether a server that has just come is being told to stop what runs: nothing is asked of it before it has answered."""
+        """Return whether a server that has just come is being told to stop what runs: nothing is asked of it before it has answered."""
         with self._lock:  # another thread may be about to destroy the client
             late = self._late
             return late is not None and late.client.wait_for_service(timeout_sec=0.0)
@@ -131,7 +131,7 @@ class FunctionSkill(SkillHooks, Generic[CallT]):
         return self.watch.now_s - call.since_s
 
     def is_open(self, call: CallT) -> bool:
-        """Tell whether this is still what the execution waits for: it has neither ended nor asked anew."""
+        """Return whether this is still what the execution waits for: it has neither ended nor asked anew."""
         return self._calls.get(call.execution.id) is call
 
     def forget(self, execution: Execution) -> CallT | None:

@@ -32,7 +32,7 @@ class RobotClient:
 
     @property
     def ready(self) -> bool:
-        """Tell whether all skillsets can be called."""
+        """Return whether all skillsets can be called."""
         return all(client.ready for client in self.clients.values())
 
     def wait_ready(self, timeout_s: float, skillsets: Sequence[str] = ()) -> bool:

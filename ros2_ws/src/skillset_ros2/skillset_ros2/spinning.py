@@ -28,7 +28,7 @@ def executor_of(node: Node) -> Any:
 
 
 def spins_here(executor: object) -> bool:
-    """Tell whether this thread is inside a callback, or any other part, of the executor's ``spin``."""
+    """Return whether this thread is inside a callback, or any other part, of the executor's ``spin``."""
     frame = inspect.currentframe()
     while frame is not None:
         # By name: in the threads of an executor that has several, frames of its handlers know it, too.

@@ -272,7 +272,7 @@ def connected(publisher, subscribers: int = 1) -> None:
 
 
 def all_arrived(context, node, server) -> bool:
-    """Tell whether the last two subscriptions, the service "ask" and the action server of a node each have something to take."""
+    """Return whether the last two subscriptions, the service "ask" and the action server of a node each have something to take."""
     subscriptions = list(node.subscriptions)[-2:]
     service = next(service for service in node.services if service.srv_name.endswith("ask"))
     inside = server.get_num_entities()

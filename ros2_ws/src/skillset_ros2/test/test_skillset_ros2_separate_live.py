@@ -39,7 +39,7 @@ def running(mission):
 
 
 def alive(pid: int) -> bool:
-    """Tell whether a process has not ended; one whose parent does not ask for its end stays as a zombie."""
+    """Return whether a process has not ended; one whose parent does not ask for its end stays as a zombie."""
     try:
         return Path(f"/proc/{pid}/stat").read_text(encoding="ascii").rsplit(")", 1)[1].split()[0] != "Z"
     except OSError:

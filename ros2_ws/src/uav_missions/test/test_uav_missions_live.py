@@ -65,7 +65,7 @@ class Mission:
         self._ticked_s, self._heard_at_s = heartbeat.stamp.sec + heartbeat.stamp.nanosec * 1e-9, time.monotonic()
 
     def has_told(self) -> bool:
-        """Tell whether a heartbeat has come."""
+        """Return whether a heartbeat has come."""
         return self._heard_at_s > 0.0
 
     def _heard_s(self) -> float:

@@ -30,7 +30,7 @@ class Route:
 
     @property
     def done(self) -> bool:
-        """Tell whether every waypoint was reached."""
+        """Return whether every waypoint was reached."""
         return self.reached >= len(self.waypoints)
 
     @property

@@ -78,7 +78,7 @@ class Rig:
         return make
 
     def _calls_are_answered(self) -> bool:
-        """Tell whether no call of a test before is still on its way: it would look like one of the next test's."""
+        """Return whether no call of a test before is still on its way: it would look like one of the next test's."""
         apis = [api for hook in self._hooks for api in vars(hook).values() if hasattr(api, "_calls")]
         assert apis, "the hooks have no functional interface any more: look here"
         return not any(api._calls._calls for api in apis)

@@ -42,7 +42,7 @@ class Service(Protocol):
     service_name: str
 
     def service_is_ready(self) -> bool:
-        """Tell whether a server is there."""
+        """Return whether a server is there."""
         ...
 
     def call_async(self, request: Any) -> Any:

@@ -115,7 +115,7 @@ def decide_hover(hovered_s: float, duration_s: float) -> SkillEnd | None:
 
 
 def speaks_of(state: GuidanceReport, *, kind: str, reference_id: int) -> bool:
-    """Tell whether a state is about a reference: a dropped one (``idle``) keeps its id, and has nothing to go any more."""
+    """Return whether a state is about a reference: a dropped one (``idle``) keeps its id, and has nothing to go any more."""
     return state.reference_id == reference_id and state.reference == kind
 
 

@@ -180,7 +180,7 @@ class GuidedSkill(SkillHooks):
         return SkillEnd("ABORTED", f"nothing is heard of the guidance for {silent_s:.1f} s: {UNHEARD}")
 
     def _should_stop(self, motion: GuidedMotion) -> bool:
-        """Tell whether a hover is to follow a motion that is not watched any more.
+        """Return whether a hover is to follow a motion that is not watched any more.
 
         Not while the vehicle is being landed, perhaps because no mission decides: it would stay in the air. Nor after a hover that may
         still arrive: another one might arrive after the landing that the mission asks for next.

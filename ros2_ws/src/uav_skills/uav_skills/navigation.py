@@ -148,7 +148,7 @@ class LockHead(GuidedSkill, AbstractLockHeadSkill):  # type: ignore[misc]  # gen
         self.guidance.release_heading(reply)
 
     def progress(self, execution: Execution) -> float:
-        """Tell whether the heading is held."""
+        """Return whether the heading is held."""
         motion = self._motion
         return 1.0 if motion is not None and motion.execution is execution and motion.followed_since_s is not None else 0.0
 

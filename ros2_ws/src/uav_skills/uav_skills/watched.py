@@ -86,7 +86,7 @@ class WatchedSkill(SkillHooks):
             execution.terminate(verdict.result, verdict.message)
 
     def _forget(self, execution: Execution) -> bool:
-        """Tell whether this execution was the one that is watched, and watch no more."""
+        """Return whether this execution was the one that is watched, and watch no more."""
         with self._lock:
             mine = self._execution is execution
             self._execution = None if mine else self._execution

@@ -108,7 +108,7 @@ class Player:
         return all(self._is_settled(handle) for handle in self._handles.values())
 
     def _is_settled(self, handle: SkillHandle) -> bool:
-        """Tell whether an execution has ended for both sides, or runs, was dispatched and does not end by itself."""
+        """Return whether an execution has ended for both sides, or runs, was dispatched and does not end by itself."""
         if self._stage.engine.execution(handle.id) is None:
             return handle.done
         hooks = self._hooks[handle.skill]

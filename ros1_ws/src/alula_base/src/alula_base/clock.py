@@ -35,7 +35,7 @@ _SLOWER = SlowerClock()
 
 
 def is_simulated() -> bool:
-    """Tell whether ROS has simulated time."""
+    """Return whether ROS has simulated time."""
     return not rospy.rostime.is_wallclock()
 
 

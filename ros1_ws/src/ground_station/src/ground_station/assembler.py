@@ -56,7 +56,7 @@ class Assembler:
 
     @property
     def want_key(self) -> bool:
-        """Tell whether only a key frame helps."""
+        """Return whether only a key frame helps."""
         return self._next_id is None and self.newest_id >= 0
 
     def add(self, packet: VideoPacket, now_ns: int) -> bool:
@@ -122,7 +122,7 @@ class Assembler:
         return None
 
     def _late(self, now_ns: int) -> bool:
-        """Tell whether newer frames have waited too long for the next one."""
+        """Return whether newer frames have waited too long for the next one."""
         newer = [p.begun_ns for frame_id, p in self._partial.items() if self._next_id is not None and frame_id >= self._next_id]
         return len(self._partial) > MOST_WAITING or (bool(newer) and now_ns - min(newer) > TIMEOUT_NS and self._behind())
 

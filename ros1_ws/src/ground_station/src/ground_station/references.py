@@ -21,7 +21,7 @@ class References:
         self._silent = False
 
     def __bool__(self) -> bool:
-        """Tell whether any has come."""
+        """Return whether any has come."""
         return self._newest_ns >= 0
 
     def note(self, stamp_ns: int, image: Rgb) -> None:

@@ -37,7 +37,7 @@ class Deflection:
 
     @property
     def moved(self) -> bool:
-        """Tell whether the stick is held away from its middle."""
+        """Return whether the stick is held away from its middle."""
         return max(map(abs, (self.forward, self.left, self.up, self.turn))) > DEAD_ZONE
 
 

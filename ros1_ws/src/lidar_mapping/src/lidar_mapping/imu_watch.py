@@ -57,6 +57,6 @@ class ImuWatch:
 
 
 def unchanging(readings: Sequence[ImuReading]) -> bool:
-    """Tell whether at most one of the six numbers changes from reading to reading: no sensor in a vehicle that flies is so quiet."""
+    """Return whether at most one of the six numbers changes from reading to reading: no sensor in a vehicle that flies is so quiet."""
     values = np.array([(*reading.rates, *reading.specific_force) for reading in readings])
     return int(np.count_nonzero(np.ptp(values, axis=0) > 0.0)) <= 1

@@ -86,7 +86,7 @@ class SuddenChange:
         self._rest(now)
 
     def part(self, *, apart: bool) -> None:
-        """Tell whether the vehicle is where too little is in view that was before the change: it is then not known whether it lasts."""
+        """Return whether the vehicle is where too little is in view that was before the change: it is then not known whether it lasts."""
         self._apart = apart
 
     def forget(self) -> None:

@@ -56,7 +56,7 @@ def matrix_of_transform(transform: Transform) -> NDArray[np.float64]:
 
 
 def is_rigid(transform: Transform) -> bool:
-    """Tell whether it is a motion: a finite shift, a quaternion of unit length."""
+    """Return whether it is a motion: a finite shift, a quaternion of unit length."""
     q, t = transform.rotation, transform.translation
     return bool(np.isfinite([t.x, t.y, t.z]).all() and abs(np.linalg.norm([q.x, q.y, q.z, q.w]) - 1.0) < UNIT_TOLERANCE)
 

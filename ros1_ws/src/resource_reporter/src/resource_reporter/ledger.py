@@ -133,7 +133,7 @@ class Ledger:
         return entry.answered or not entry.insist or self._actual.get(resource, entry.state) == entry.state
 
     def _differs(self, resource: str) -> bool:
-        """Tell whether the skillset shows another state than the hardware has, or another reason than is known."""
+        """Return whether the skillset shows another state than the hardware has, or another reason than is known."""
         if resource not in self._actual:
             return False
         wanted = self._wanted[resource]

@@ -136,7 +136,7 @@ class RospyLink:
 
     @property
     def connected(self) -> bool:
-        """Tell whether there are connections in both directions to the managers' node."""
+        """Return whether there are connections in both directions to the managers' node."""
         server = self._base.server
         sending = all(publisher.impl.has_connection(server) for publisher in (self._goals, self._cancels) if publisher.impl)
         return sending and all(is_connected(subscriber, server) for subscriber in self._listening)
@@ -180,7 +180,7 @@ class RospyLink:
 
 
 def is_connected(subscriber: Any, server: str = "") -> bool:
-    """Tell whether a subscriber has a live connection from this node, or from any; rospy keeps broken ones to mend them later."""
+    """Return whether a subscriber has a live connection from this node, or from any; rospy keeps broken ones to mend them later."""
     if subscriber.impl is None:
         return False
     connections = list(subscriber.impl.connections)

@@ -34,12 +34,12 @@ class Connection:
 
     @property
     def here(self) -> bool:
-        """Tell whether the peer that is called is a program of this machine."""
+        """Return whether the peer that is called is a program of this machine."""
         return self.kind in CALLS and self.host in {"127.0.0.1", "localhost", "::1"}
 
     @property
     def refused(self) -> bool:
-        """Tell whether nobody listens where a program of this machine is called; found without a call, for the peer may take one alone."""
+        """Return whether no program listens at an address of this machine, without connecting: the peer may take one client only."""
         if self.kind != "tcp" or not self.here:
             return False
         listening = (one for one in psutil.net_connections(kind="tcp") if one.status == psutil.CONN_LISTEN)

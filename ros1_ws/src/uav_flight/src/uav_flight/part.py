@@ -61,7 +61,7 @@ class Flight:
 
     @property
     def simulated(self) -> bool:
-        """Tell whether the simulator takes part, with its clock, its truth and its sensors."""
+        """Return whether the simulator takes part, with its clock, its truth and its sensors."""
         return self.autopilot is None or bool(self.sensors)
 
 

@@ -171,7 +171,7 @@ def in_map(vehicle: VehicleSnapshot, correction: Correction, home_map_m: Vec3 | 
 
 
 def leapt(before: VehicleSnapshot, after: VehicleSnapshot, most_m: float) -> bool:
-    """Tell whether the place differs by more than ``most_m`` from what the motion explains: the autopilot's estimator was reset."""
+    """Return whether the place differs by more than ``most_m`` from what the motion explains: the autopilot's estimator was reset."""
     if before.position_enu_m is None or after.position_enu_m is None or after.boots != before.boots:
         return False
     gap_s = max(after.boot_ms - before.boot_ms, 0) * 1e-3

@@ -114,7 +114,7 @@ class FlightReport:
         return page_entries(self._recording, self._truth.world)
 
     def _came_down(self) -> bool | None:
-        """Tell whether the vehicle came down: it must be said so, and be true where that is known; None: it never flew."""
+        """Return whether the vehicle came down: it must be said so, and be true where that is known; None: it never flew."""
         phases, resting, place = self._phases, self._truth.resting, home()
         if not phases.lifted_off:
             return None
@@ -182,7 +182,7 @@ class FlightReport:
 
 
 def explains(fault: Fault, lost_s: float, radio: FaultEffects) -> bool:
-    """Tell whether a fault is what the loss of the radio was: a process of the video, or the radio at that moment."""
+    """Return whether a fault is what the loss of the radio was: a process of the video, or the radio at that moment."""
     if fault.name == RADIO:
         return abs(fault.at_s - lost_s) < SAME_MOMENT_S
     return fault.holds(lost_s) and bool(fault.effects.ends & radio.ends)

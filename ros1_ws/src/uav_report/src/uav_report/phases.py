@@ -23,7 +23,7 @@ class FlightPhases(Phases):
 
     @property
     def lifted_off(self) -> bool:
-        """Tell whether the vehicle is known to have left the ground."""
+        """Return whether the vehicle is known to have left the ground."""
         return self.departed
 
     @property

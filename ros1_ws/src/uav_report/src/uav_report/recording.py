@@ -76,7 +76,7 @@ class GuidanceAccount:
 
     @property
     def landing(self) -> bool:
-        """Tell whether the vehicle was on its way down to the ground."""
+        """Return whether the vehicle was on its way down to the ground."""
         return self.reference == "land" or self.mode == "LAND" or self.landed_state == LANDING
 
     @property

@@ -96,7 +96,7 @@ def _landing_begins(track: Track, height: NDArray[np.float64], phases: FlightPha
 
 
 def rests(track: Track | None, world: TrueSurfaces | None, phases: FlightPhases) -> bool | None:
-    """Tell whether the vehicle stands still on a surface at the end as it did before lift-off; None if that can't be known."""
+    """Return whether the vehicle stands still on a surface at the end as it did before lift-off; None if that can't be known."""
     if track is None or world is None or track.t_s[0] > phases.zero_s:
         return None
     if track.t_s[-1] < (phases.zero_s if phases.touch_down_s is None else phases.touch_down_s):

@@ -31,7 +31,7 @@ class CameraSource:
 
     @property
     def is_device(self) -> bool:
-        """Tell whether it is read as V4L2."""
+        """Return whether it is read as V4L2."""
         return self.name.startswith("/dev/")
 
 

@@ -63,7 +63,7 @@ class VideoSender:
 
     @property
     def exhausted(self) -> bool:
-        """Tell whether adaptation has given all it has: the lowest level at the lowest bit rate."""
+        """Return whether adaptation has given all it has: the lowest level at the lowest bit rate."""
         return self._rate.exhausted
 
     def frame(self, image: Rgb, stamp_ns: int, now_ns: int) -> SentFrame | None:

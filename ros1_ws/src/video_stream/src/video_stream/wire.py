@@ -70,7 +70,7 @@ class Seal:
         return hmac.digest(self._key, data, hashlib.sha256)[:TAG_BYTES]
 
     def holds(self, data: bytes, tag: bytes) -> bool:
-        """Tell whether the tag belongs to the bytes."""
+        """Return whether the tag belongs to the bytes."""
         return hmac.compare_digest(self.tag(data), tag)
 
 

@@ -50,7 +50,7 @@ def fixed_columns_finding(left: Gray, right: Gray) -> Finding:
 
 
 def _is_edge(column: int, image: Gray, steps: Shares, other: Gray, steps_there: Shares, *, mirrored: bool = False) -> bool:
-    """Tell whether the step after a column of an image stands in the other one, too, farther left, beside the same surface.
+    """Return whether the step after a column of an image stands in the other one, too, farther left, beside the same surface.
 
     ``mirrored``: farther right, as what the right image shows does in the left one.
     """

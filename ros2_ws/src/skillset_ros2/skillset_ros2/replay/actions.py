@@ -44,7 +44,7 @@ class RecordedGoal:
         return RecordedFuture()
 
     def answer(self, *, accepted: bool = True) -> None:
-        """Tell whether the server took it, at the first that is heard of it."""
+        """Return whether the server took it, at the first that is heard of it."""
         if self.answered.result() is None:
             self.accepted = accepted
             self.answered.resolve(self)

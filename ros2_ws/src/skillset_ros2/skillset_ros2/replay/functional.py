@@ -210,7 +210,7 @@ class RecordedFunctions(ReplayedRobot):
         self._recorded_next.setdefault(f"{skillset}.{skill}", deque()).append(then is not None)
 
     def next_is_recorded(self, name: str) -> bool:
-        """Tell whether the next call of a skill was made then, too."""
+        """Return whether the next call of a skill was made then, too."""
         waiting = self._recorded_next.get(name)
         return bool(waiting) and waiting.popleft() if waiting is not None else False
 

@@ -34,7 +34,7 @@ class Standing:
 
     @property
     def stands(self) -> bool:
-        """Tell whether it has stood for long enough."""
+        """Return whether it has stood for long enough."""
         return self._since_s is not None and self.now_s - self._since_s >= STANDING_S
 
 

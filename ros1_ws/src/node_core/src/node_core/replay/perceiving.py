@@ -162,7 +162,7 @@ class Perceiving:
             core.switch(bool(call["request"]["data"]))
 
     def _came_before(self, resource: str) -> bool:
-        """Tell whether a node has judged by measurements that the bag does not hold: the recorder begins later than the robot."""
+        """Return whether a node has judged by measurements that the bag does not hold: the recorder begins later than the robot."""
         return self._timeline.now_ns < self._begins.get(resource, 0)
 
     def _begins_of(self) -> Iterator[tuple[str, int]]:

@@ -23,7 +23,7 @@ class Deflection:
 
     @property
     def moves(self) -> bool:
-        """Tell whether it takes the vehicle anywhere."""
+        """Return whether it takes the vehicle anywhere."""
         return bool(self.forward or self.left or self.up)
 
 

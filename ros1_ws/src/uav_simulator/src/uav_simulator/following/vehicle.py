@@ -59,7 +59,7 @@ class FollowedVehicle:
         self._link.close()
 
     def known(self, now_s: float) -> bool:
-        """Tell whether the autopilot has come so far."""
+        """Return whether the autopilot has come so far."""
         newest_s = self._track.newest_s
         return newest_s is not None and newest_s >= now_s
 

@@ -48,7 +48,7 @@ class LaserMonitor:
 
     @property
     def repeats(self) -> bool:
-        """Tell whether the last scan is the one before once more: it says nothing of where the rover is now."""
+        """Return whether the last scan is the one before once more: it says nothing of where the rover is now."""
         return self._repeated > 0
 
     def verdict(self, now_s: float) -> str:

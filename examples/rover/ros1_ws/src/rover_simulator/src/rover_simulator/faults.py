@@ -37,5 +37,5 @@ class FaultBoard:
         return begun
 
     def lasts(self, what: str, how: str) -> bool:
-        """Tell whether something fails in this way at the moment."""
+        """Return whether something fails in this way at the moment."""
         return (what, how) in self._now
