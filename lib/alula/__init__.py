@@ -9,7 +9,7 @@ A model says what a robot can do (`load_skillset`, `check_files`), hooks do it (
     assert mission.run("laser@20", seed=1).outcome is alula.Outcome.DEGRADED
 
 These names are public, and so are those of `alula.trees` (nodes of one's own), `alula.parts` (what a robot adds to the commands),
-``skillset_ros2`` and ``skillset_ros1``. Everything else is private: it changes without a word.
+``skillset_ros2`` and ``skillset_ros1``. Everything else is private, and may change without notice.
 """
 
 from __future__ import annotations

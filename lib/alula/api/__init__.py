@@ -1,1 +1,1 @@
-"""What the public API adds where no single room has the entry: each class and function here is offered by `alula`."""
+"""Entry points of the public API that use several rooms; `alula` exports them."""

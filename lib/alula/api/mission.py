@@ -42,7 +42,7 @@ class Mission:
         behaviour: what their mocks do.
         path: its file.
         world: the file of the world that its inputs were read from, empty where there is none.
-        robot: the robot that it is a mission of, None where it is none's.
+        robot: the robot that the mission belongs to, or None.
     """
 
     plan: MissionPlan
@@ -117,7 +117,7 @@ class Mission:
         return cls(plan_of_file(source, file.stem, models, inputs or {}, MissionPart(tuple(nodes))), models, does, file)
 
     def run(self, *faults: Fault, seed: int = 0, out: str | Path | None = None) -> MockedMission:
-        """Run it over mocks to its end, in virtual time; return what it did.
+        """Run it over mocks to its end, in virtual time; return the finished mission.
 
         The same faults and seed make the same run.
 
@@ -148,7 +148,7 @@ class Mission:
         limit_s: float = 0.0,
         listener: Listener | None = None,
     ) -> MockedMission:
-        """Return the mission over mocks before its first tick: something may be done to it at some time of its clock.
+        """Return the mission over mocks before its first tick, for programs that schedule acts of their own on its clock.
 
         Args:
             faults: as for `run`.
@@ -159,7 +159,7 @@ class Mission:
             groot: ``HOST:PORT`` where Groot2 and its like find the tree; empty: nowhere.
             monitor: noted in the run's folder only.
             limit_s: mission clock after which it is aborted; 0: after an hour.
-            listener: gets, of a mission that leaves nothing behind, what its record would have had.
+            listener: receives, where ``out`` is None, what would have been recorded.
 
         Raises:
             AlulaError: the mocks have no such fault, the folder is not empty, or the address can't be had.
@@ -221,7 +221,7 @@ class Mission:
 
 
 def note_account(out: Path, mission: MockedMission, faults: Sequence[FaultRequest]) -> None:
-    """Note in a run's folder what failed and when, and how fast the mocks were."""
+    """Write into a run's folder when each fault took effect, and how fast the mocks ran."""
     simulated_s = mission.world.now_s
     spans = spans_of(faults, begun_s=0.0, lift_off_s=mission.departure_s, ended_s=simulated_s, first_s=mission.faults)
     note_mocked(out, simulated_s, mission.wall_s, changes_of(spans, simulated_s, MOCKED), mission.notes)

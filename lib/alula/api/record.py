@@ -13,7 +13,7 @@ from alula.runtime.core.records import ExecutionRecord, executions_of
 
 @public()
 class Record:
-    """The record of a run's decisions, ``skills.mcap``: its entries, in the order in which the mission came to know of them.
+    """The record of a run's decisions, ``skills.mcap``: its entries, in the order in which the mission received or made them.
 
     An entry has a ``topic``, a ``stamp_s`` (seconds of mission clock) and a ``value`` as JSON has it; the page on records lists the topics.
     Foxglove opens the file, too.
@@ -46,17 +46,17 @@ class Record:
 
     @property
     def events(self) -> list[EngineEvent]:
-        """What happened to executions and resources."""
+        """The events of executions and resources."""
         return [_event(self.path, entry) for entry in self.topic(EVENTS)]
 
     @property
     def executions(self) -> list[ExecutionRecord]:
-        """All executions of skills, by age."""
+        """All executions of skills, the oldest first."""
         return executions_of(self.events)
 
     @property
     def decisions(self) -> list[Entry]:
-        """What the tree asked for."""
+        """The decisions of the mission: starts and interruptions of skills, pauses, resumptions."""
         return self.topic(DECISIONS)
 
 

@@ -41,17 +41,17 @@ class Run:
 
     @cached_property
     def record(self) -> Record:
-        """What was decided, and what was known."""
+        """Its record: what the mission decided, and the events and data that it had received."""
         return Record(self.folder)
 
     @cached_property
     def request(self) -> Mapping[str, Any]:
-        """What was asked for: scenario, seed, faults (``run.json``)."""
+        """The request of the run: scenario, seed, faults (``run.json``)."""
         return _object(self.folder / FILE)
 
     @cached_property
     def summary(self) -> Mapping[str, Any]:
-        """What its report says in figures (``summary.json``); raises NoRunError where no report was made."""
+        """The figures of its report (``summary.json``); raises NoRunError where no report was made."""
         return _object(self.folder / SUMMARY)
 
     @cached_property
@@ -66,7 +66,7 @@ class Run:
 
     @property
     def faults(self) -> list[FaultChange]:
-        """What failed, and what worked again, in the order of time."""
+        """The faults that began and that were mended, in the order of time."""
         return [FaultChange(str(one["sensor"]), str(one["mode"]), float(one["t_s"])) for one in run_log.read(self.folder, run_log.FAULT)]
 
     def report(self) -> Mapping[str, Any]:
@@ -81,7 +81,7 @@ class Run:
         return self.summary
 
     def conform(self, *models: str | Path) -> ConformanceVerdict:
-        """Hold its events against the models: each has to be one that the semantics allows.
+        """Check that the semantics of the models allows each of its events; return the verdict.
 
         Args:
             models: files of models instead of the robot's.

@@ -31,7 +31,7 @@ def load_skillset(path: str | Path) -> Skillset:
 
 @public()
 def parse_skillset(text: str, name: str = "model.skill") -> Skillset:
-    """Return the checked skillset of a text; ``name`` is what findings call it; its suffix says the notation: ``*.skill`` or ``*.rl``.
+    """Return the checked skillset of a text; ``name`` stands in findings, and its suffix selects the notation: ``*.skill`` or ``*.rl``.
 
     Raises:
         LanguageError: the text has errors, or holds none or several skillsets.

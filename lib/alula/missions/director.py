@@ -57,7 +57,7 @@ class End:
 
 
 class Mission(Protocol):
-    """A tree, and what its end means."""
+    """A mission's tree, its conditions to start, and the tree that stops the robot."""
 
     @property
     def root(self) -> Behaviour:
@@ -71,7 +71,7 @@ class Mission(Protocol):
 
     @property
     def stopping(self) -> bool:
-        """Return whether the tree has the robot brought to rest by now, so that an abort has nothing to add."""
+        """Return whether the tree already brings the robot to rest, so that an abort has nothing to add."""
         ...
 
     def conditions(self) -> list[Condition]:
@@ -85,7 +85,7 @@ class Mission(Protocol):
 
 @dataclass(frozen=True)
 class DirectorMemory:
-    """Where a director is; times as ``Blackboard.now_s``."""
+    """The state of a director, without its trees; times as ``Blackboard.now_s``, seconds."""
 
     phase: str
     end: End | None
@@ -95,7 +95,7 @@ class DirectorMemory:
 
 
 def halted(root: Behaviour) -> list[str]:
-    """Halt all that runs in a tree, whatever breaks on the way; return what did, in words."""
+    """Halt all that runs in a tree, also where halts raise; return these errors, in words."""
     broken: list[str] = []
     # The root halts what is below it, in the order of the tree. Where that breaks, the others are halted one by one, from the leaves up.
     for node in (root, *root.iterate()):
@@ -108,7 +108,7 @@ def halted(root: Behaviour) -> list[str]:
 
 
 class Director:
-    """Waits for the robot, has the tree ticked, and knows the outcome.
+    """Waits until the mission can start, ticks its tree, stops the robot after an abort, and settles the outcome.
 
     ``step`` is to be called after each event, and at 10 Hz once the mission has begun; less often will do before.
     ``serves``: there is no mission; to be told to end is how the run ends well.
@@ -142,18 +142,18 @@ class Director:
 
     @property
     def memory(self) -> DirectorMemory:
-        """What the next step hangs on, besides the trees."""
+        """The state of the director that the next step depends on, besides the trees."""
         return DirectorMemory(self._phase.__name__, self.end, self.start_s, self._wait_until_s, self._stop is not None)
 
     def recall(self, memory: DirectorMemory) -> None:
-        """Go on from another moment; a pause is none that can be gone on from."""
+        """Restore the state of another moment, which must not lie in a pause."""
         self._phase = getattr(self, memory.phase)
         self.end, self.start_s, self._wait_until_s = memory.end, memory.start_s, memory.wait_until_s
         self._pause = None
         self._stop = self._mission.stop_here() if memory.stops else None
 
     def step(self) -> None:
-        """Do what is to be done now; returns at once. The mission is over when ``end`` is set."""
+        """Take one step of the current phase; returns at once. The mission is over when ``end`` is set."""
         if self.end is not None:
             return
         if self._pause is None:
@@ -172,7 +172,7 @@ class Director:
         return "the robot is being stopped already" if self._stops else ""
 
     def pause(self) -> str:
-        """Tick the tree no more until `resume`, and have the skills that can hold hold; return what was asked for, in words.
+        """Stop ticking until `resume`, and pause the skills that can pause; return what was requested, in words.
 
         An abort ends the pause, too.
 
@@ -187,14 +187,14 @@ class Director:
         return self._pause.words()
 
     def resume(self) -> None:
-        """Have the skills go on, and tick the tree again; raise PauseRefusedError when it is not paused."""
+        """Resume the skills, and tick the tree again; raise PauseRefusedError when it is not paused."""
         if self._pause is None:
             raise PauseRefusedError(self.refusal(paused=False))
         self._pause.end()
         self._pause = None
 
     def news_of_pause(self) -> str:
-        """Return what holds and what goes on since the mission was paused, in words, once; empty when there is nothing new."""
+        """Return, once, which skills have paused and which go on, in words; empty when that has not changed."""
         held, self._held = self._held, ""
         return held
 
@@ -211,10 +211,10 @@ class Director:
         return "the robot stops where it is"
 
     def broken(self, reason: str, *, ticked: bool = True) -> None:
-        """Leave a tree that has raised an error: the mission's, also on its way to rest, for what stops the robot; that one for good.
+        """Abort the mission because a tree raised an error, and tick `stop_here`; where `stop_here` raised, settle.
 
-        A mission that has not started moves nothing: it could not start. ``ticked`` False: no node has raised, but what records or
-        shows the mission; what stops the robot goes on then.
+        A mission that has not started ends as NOT_STARTED. ``ticked`` False: not a node raised the error, but what records or shows the
+        mission; a tree `stop_here` that is being ticked goes on then.
         """
         if self.end is not None:
             return
@@ -227,17 +227,17 @@ class Director:
             self._phase = self._settle
 
     def conditions(self) -> list[Condition]:
-        """Return what the mission needs to start; nothing once it has started, or is over."""
+        """Return the conditions to start, met or not; none once the mission has started, or is over."""
         return self._mission.conditions() if self.start_s is None and self.end is None else []
 
     def remember(self) -> None:
-        """Take note of how each node is; for views of the tree at a later time only, instead of ``view`` after each step."""
+        """Keep each node's status for later views of the tree; replaces a call of ``view`` after each step."""
         self._watch.remember()
         if self._stop_watch is not None:
             self._stop_watch.remember()
 
     def view(self) -> NodeView:
-        """Return the tree as it is now; after an abort with what stops the robot beside it."""
+        """Return the tree as it is now; after an abort with the tree `stop_here` beside it."""
         tree = self._watch.look()
         if self._stop_watch is None or self._serves:
             return tree

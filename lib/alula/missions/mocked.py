@@ -55,10 +55,10 @@ def check_faults(faults: Sequence[FaultRequest], behaviour: Behaviour, skillsets
 
 
 class Listener(Recorder, Protocol):
-    """Hears what passes between a tree and its skillsets, tick by tick."""
+    """Receives what a tree requests of its skillsets and what they report, tick by tick."""
 
     def tick(self) -> None:
-        """The tree is ticked now."""
+        """Take that the tree is ticked now."""
         ...
 
 
@@ -130,7 +130,7 @@ class MockedMission:
         self.world.on_event(self._on_event)
 
     def run(self) -> End:
-        """Run to the end; time is that of the world, so this takes a moment."""
+        """Run to the end in virtual time; return how it ended."""
         begun = time.perf_counter()
         self._driver.tick_regularly(self.world.clock.after, self._tick_period_s)
         over = lambda: self._driver.end is not None  # noqa: E731
@@ -145,7 +145,7 @@ class MockedMission:
         return end
 
     def abort(self, reason: str) -> None:
-        """Have the robot stop at the next tick; may be called by a signal's handler."""
+        """Abort at the next tick, with this reason; may be called by a signal handler."""
         self._driver.ask_abort(reason)
 
     @property
@@ -155,32 +155,32 @@ class MockedMission:
 
     @property
     def reason(self) -> str:
-        """Why it ended so, in words; empty where there is nothing to be said."""
+        """Why it ended so, in words; empty without a reason, and before the end."""
         return "" if self.end is None else self.end.reason
 
     @property
     def facts(self) -> Mapping[str, object]:
-        """What the mission's account says beyond the outcome: the output ports of its tree."""
+        """The values of the output ports of its tree, by name."""
         return self._facts()
 
     @property
     def executions(self) -> list[ExecutionRecord]:
-        """All executions of skills, by age."""
+        """All executions of skills, the oldest first."""
         return executions_of(self.events)
 
     @property
     def ended(self) -> list[ExecutionEvent]:
-        """The end of each execution that has ended, in their order."""
+        """The last event of each execution that has ended, in the order of the ends."""
         return [event for event in self.events if isinstance(event, ExecutionEvent) and event.state.terminal]
 
     @property
     def director(self) -> Director:
-        """What drives the tree."""
+        """The director, which ticks the tree."""
         return self._driver.director
 
     @property
     def open_executions(self) -> list[str]:
-        """Return what has not ended; what managers had that were killed has ended with them."""
+        """Return the executions that have not ended, as text; those of killed managers count as ended."""
         living = [managers for managers in self.world.managers.values() if managers.alive]
         return [str(execution) for managers in living for execution in managers.engine.executions]
 
@@ -190,19 +190,19 @@ class MockedMission:
 
     @property
     def departure_s(self) -> float | None:
-        """When the robot's state of departure was left first, seconds of mission clock; None also without a record."""
+        """When the robot first left its state of departure, seconds of mission clock; None before, and without a record."""
         return None if self._record is None else self._record.departure_s
 
     @property
     def faults(self) -> dict[str, float]:
-        """When each fault came first, and the operator acted, seconds of mission clock; those that came to nothing are missing."""
+        """When each fault, or act of the operator, first took effect, seconds of mission clock; without those that had none."""
         zero_s = self._departed_s
         killed = {} if zero_s is None else {f"{one.what}:{KILLED}": zero_s + (one.begin_s or 0.0) for one in self._kills}
         return {**self.robot.faults, **killed, **on_time(self._faults, zero_s)}
 
     @property
     def notes(self) -> list[str]:
-        """Return what went wrong in the mocks themselves."""
+        """Return the errors of the mocks themselves, a line each."""
         return [*self.world.errors, *self.robot.host.notes]
 
     def _act(self, command: str) -> None:

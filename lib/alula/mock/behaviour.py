@@ -48,7 +48,7 @@ class MockChange:
 
 @dataclass(frozen=True, kw_only=True)
 class Rule:
-    """What a mock does in the calls that the rule is for; None says nothing.
+    """What a mock does in the calls that the rule applies to; of a field that is None, a later rule decides.
 
     ``call`` counts from 1, ``when`` is about the inputs, ``chance`` is a probability; all that are given must hold. ``progress`` is
     a formula of ``t`` (seconds since the start) and ``f`` (part of the delay, 0 to 1), or points (f, value). ``moves`` says where
@@ -118,9 +118,9 @@ class DataScript:
 @public()
 @dataclass(frozen=True, kw_only=True)
 class Behaviour:
-    """What the mocks of a robot do: the rules of skills, what happens by the clock, faults, data, and a memory that they share.
+    """What the mocks of a robot do: rules of skills, timed events, faults and data, over one memory.
 
-    ``beside``: of other robots of a fleet, each with a memory of its own.
+    ``beside``: the behaviours of other robots of a fleet, each with a memory of its own.
     """
 
     memory: Mapping[str, object] = field(default_factory=dict)
@@ -131,7 +131,7 @@ class Behaviour:
     beside: tuple[Behaviour, ...] = ()
 
     def over(self, other: Behaviour) -> Behaviour:
-        """Return both together; this one's rules come first, and its memory, faults and data replace those of the same name."""
+        """Return the union of two behaviours: this one's rules come first, its memory, faults and data replace those of the same name."""
         rules = {place: (*self.rules.get(place, ()), *other.rules.get(place, ())) for place in {**other.rules, **self.rules}}
         return Behaviour(
             memory={**other.memory, **self.memory},
@@ -143,7 +143,7 @@ class Behaviour:
         )
 
     def named(self, name: Callable[[str], str]) -> Behaviour:
-        """Return it with the names of skillsets and faults replaced by what ``name`` makes of them."""
+        """Return a copy in which ``name`` has mapped the names of skillsets and faults."""
 
         def states(said: Mapping[Place, str]) -> dict[Place, str]:
             return {(name(skillset), member): state for (skillset, member), state in said.items()}
@@ -172,7 +172,7 @@ class Behaviour:
         )
 
     def about(self, skillset: str) -> bool:
-        """Return whether it has rules for a skillset, ``beside`` aside."""
+        """Return whether it has rules for a skillset itself, not in ``beside``."""
         said = [*self.rules, *self.data, *(place for event in self.timeline for place in event.states)]
         said += [place for fault in self.faults.values() for place in (*fault.states, *fault.ends)]
         return any(place[0] == skillset for place in said)

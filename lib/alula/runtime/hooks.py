@@ -43,12 +43,12 @@ class SkillHooks:
     """Class made from the inputs by keyword; None makes a ``SimpleNamespace``."""
 
     def make_inputs(self, values: Mapping[str, object]) -> object:
-        """Make what ``validate`` gets and ``execution.inputs`` holds from the values by name."""
+        """Return the inputs, made of values by name, as ``validate`` receives them and ``execution.inputs`` holds them."""
         return SimpleNamespace(**values) if self.inputs_type is None else self.inputs_type(**values)
 
     @unwritten
     def on_start(self) -> None:
-        """Stop what managers that were here before have started, or find out that nothing runs; may wait a bounded time.
+        """Stop what earlier managers have started, or make sure that nothing runs; may wait a bounded time.
 
         Called once, when the managers start: they know of no execution then, also where their process was killed while functions ran.
         Where it raises, or does not return in time, the skill refuses all requests and says why.

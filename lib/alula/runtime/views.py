@@ -79,12 +79,12 @@ class Access(Protocol):
 
     @property
     def resources(self) -> dict[str, str]:
-        """State of each resource by name, as last heard."""
+        """State of each resource by name, as last received."""
         ...
 
     @property
     def reasons(self) -> dict[str, str]:
-        """Why each resource is in its state, by name, as last heard."""
+        """The reason for each resource's state, by name, as last received."""
         ...
 
     def on_change(self, callback: Callable[[dict[str, str]], None]) -> Unsubscribe:
@@ -92,7 +92,7 @@ class Access(Protocol):
         ...
 
     def start(self, skill: str, **inputs: object) -> Handle[Any, Any]:
-        """Ask the managers for an execution; its handle tells what becomes of it."""
+        """Ask the managers for an execution; return its handle."""
         ...
 
     def last(self, skill: str) -> Ended[Any, Any] | None:
@@ -112,7 +112,7 @@ class Access(Protocol):
         ...
 
     def moment(self) -> Pending[Any]:
-        """Return an answer that is not given yet, to be waited for as all others of this client."""
+        """Return an answer to be resolved by the caller, and waited for as all others of this client."""
         ...
 
 
@@ -166,7 +166,7 @@ class ResourceView(Generic[StateT]):
 
     @property
     def reason(self) -> str:
-        """Why it is in its state, as the functional layer has told, in words; empty where it told nothing."""
+        """The reason that the functional layer reported for its state; empty where it reported none."""
         return self._client.reasons.get(self.name, "")
 
     def on_change(self, callback: Callable[[StateT], None]) -> Unsubscribe:
@@ -182,7 +182,7 @@ class ResourceView(Generic[StateT]):
         return self._client.on_change(look)
 
     def becomes(self, *states: StateT) -> Pending[StateT]:
-        """Return what ends as soon as the resource is in one of the states: ``becomes("IN_AIR").wait(timeout_s)``, or await it."""
+        """Return an answer that comes when the resource is in one of the states: ``becomes("IN_AIR").wait(timeout_s)``, or await it."""
         reached: Pending[StateT] = self._client.moment()
 
         def look(now: dict[str, str]) -> None:
@@ -229,7 +229,7 @@ class DataView(Generic[ValueT]):
         return self._client.data_feed(self.name).on_sample(lambda sample: callback(cast("ValueT", sample.value)))
 
     def next(self) -> Pending[ValueT]:
-        """Return what ends with the next value: ``next().get(timeout_s)``, or await it."""
+        """Return an answer that comes with the next value: ``next().get(timeout_s)``, or await it."""
         arrival: Pending[ValueT] = self._client.moment()
         forget = self._client.data_feed(self.name).on_sample(lambda sample: arrival.resolve(cast("ValueT", sample.value)))
         arrival.add_done_callback(lambda _: forget())

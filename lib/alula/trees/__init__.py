@@ -1,7 +1,7 @@
-"""Behaviour Trees in BehaviorTree.CPP 4's XML: what a node of one's own is made of.
+"""Behaviour Trees in BehaviorTree.CPP 4's XML: base classes, ports and registration for nodes of one's own.
 
 A node is a class: `SyncAction` and `Condition` answer in each tick, `Action` may take several ticks, `Decorator` has one child, `Control`
-several. It declares its ``ports``, and `register` says what files call it::
+several. It declares its ``ports``, and `register` gives it the name that files use::
 
     @register("rover.Near")
     class Near(Condition):

@@ -32,7 +32,7 @@ Watcher = Callable[["Node", Status, Status], None]
 
 @public("alula.trees")
 class Script(Protocol):
-    """A script that was read, over a node's blackboard; raises TickError."""
+    """A compiled script, bound to the blackboard of its node; its methods raise TickError."""
 
     unknown: str
     """Why its last answer as a condition was false, where that was because a value is not known."""
@@ -167,34 +167,34 @@ _HALTS = ("halt", "halt_node", "reset_children", "reset_child", "become", "give_
 
 @public("alula.trees")
 class Node(Behaviour):  # type: ignore[misc]  # py_trees is seen untyped
-    """One node of a tree. A class of one's own derives from one of those below, and declares its ports."""
+    """Base of all nodes; derive from `SyncAction`, `Action`, `Condition`, `Decorator` or `Control`, and declare `ports`."""
 
     category: ClassVar[Category]
     registered_name: ClassVar[str] = ""
-    """What files call it, as `register` has it; empty: the name of the class."""
+    """The name of the type in files, which `register` sets; empty: the name of the class."""
     ports: ClassVar[tuple[Port, ...]] = ()
     child_count: ClassVar[tuple[int, int | None] | None] = None
-    """How many children it may have, from and to; None: as its category."""
+    """The least and the largest number of children; None: those of its category."""
     remembers: ClassVar[tuple[str, ...]] = ()
-    """The attributes that one tick leaves for the next, besides the status; what takes a tree to another moment needs all of them."""
+    """The attributes that keep values from tick to tick, besides the status: all that restores a node to another moment."""
     remembers_running: ClassVar[tuple[str, ...]] = ()
-    """Those of them that are set anew when the node begins: while it does not run, nothing hangs on them."""
+    """Those of `remembers` that are set anew when the node begins: they have no effect while it does not run."""
     counts: ClassVar[tuple[Count, ...]] = ()
-    """Those of them that count, of which a search of all runs keeps a few numbers."""
+    """Those of `remembers` that count; a search of all runs distinguishes a few of their numbers."""
     watches: ClassVar[Mapping[str, str]] = {}
-    """Those that have how often the entry that a port names was written, by attribute the port."""
+    """Those that hold how often an entry was written: by attribute, the port that names the entry."""
     ticking: ClassVar[Ticking] = ANY_TICKING
-    """How it ticks its children; what is not said may be anything."""
+    """How it ticks its children; what is not declared may be anything."""
     ends: ClassVar[Ends] = ANY_END
-    """The ends that it may have, where they hang neither on ports nor on children."""
+    """The ends that it may have, where they depend neither on ports nor on children."""
     may_run: ClassVar[bool | None] = None
-    """Whether it may take several ticks, its children aside; None: not known."""
+    """Whether it may answer RUNNING by itself, apart from its children; None: not known."""
     answers_by: ClassVar[str] = ""
-    """The port with the condition of the file that a leaf answers by; empty where its answer is another's, or hangs on more."""
+    """The port with the condition that decides the answer of a leaf; empty where something else decides, too."""
     runs_script: ClassVar[str] = ""
-    """The port with the script that is all that a leaf does."""
+    """The port with the script, where a leaf does nothing but run it."""
     takes_away: ClassVar[str] = ""
-    """The port that names an entry which it takes from the blackboard."""
+    """The port that names an entry which it deletes from the blackboard."""
     status: Status
     children: list[Node]
 
@@ -208,24 +208,24 @@ class Node(Behaviour):  # type: ignore[misc]  # py_trees is seen untyped
         self._constants: dict[str, object] = {}
 
     def setup(self) -> None:
-        """Prepare what ticks need, such as the scripts of ports; called once, when the tree is built. What it raises says where."""
+        """Prepare what ticks need, such as the scripts of ports; called once, when the tree is built. Errors should name the `place`."""
 
     # --- before anything is ticked -------------------------------------------------------------------------------------
 
     @classmethod
     def may_end(cls, given: Given, children: Sequence[Ends]) -> Ends:  # noqa: ARG003
-        """Return all ends that it may ever have, with these ports, and children that may have these ends."""
+        """Return all ends that it can have, given its ports and the ends of its children."""
         ticking = cls.known_ticking()
         return ticking.ends(children[0]) if ticking.order is Order.SINGLE else cls.ends
 
     @classmethod
     def never_ticked(cls, given: Given, children: Sequence[Ends]) -> Iterator[tuple[int, int]]:  # noqa: ARG003
-        """Yield children that are never ticked, each with the one that does not end as it would have to; of several in a row the first."""
+        """Yield indices of children that are never ticked, each with that of the child whose ends prevent it; of a row the first."""
         yield from never_ticked(cls.ticking, children)
 
     @classmethod
     def is_described(cls) -> bool:
-        """Return whether its ends are described by this class: not where a class derives from it, answers otherwise and describes nothing.
+        """Return whether the class describes its ends: False for a subclass that overrides how it answers and describes nothing.
 
         `ticking`, `ends`, `may_end`, `never_ticked` belong to what answers: `execute`, `update`, `on_start`, `on_running`.
         """
@@ -233,12 +233,12 @@ class Node(Behaviour):  # type: ignore[misc]  # py_trees is seen untyped
 
     @classmethod
     def known_ticking(cls) -> Ticking:
-        """Return how it ticks its children: in any way, where the class answers or halts otherwise than the one that describes it."""
+        """Return how it ticks its children; anything, for a subclass that overrides how it answers or halts and describes nothing."""
         return cls.ticking if cls._does_as(frozenset({"ticking"}), (*_ANSWERS, *_HALTS)) else ANY_TICKING
 
     @classmethod
     def as_type(cls, name: str = "") -> TickableType:
-        """Return the type of its nodes: what it declares, under a name; as it was registered unless another is given."""
+        """Return its node type under a name, by default the one it was registered by."""
         doc = (cls.__doc__ or "").strip().partition("\n")[0]
         ports = {port.name: port for port in cls.ports}
         children = cls.child_count or CHILDREN[cls.category]
@@ -254,7 +254,7 @@ class Node(Behaviour):  # type: ignore[misc]  # py_trees is seen untyped
     # --- ticks ---------------------------------------------------------------------------------------------------------
 
     def execute(self) -> Answer:
-        """Tick the node once, with its conditions."""
+        """Tick the node once: preconditions, then `update`, then postconditions."""
         before = self.before
         answer = None if before is None else self._guarded(before)
         if answer is None:
@@ -267,15 +267,15 @@ class Node(Behaviour):  # type: ignore[misc]  # py_trees is seen untyped
         return answer
 
     def update(self) -> Answer:
-        """Do what this type of node does in a tick; never called when a condition has decided."""
+        """Do one tick of this type of node, and return the answer; not called when a precondition has decided."""
         raise NotImplementedError
 
     def halt(self) -> None:
-        """Stop what the node does, and be idle; a node that remembers anything of its ticks resets it here."""
+        """Stop what the node does and become idle; override it to reset what is kept from tick to tick."""
         raise NotImplementedError
 
     def halt_node(self) -> None:
-        """Halt it, and run what its file says for that."""
+        """Halt the node, then run its script ``_onHalted``."""
         self.halt()
         if self.after is not None and self.after.on_halted is not None:
             self.after.on_halted.run()
@@ -289,7 +289,7 @@ class Node(Behaviour):  # type: ignore[misc]  # py_trees is seen untyped
                 watcher(self, previous, status)
 
     def give_way(self) -> Answer:
-        """Return RUNNING, and have the tree ticked again at once: a long chain of quick nodes can be halted in between."""
+        """Return RUNNING and request the next tick at once, so that a long chain of quick nodes can be halted in between."""
         self._shared.woken = True
         return RUNNING
 
@@ -318,18 +318,18 @@ class Node(Behaviour):  # type: ignore[misc]  # py_trees is seen untyped
 
     @property
     def watchers(self) -> list[Watcher]:
-        """Callbacks for each change in the tree."""
+        """The callbacks that receive each change of a status in the tree."""
         return self._shared.watchers
 
     # --- py_trees ------------------------------------------------------------------------------------------------------
 
     def tick(self) -> Iterator[Behaviour]:
-        """Tick the node once, as py_trees has it."""
+        """Tick the node once, with the signature of py_trees."""
         self.execute()
         yield self
 
     def stop(self, new_status: Status = IDLE) -> None:
-        """Halt what runs and be idle, as py_trees has it; ``new_status`` is what it says elsewhere."""
+        """Halt the node if it runs, and set ``new_status``, with the signature of py_trees."""
         if self.status is RUNNING:
             self.halt_node()
         self.become(new_status)
@@ -338,20 +338,20 @@ class Node(Behaviour):  # type: ignore[misc]  # py_trees is seen untyped
 
     @property
     def blackboard(self) -> Blackboard:
-        """The blackboard of the tree that the node stands in."""
+        """The blackboard of the tree or subtree that contains the node."""
         return self.wiring.blackboard
 
     @property
     def now_ns(self) -> int:
-        """Mission clock."""
+        """Mission clock, nanoseconds."""
         return self._shared.clock()
 
     def given(self, port: str) -> bool:
-        """Return whether a port has a text, of the file or by default."""
+        """Return whether a port has a text, from the file or by default."""
         return port in self.wiring.ports
 
     def get(self, port: str) -> object:
-        """Return the value of an input, of its port's type; raises TickError when it has none, or another's."""
+        """Return the value of an input, of its port's type; raises TickError without one, or for one of another type."""
         constants = self._constants
         if port in constants:
             return constants[port]
@@ -372,7 +372,7 @@ class Node(Behaviour):  # type: ignore[misc]  # py_trees is seen untyped
             raise TickError(f"{self.place()}: the port '{port}': {error}") from None
 
     def script(self, port: str, default: str | None = None) -> Script:
-        """Compile the script that a port holds; to be called in `setup`. Raises FileError where it can't be read, TickError without one."""
+        """Compile the script of a port; call it in `setup`. Raises FileError where the script is wrong, TickError without one."""
         text = self.wiring.ports.get(port, default)
         if text is None:
             raise TickError(f"{self.place()}: the port '{port}' is not given")
@@ -410,7 +410,7 @@ class Node(Behaviour):  # type: ignore[misc]  # py_trees is seen untyped
         return self.blackboard.entry(pointer(text, port) or text)
 
     def place(self) -> str:
-        """Return what messages call the node: its place in the file and its name."""
+        """Return the node's place in the file and its name, for messages."""
         return f"{self.wiring.element.place} ({self.name})"
 
 
@@ -474,7 +474,7 @@ class Leaf(Node):
     category = Category.ACTION
 
     def halt(self) -> None:
-        """Be idle."""
+        """Become idle."""
         self.become(IDLE)
 
 
@@ -507,13 +507,13 @@ class Action(Leaf):
     may_run = True
 
     def update(self) -> Answer:
-        """Start it, or follow it; one that has ended, and that its parent has not reset, answers the same again."""
+        """Call `on_start` when idle, `on_running` while RUNNING; after the end, repeat the answer until the parent resets the node."""
         if self.status is RUNNING:
             return self.on_running()
         return self.on_start() if self.status is IDLE else self.status
 
     def halt(self) -> None:
-        """Interrupt it if it runs; it is idle afterwards, whatever ``on_halted`` raises."""
+        """Call `on_halted` if it runs, and become idle, whatever that raises."""
         try:
             if self.status is RUNNING:
                 self.on_halted()
@@ -529,7 +529,7 @@ class Action(Leaf):
         raise NotImplementedError
 
     def on_halted(self) -> None:
-        """Interrupt what runs; must not wait for its end."""
+        """Interrupt what runs, without waiting for its end; called when the tree leaves the node."""
 
 
 @public("alula.trees")
@@ -544,7 +544,7 @@ class Control(Node):
         self.become(IDLE)
 
     def reset_children(self, first: int = 0) -> None:
-        """Halt the running children, and reset all to idle, from index ``first`` on."""
+        """Halt the running children from index ``first`` on, and reset all of these to idle."""
         for child in self.children[first:] if first else self.children:
             if child.status is RUNNING:
                 child.halt_node()
@@ -565,7 +565,7 @@ class Decorator(Control):
     category = Category.DECORATOR
 
     def execute(self) -> Answer:
-        """Tick the node; a child that has ended is idle afterwards."""
+        """Tick the node; reset the child to idle when it has ended."""
         answer = super().execute()
         child = self.child
         if child.status is SUCCESS or child.status is FAILURE:

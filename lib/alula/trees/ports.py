@@ -21,7 +21,7 @@ class Direction(Enum):
 @public("alula.trees")
 @dataclass(frozen=True)
 class Port:
-    """A port: ``default`` is text as in a file, None where there is none; ``unit`` is of a number, as ``m/s``."""
+    """A port of a type of node; ``default`` is text as in a file, None: none; ``unit`` is that of a number, as ``m/s``."""
 
     name: str
     type: PortType = ANY
@@ -30,19 +30,19 @@ class Port:
     doc: str = ""
     unit: str = ""
     required: bool = False
-    """A file has to give it; else a node does without it, or says so when it is ticked."""
+    """Whether a file has to set it. Without a port that is not required a node still works, or raises TickError in a tick."""
     optional: bool = False
-    """The node does without it, and without a value of the entry that it names."""
+    """Whether the node works without it, and without a value of the entry that it names."""
     unchecked: bool = False
-    """The node reads it without looking whether there is a value: it goes on with an empty one."""
+    """Whether the node reads it without checking that there is a value, and goes on with an empty one."""
     script: bool = False
-    """Its text is a script, unless it names an entry that has one."""
+    """Whether its text is a script, or names an entry that holds one."""
     may_be_empty: bool = False
-    """A script that is empty does nothing; another node's is wrong then."""
+    """Whether an empty script is allowed, and does nothing."""
     written_from: str = ""
-    """A plain text names an entry, too, which gets what this other port says; empty: a plain text is a value."""
+    """The port whose value is written to the entry that a plain text names; empty: a plain text is a value."""
     place: Place | None = field(default=None, compare=False, repr=False)
-    """Where a file says its default."""
+    """The place of the default in a file."""
 
 
 @public("alula.trees")
@@ -67,5 +67,5 @@ def inout_port(name: str, type_: PortType = ANY, default: str | None = None, doc
 
 @public("alula.trees")
 def script_port(name: str, doc: str = "", *, may_be_empty: bool = False) -> Port:
-    """Return a port whose text is a script, which `Node.script` compiles: what it reads and writes is known before it is run."""
+    """Return a port whose text is a script, for `Node.script` to compile; checks and proofs read which entries it uses."""
     return Port(name, STRING, doc=doc, script=True, may_be_empty=may_be_empty)

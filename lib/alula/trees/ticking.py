@@ -119,18 +119,18 @@ class Ticking:
 
     @property
     def tells_passed(self) -> bool:
-        """Return whether it is known, by `place`, which children are not ticked again before the node ends."""
+        """Return whether `place` shows which children are not ticked again before the node ends."""
         if self.order is Order.SINGLE:
             return not self.repeats
         return self.order in {Order.IN_TURN, Order.AT_ONCE} and bool(self.place)
 
     @property
     def lists(self) -> bool:
-        """Return whether it ticks its children from the first to the last, as far as they end with `goes_on`."""
+        """Return whether it ticks its children from the first to the last, until one does not end with `goes_on`."""
         return self.order in _LISTED - {Order.FROM_ANY}
 
     def goes_back(self, count: int) -> bool:
-        """Return whether one of so many children may be ticked after another one that stands behind it."""
+        """Return whether, of ``count`` children, one may be ticked after a later one."""
         return count > 1 and self.order not in _ONE_WAY
 
     def begins_with_first(self) -> bool:
@@ -139,7 +139,7 @@ class Ticking:
         return ordered and self.order is not Order.FROM_ANY and self.begins is Begin.AT_ONCE and not self.keeps_place
 
     def heeds_failure(self, place: int, count: int, given: Given) -> bool:
-        """Return whether it may do something else about the failure of a child than to fail, too; of what is not known it may."""
+        """Return whether it may do anything but fail when the child at index ``place`` fails; True where that is not known."""
         match self.order:
             case Order.SINGLE:
                 return self.takes_failure or self.follows(FAILURE) != {FAILURE}
@@ -160,7 +160,7 @@ class Ticking:
 
     @property
     def figure(self) -> str:
-        """What it is in the words of the paper's figures; empty where they have no word for it."""
+        """The name of the node's symbol in the paper's figures; empty where it has none."""
         if self.order is Order.AT_ONCE:
             return "parallel"
         if self.order in _LISTED:

@@ -58,7 +58,7 @@ class Client:
 
     @property
     def missing(self) -> str:
-        """What the managers can't be called without, and has not come so far, for a message to people; empty when nothing is missing."""
+        """What has not been received yet that calls of the managers need, in words; empty when nothing is missing."""
         return self._connection.missing
 
     @property
@@ -83,17 +83,17 @@ class Client:
 
     @property
     def resources(self) -> dict[str, str]:
-        """Return the state of every resource by name; empty until the managers were heard, and when they have gone."""
+        """Return the state of every resource by name; empty before the managers' first message, and once they are gone."""
         return {} if self._connection.gone else dict(self._news.resources)
 
     @property
     def reasons(self) -> dict[str, str]:
-        """Why each resource is in its state, as the functional layer has told, in words; empty where it told nothing."""
+        """The reason that the functional layer reported for each resource's state, by name; empty where it reported none."""
         return {} if self._connection.gone else dict(self._news.reasons)
 
     @property
     def skills(self) -> dict[str, SkillRecord]:
-        """Return what runs of every skill, and what ended last; empty until the managers were heard, and when they have gone."""
+        """Return, by skill, its open executions and its last end; empty before the managers' first message, and once they are gone."""
         return {} if self._connection.gone else dict(self._news.skills)
 
     def last(self, skill: str) -> Ended[dict[str, Any], str] | None:
@@ -124,7 +124,7 @@ class Client:
         return self._news.on_skills.add(callback)
 
     def data_feed(self, name: str, every_s: float = 0.0) -> Feed:
-        """Return the values of a data; it is subscribed to when it is first asked for, by any thread, and told at most once in ``every_s``.
+        """Return the feed of a data, subscribed to at the first call, from any thread; it has at most one value in ``every_s`` seconds.
 
         Raises:
             ValueError: there is no such data.
@@ -205,15 +205,15 @@ class Client:
         return self._ask("transition", {"resource": resource, "to": to, "reason": reason}, answer)
 
     def trigger(self, event: str) -> Pending[TransitionReply]:
-        """Ask for an event of the model; it is asked for once only, as it may be taken again and again."""
+        """Ask for an event of the model; the request is never repeated, as the event may be possible several times."""
         return self._ask("trigger", {"event": event}, lambda reply, _: reply, once=True)
 
     def read_data(self, name: str) -> Pending[DataReading]:
-        """Ask the managers for a data's value as JSON: also of a type that is not known here."""
+        """Ask the managers for a data's value as JSON, also of a type that this process does not have."""
         return self._ask("get_data", {"name": name}, lambda reading, _: reading)
 
     def moment(self) -> Pending[Any]:
-        """Return an answer that is not given yet; it fails when the managers go."""
+        """Return an answer to be resolved by the caller; it fails when the managers are gone."""
         return self._news.moment()
 
     # --- inside ------------------------------------------------------------------------------------------------------

@@ -155,7 +155,7 @@ class Connection:
 
     @property
     def missing(self) -> str:
-        """What the managers can't be called without, and has not come so far; empty when nothing is missing."""
+        """What has not been received yet that calls of the managers need, in words; empty when nothing is missing."""
         if not self._alive:
             return "a heartbeat"
         if self._unusable == self.instance_id:

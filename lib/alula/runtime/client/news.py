@@ -86,7 +86,7 @@ class ClientNews:
             tracker.link.release(tracker.handle.id)
 
     def moment(self) -> Pending[Any]:
-        """Return an answer that is not given yet; it fails when the managers go."""
+        """Return an answer to be resolved by the caller; it fails when the managers are gone."""
         pending: Pending[Any] = Pending(self._middleware.waiter)
         with self._lock:
             self._pending.add(pending)

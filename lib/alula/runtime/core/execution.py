@@ -65,7 +65,7 @@ class Execution:
         return self._controller.fail(self.id, message)
 
     def interrupted(self, message: str = "") -> bool:
-        """Say that the stop which ``on_interrupt`` has begun is done. False when no stop is under way (any more)."""
+        """Report that the stop begun by ``on_interrupt`` is complete. False when no stop is under way (any more)."""
         return self._controller.interrupted(self.id, message)
 
     def set_outputs(self, **outputs: object) -> None:

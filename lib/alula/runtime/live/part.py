@@ -58,9 +58,9 @@ class RunPart:
     faults: Mapping[str, Sequence[str]] = {}
     """What can fail in every scenario, each with the ways in which it can; scenarios add their own."""
     consequences: Mapping[str, Consequence] = {}
-    """Of the death of a node; of one that is not here the run goes on."""
+    """What the death of a node leads to, by name; after that of any other node the run goes on."""
     stays_dead: Mapping[str, Consequence] = {}
-    """Of the death of a node that does not run again within `DEAD_S`."""
+    """What it leads to, by name, that a dead node does not run again within `DEAD_S`."""
     cameras: Mapping[str, str] = {}
     """Topics of sensor_msgs/Image that the operator's page shows thumbnails of, by the name there."""
 
@@ -70,18 +70,18 @@ class RunPart:
         """Add options to the command line."""
 
     def read(self, given: Namespace, scenario: Scenario) -> Mapping[str, Any]:  # noqa: ARG002
-        """Check the options; return what the run is to know of them, as JSON has it; raises RequestError."""
+        """Check the options; return the values that the run needs, which JSON can hold; raises RequestError."""
         return {}
 
     def check_world(self, path: str) -> None:
         """Refuse a world's file that can't be used; raises RequestError."""
 
     def claim(self, spec: RunSpec) -> Mapping[str, Any]:
-        """Return ports and the like, which depend on the run's domain; they go on top of ``own``. Raises RequestError, NoFreePortError."""
+        """Return ``own`` with what depends on the run's domain, such as ports. Raises RequestError, NoFreePortError."""
         return spec.own
 
     def words(self, spec: RunSpec) -> Sequence[str]:  # noqa: ARG002
-        """Return what is to be said before the run starts, a line each."""
+        """Return lines to be printed before the run starts."""
         return ()
 
     # --- in the supervisor --------------------------------------------------------------------------------------------
@@ -91,29 +91,29 @@ class RunPart:
         return spec.own
 
     def listen(self, spec: RunSpec, departed: Callable[[float], None]) -> None:
-        """Subscribe to what this part needs.
+        """Subscribe to the topics that this part needs.
 
         ``departed`` may be called with the moment when the robot departed, seconds of mission clock; else the record tells it.
         """
 
     def clock_source(self, spec: RunSpec) -> str:  # noqa: ARG002
-        """Say where ``/clock`` comes from."""
+        """Return what publishes ``/clock``, in words."""
         return "/clock"
 
     def waits(self, spec: RunSpec, *, clock: bool) -> list[str]:  # noqa: ARG002
-        """Return what the run waits for before it can begin, besides its clock, in words. ``clock``: the mission clock has begun."""
+        """Return what the run still waits for before it can begin, in words, its clock aside. ``clock``: the mission clock has begun."""
         return []
 
     def held(self, clock: Clock) -> str:  # noqa: ARG002
-        """Return who else has the robot while it is not at rest, and how it is, in words; empty: nobody has.
+        """Return who else controls the robot while it is not at rest, and what it does, in words; empty: nobody.
 
-        It is told every 10 s. A run whose mission is over goes on as long as there is something: until it is at rest, is ours again and is
-        brought to rest, or somebody ends the run.
+        It is printed every 10 s. A run whose mission is over goes on until this is empty, and the robot is brought to rest where it is
+        not, or until somebody ends the run.
         """
         return ""
 
     def bring_to_rest(self, clock: Clock) -> None:
-        """Bring the robot to rest because no mission decides any more; return when it is, or when that takes too long."""
+        """Bring the robot to rest when no mission decides any more; return once it is at rest, or after a time limit."""
 
 
 def part_of_robot() -> RunPart:

@@ -45,7 +45,7 @@ class LocalManagers:
 
     @property
     def errors(self) -> list[str]:
-        """Errors that no execution could carry."""
+        """The errors that belong to no execution, a line each."""
         return self._middleware.errors
 
     def soon(self, job: Job) -> None:
@@ -61,11 +61,11 @@ class LocalManagers:
         return self._managers.resources.transition(resource, to, reason)
 
     def heard(self, resources: Iterable[str]) -> None:
-        """Note that the reporter of these resources was heard of: one with a ``silence`` is unknown when it is not again within that."""
+        """Take a heartbeat of the reporter of these resources; one with a ``silence`` becomes unknown without another within that time."""
         self._managers.resources.heard(resources)
 
     def expect_nothing(self) -> None:
-        """Take it that no reporter will be heard of any more; nothing becomes unknown by that."""
+        """Expect no more heartbeats of reporters: no resource becomes unknown for want of one."""
         self._managers.resources.expect_nothing()
 
     def publish(self, name: str, value: object) -> None:
@@ -73,11 +73,11 @@ class LocalManagers:
         self.data.receive(name, value)
 
     def update_data(self, name: str, value: object | None) -> None:
-        """Have conditions see a value of a data, or None: there is no fresh one any more."""
+        """Evaluate conditions with this value of a data from now on; None: it has no fresh one any more."""
         self._managers.update_data(name, value)
 
     def on_step(self, callback: Listener) -> None:
-        """Call ``callback(events)`` at each step, within it: clients hear of it later."""
+        """Call ``callback(events)`` within each step, before clients receive its events."""
         self._managers.on_step.append(callback)
 
     def describe(self) -> str:
@@ -89,7 +89,7 @@ class LocalManagers:
         self._managers.close(reason)
 
     def vanish(self) -> None:
-        """Be gone at once, like a process that was killed: nothing is stopped, nothing is published."""
+        """Disappear at once, as a killed process does: stop nothing and publish nothing."""
         self._middleware.close()
         self._middleware.bus.vanish(self.skillset.name)
 

@@ -61,7 +61,7 @@ class LocalWorld:
 
     @property
     def bus(self) -> Bus:
-        """What clients and managers talk over."""
+        """The bus that carries messages between clients and managers."""
         return self._bus
 
     @property
@@ -71,7 +71,7 @@ class LocalWorld:
 
     @property
     def errors(self) -> list[str]:
-        """All errors that no execution could carry."""
+        """The errors that belong to no execution, a line each."""
         return [error for managers in self.managers.values() for error in managers.errors]
 
     # --- managers and clients ----------------------------------------------------------------------------------------

@@ -1,4 +1,4 @@
-"""A client of an action that hears every response, for hooks and tools that ask others' action servers."""
+"""A client of an action that loses no response, for hooks and tools that call action servers."""
 
 from __future__ import annotations
 
@@ -9,7 +9,7 @@ from rclpy.action import ActionClient as RclpyActionClient  # noqa: TID251
 
 
 class ActionClient(RclpyActionClient):  # type: ignore[misc]  # rclpy ships no types
-    """A client of an action whose methods may be called in any thread, as those of rclpy's own may not.
+    """A thread-safe client of an action, which rclpy's own is not.
 
     rclpy 7.1.6 sends a request first and notes it then, without a lock: a response that the spinning thread takes in between is dropped
     ("Ignoring unexpected goal response"), and its future never ends. Here responses wait until their request is noted.

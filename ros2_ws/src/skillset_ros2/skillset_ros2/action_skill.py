@@ -32,7 +32,7 @@ class Goal(Call):
     handle: Any = None
     """rclpy's, once the server has accepted the goal."""
     cancelled: bool = False
-    """Whether it is to be cancelled; ``cancel_answered``: the server has heard that, and stops in its own time."""
+    """Whether it is to be cancelled; ``cancel_answered``: the server has received that, and stops in its own time."""
     cancel_answered: bool = False
     paused: bool = False
     ended: bool = False
@@ -45,8 +45,9 @@ class ActionSkill(FunctionSkill[Goal]):
 
     An interruption cancels the goal and waits until it is over.
 
-    The skill's inputs fill the goal's fields of the same names, the feedback's ``progress`` (0 to 1) is the skill's, the goal's final
-    status says the result, and the ``message`` of the server's result why; ``goal``, ``part_done`` and ``ending`` change that.
+    By default inputs fill the goal's fields of the same names, the feedback's ``progress`` (0 to 1) is the skill's, the goal's final status
+    selects the result, and ``message`` of the server's result is the reason; override ``goal``, ``part_done`` and ``ending`` to change
+    that.
     """
 
     action: ClassVar[Any]
@@ -54,7 +55,7 @@ class ActionSkill(FunctionSkill[Goal]):
     results: ClassVar[Mapping[Any, str]] = {}
     """The result for each final status of a goal, as ``GoalStatus.STATUS_SUCCEEDED``."""
     silence_s: ClassVar[float] = 0.0
-    """How long a goal that was accepted may be without feedback, mission clock; 0: it need not tell anything."""
+    """How long a goal that was accepted may be without feedback, mission clock; 0: it need not send any."""
     resumable: ClassVar[bool] = False
     """Whether a pause cancels the goal and its end sends it again."""
 
@@ -81,7 +82,7 @@ class ActionSkill(FunctionSkill[Goal]):
     # --- hooks --------------------------------------------------------------------------------------------------------
 
     def on_start(self) -> None:
-        """Cancel all goals of the server: those of managers that were here before run on."""
+        """Cancel all goals of the server: those that earlier managers have sent may still run."""
         if self.server:
             self.call_at_start(CancelGoal, f"{self.server}/_action/cancel_goal", CancelGoal.Request())
 
@@ -176,7 +177,7 @@ class ActionSkill(FunctionSkill[Goal]):
         return f"sends no feedback for {self.silence_s:g} s" if not call.cancelled and 0.0 < self.silence_s < waited_s else ""
 
     def give_up(self, call: Goal, why: str) -> None:
-        """Leave a server that is lost; it may still hear that the goal is cancelled."""
+        """End the execution, as the server is lost; cancel the goal, in case that is received."""
         if not call.cancelled:
             self._cancel(call)
         self._over(call, lambda: self.lose(call, f"{call.server} {why}"))

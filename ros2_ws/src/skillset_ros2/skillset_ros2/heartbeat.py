@@ -13,10 +13,10 @@ HEARTBEAT_S = 0.5
 
 
 class Heartbeat:
-    """Sends a heartbeat twice a second, by the monotonic clock and by simulated time: the node that reports these resources is alive.
+    """Sends, twice a second by the monotonic clock and by simulated time, that the node which reports some resources is alive.
 
-    Managers take a resource with a ``silence`` back to its initial state when that is not heard any more. A node that is heard again
-    has to report anew what it is: follow ``SkillsetClient.on_change``.
+    Managers reset a resource with a ``silence`` to its initial state when heartbeats stop. A node whose heartbeats are received again has
+    to report its state anew: follow ``SkillsetClient.on_change``.
     """
 
     def __init__(self, node: Node, skillset: str, *resources: str) -> None:

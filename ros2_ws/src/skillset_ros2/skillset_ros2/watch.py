@@ -1,4 +1,4 @@
-"""The mission clock of a node, and what hooks ask several times a second of it."""
+"""The mission clock of a node, and periodic calls by it."""
 
 from __future__ import annotations
 
@@ -32,11 +32,11 @@ class Watch:
 
     @property
     def now_s(self) -> float:
-        """Mission clock."""
+        """Mission clock, seconds."""
         return self._clock.now_ns() / 1e9
 
     def every(self, look: Callable[[], None]) -> None:
-        """Call this from now on."""
+        """Call ``look()`` every period from now on."""
         self._looks.append(look)
 
     def _look(self) -> None:

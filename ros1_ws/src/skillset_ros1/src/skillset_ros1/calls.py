@@ -93,7 +93,7 @@ class _Call:
 
 
 def call_and_wait(name: str, kind: Any, request: Any, *, timeout_s: float = DEFAULT_TIMEOUT_S) -> Any:
-    """Return the reply of a service, called as soon as it is there.
+    """Call a service as soon as it is available, and wait for its reply.
 
     Raises:
         ServiceCallError: there is none within the time (wall clock).
@@ -152,7 +152,7 @@ _queues: defaultdict[str, _Queue] = defaultdict(_Queue)
 def call(name: str, kind: Any, request: Any, on_reply: OnReply, on_error: OnError, *, timeout_s: float = DEFAULT_TIMEOUT_S) -> None:
     """Call a service; return at once. Then either ``on_reply`` or ``on_error`` is called, on another thread, in time.
 
-    ``on_error`` is also called when ``on_reply`` raises, so ``on_error=execution.fail`` ends the execution whatever goes wrong. Of many
-    calls of one service each waits for its turn, and has its time from then on as long as the service answers.
+    ``on_error`` is also called when ``on_reply`` raises, so ``on_error=execution.fail`` ends the execution whatever goes wrong. Calls of
+    one service are queued; while the service answers, the time limit of each counts from its turn.
     """
     _queues[rospy.resolve_name(name)].put(_Call(name, kind, request, timeout_s), on_reply, on_error)

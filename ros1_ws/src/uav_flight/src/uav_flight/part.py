@@ -162,7 +162,7 @@ class DronePart(RunPart):
         self._linked = self._linked or state.link
 
     def clock_source(self, spec: RunSpec) -> str:
-        """Say where ``/clock`` comes from."""
+        """Return what publishes ``/clock``, in words."""
         flight = Flight.of(spec)
         if flight.autopilot is None:
             return "the simulator"

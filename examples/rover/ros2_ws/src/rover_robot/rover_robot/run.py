@@ -32,7 +32,7 @@ class RoverRun(parts.RunPart):
         return {"rate": given.rate}
 
     def clock_source(self, spec: parts.RunSpec) -> str:
-        """Say where ``/clock`` comes from."""
+        """Return what publishes ``/clock``, in words."""
         return "the simulator"
 
     def bring_to_rest(self, clock: parts.Clock) -> None:
