@@ -11,6 +11,7 @@ from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 
 from alula.common.faults import FaultRequest
+from alula.common.located_yaml import choices
 from alula.common.public import public
 from alula.mock.formula import Formula
 from alula.model.model import ResultKind, Skill
@@ -186,7 +187,7 @@ class Behaviour:
         faults = {name: fault for one in (self, *self.beside) for name, fault in one.faults.items()}
         name = next((name for name in (f"{request.what}:{request.how}", request.what) if name in faults), None)
         if name is None:
-            raise SkillRuntimeError(f"there is no fault '{request.what}' in the behaviour; it has {', '.join(faults) or 'none'}")
+            raise SkillRuntimeError(f"there is no fault '{request.what}' in the behaviour; it has {choices(request.what, faults)}")
         return name, faults[name]
 
     def of(self, skillsets: frozenset[str]) -> Behaviour:

@@ -8,6 +8,7 @@ from dataclasses import dataclass
 from pathlib import Path
 
 from alula.common.robots import RobotError, RobotFolder, find_robot, fleet_name
+from alula.common.suggestions import nearest
 from alula.language.errors import LanguageError
 from alula.language.fleet import of_robot, together
 from alula.language.load import load_robot, load_skillset
@@ -88,5 +89,7 @@ def models_of(names: Iterable[str], files: Sequence[Path] = ()) -> list[Skillset
 
 def _known(own: Mapping[str, Skillset], name: str) -> Skillset:
     if name not in own:
-        raise AnalysisError(f"there is no model of skillset {name!r} in this robot; give its file with --model")
+        hint = nearest(name, own)
+        meant = f"; {hint}" if hint.startswith("did") else ""
+        raise AnalysisError(f"there is no model of skillset {name!r} in this robot; give its file with --model{meant}")
     return own[name]

@@ -30,6 +30,7 @@ DASHES = re.compile(rb"-(?=-)|-\Z")
 DECLARATION = re.compile(rb"\s+(<\?xml[^>]*\?>)")
 _ESCAPED = str.maketrans({"&": "&amp;", "<": "&lt;", ">": "&gt;", '"': "&quot;", "\n": "&#10;", "\t": "&#9;", "\r": "&#13;"})
 """How an attribute's value has to be written; xml.sax.saxutils would take the network's modules along."""
+_UNCLOSED = {expat.errors.codes[message] for message in (expat.errors.XML_ERROR_TAG_MISMATCH, expat.errors.XML_ERROR_NO_ELEMENTS)}
 _AMPERSAND = "an `&` that stands for itself is no XML, so other tools refuse the file", "write &amp;"
 _LESS = "a `<` in an attribute is no XML, so other tools refuse the file", "write &lt;"
 _DASHES = "a comment with `--` in it is no XML, so other tools refuse the file", "write other signs than dashes there"
@@ -261,12 +262,19 @@ class _Parser:
         try:
             self._expat.Parse(self._plain, True)
         except expat.ExpatError as error:
-            raise self._error(self._expat.ErrorByteIndex, f"is no XML: {expat.ErrorString(error.code)}") from error
+            raise self._error(self._expat.ErrorByteIndex, f"is no XML: {expat.ErrorString(error.code)}", self._closing(error)) from error
         if self._root is None:
             raise self._error(0, "is empty")
         before, after = self._source[: self._before].decode(), self._source[self._written :].decode()
         slips = [Problem(self._place(index), message, cure, "ALU619", warning=True) for index, message, cure in self._slips]
         return Document(self._path, self._root, mark + before, after, tuple(slips))
+
+    def _closing(self, error: expat.ExpatError) -> str:
+        """Return which tag is missing where the tags do not match, or the file ends before the last one."""
+        if not self._open or error.code not in _UNCLOSED:
+            return ""
+        element = self._open[-1]
+        return f"close <{element.tag}> of line {element.place.line} first, with </{element.tag}>"
 
     def _place(self, index: int) -> Place:
         line = bisect_right(self._lines, index)

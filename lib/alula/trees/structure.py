@@ -16,6 +16,8 @@ from alula.trees.node_type import CATEGORIES, NodeType
 from alula.trees.palette import Palette
 from alula.trees.ports import Direction
 from alula.trees.reading import TreeFiles
+from alula.trees.status import ANSWERS
+from alula.trees.values import PortType
 
 MOST_NODES = 65_535
 """A node's uid has 16 bits in Groot2's protocol."""
@@ -25,6 +27,8 @@ ALIKE = 0.9
 """From here on a name that nobody knows is a slip of the pen, not a node of one's own."""
 SHOWN = 5
 """Names of nodes that one message shows."""
+_WRITTEN = {"double": "write a number, such as 0.5", "bool": "write true or false", "BT::NodeStatus": f"write {', '.join(ANSWERS)}"}
+"""How a value is written, by its type's name."""
 
 
 def verify(files: TreeFiles, palette: Palette, report: Report = refuse, *, of_others: bool = False, others: Collection[Path] = ()) -> None:
@@ -205,7 +209,15 @@ def _verify_attribute(attribute: Attribute, known: NodeType, element: Element, r
         try:
             port.type.parse(attribute.value)
         except ValueError as error:
-            report(Problem(attribute.value_place or attribute.place, f"the port '{port.name}': {error}", code="ALU605"))
+            place = attribute.value_place or attribute.place
+            report(Problem(place, f"the port '{port.name}': {error}", _written_as(port.type), code="ALU605"))
+
+
+def _written_as(type_: PortType) -> str:
+    """Return how a value of a type of ports is written in a file; empty for a type of a robot's own."""
+    if type_.limits is not None:
+        return f"write a whole number from {type_.limits[0]} to {type_.limits[1]}"
+    return _WRITTEN.get(type_.name, "")
 
 
 def _verify_given(element: Element, known: NodeType, report: Report) -> None:

@@ -230,6 +230,8 @@ def test_faults_wait_for_their_anchor_and_are_noticed_late(read):
     assert mocked.call() == (("RESOURCE_INVARIANT_VIOLATED", "keep_sdk"), 2.0)
     with pytest.raises(SkillRuntimeError, match="no fault 'zed' in the behaviour; it has pilot, early"):
         mocked.robot.fail(FaultRequest("zed", begin_s=1.0))
+    with pytest.raises(SkillRuntimeError, match=r"no fault 'pilt' in the behaviour; it has pilot, early \(did you mean `pilot`\?\)"):
+        mocked.robot.fail(FaultRequest("pilt", begin_s=1.0))
 
 
 def test_a_fault_may_end_what_runs_of_a_skill(read):

@@ -230,6 +230,13 @@ UNREADABLE = {
         ),
         "there is no model of skillset 'os; x' in this robot; give its file with --model",
     ),
+    "a slip": (
+        "x.jsonl",
+        lambda path: path.write_text(
+            '{"kind": "TRANSITION", "stamp_s": 0, "skillset": "navigaton", "resource": "r", "from_state": "", "to_state": ""}\n'
+        ),
+        "there is no model of skillset 'navigaton' in this robot; give its file with --model; did you mean `navigation`?",
+    ),
 }
 
 
