@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import uuid
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from pathlib import Path
 
 from alula.campaign.mocked_scenarios import load_mocked_scenario
@@ -43,6 +43,7 @@ class Mission:
         path: its file.
         world: the file of the world that its inputs were read from, empty where there is none.
         robot: the robot that the mission belongs to, or None.
+        ways: the ways in which each fault of its scenario can occur, by name; a fault that is not in it may have any.
     """
 
     plan: MissionPlan
@@ -51,6 +52,7 @@ class Mission:
     path: Path
     world: str = ""
     robot: RobotFolder | None = None
+    ways: Mapping[str, Sequence[str]] = field(default_factory=dict)
 
     @classmethod
     def load(
@@ -79,7 +81,8 @@ class Mission:
             known = load_mocked_scenario(scenario, list(map(Path, behaviour)), world=world, inputs=inputs)
             name = world or known.scenario.world
             place = str(folder.world(name).absolute()) if name else ""
-            return cls(known.plan, known.skillsets, known.behaviour, folder.root / known.scenario.mission, place, folder)
+            file, ways = folder.root / known.scenario.mission, dict(known.scenario.faults)
+            return cls(known.plan, known.skillsets, known.behaviour, file, place, folder, ways)
 
     @classmethod
     def from_file(
@@ -127,7 +130,7 @@ class Mission:
             out: a folder for its record, which `alula.open_run` opens; None: it leaves nothing behind.
 
         Raises:
-            AlulaError: the mocks have no such fault, or the folder is not empty.
+            AlulaError: the mocks have no such fault, the scenario not in this way, or the folder is not empty.
         """
         mission = self.mocked(*faults, seed=seed, out=out)
         with meaning(self.robot):
@@ -166,7 +169,7 @@ class Mission:
         """
         requests = _requests(faults)
         try:
-            check_faults(requests, self.behaviour, [one.name for one in self.skillsets])
+            check_faults(requests, self.behaviour, [one.name for one in self.skillsets], self.ways)
         except SkillRuntimeError as error:
             raise FaultError(str(error)) from None
         folder = None if out is None else Path(out).expanduser().absolute()

@@ -63,7 +63,7 @@ class MockedScenario:
             AnalysisError: there is none of this name.
         """
         try:
-            check_faults(faults, self.behaviour, self.scenario.skillsets)
+            check_faults(faults, self.behaviour, self.scenario.skillsets, dict(self.scenario.faults))
         except (FaultError, SkillRuntimeError) as error:
             raise AnalysisError(str(error)) from None
 

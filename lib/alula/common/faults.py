@@ -163,7 +163,7 @@ def parse_fault(text: str, known: Mapping[str, Sequence[str]] | None = None) -> 
         raise FaultError(f"fault '{text}': it ends at {end_s:g} s, but begins at {begin_s:g} s")
     fault = FaultRequest(match["what"], match["how"] or "", begin_s, end_s)
     if known is not None:
-        _check(fault, text, known)
+        check_fault(fault, known, text)
     return fault
 
 
@@ -173,7 +173,9 @@ def parse_faults(text: str, known: Mapping[str, Sequence[str]] | None = None) ->
     return [parse_fault(word, known) for word in text.split(",") if word.strip()]
 
 
-def _check(fault: FaultRequest, text: str, known: Mapping[str, Sequence[str]]) -> None:
+def check_fault(fault: FaultRequest, known: Mapping[str, Sequence[str]], text: str = "") -> None:
+    """Refuse a fault that is not in ``known``, ways of failing by thing; ``text``: as the user wrote it. Raises FaultError."""
+    text = text or str(fault)
     if fault.what not in known:
         raise FaultError(f"fault '{text}': there is no '{fault.what}' to break; choose one of {choices(fault.what, known)}")
     ways = known[fault.what]

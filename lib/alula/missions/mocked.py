@@ -9,7 +9,7 @@ from functools import partial
 from pathlib import Path
 from typing import Protocol
 
-from alula.common.faults import FaultRequest
+from alula.common.faults import FaultRequest, check_fault
 from alula.common.operator import ABORT, PAUSE, acts_of, is_operator, on_time
 from alula.common.public import public
 from alula.missions.director import Director, End, Outcome
@@ -36,22 +36,31 @@ KILLED = "killed"
 """How managers fail that are ended without a word, as ``mapping:killed``; mocks do not start them again."""
 
 
+NO_WAYS: Mapping[str, Sequence[str]] = {}
+
+
 def kills_managers(fault: FaultRequest, skillsets: Collection[str]) -> bool:
     """Return whether a fault ends the managers of one of these skillsets."""
     return fault.what in skillsets and fault.how == KILLED
 
 
-def check_faults(faults: Sequence[FaultRequest], behaviour: Behaviour, skillsets: Collection[str]) -> None:
+def check_faults(
+    faults: Sequence[FaultRequest], behaviour: Behaviour, skillsets: Collection[str], ways: Mapping[str, Sequence[str]] = NO_WAYS
+) -> None:
     """Refuse what can't fail in a mission over mocks with these skillsets.
 
+    ``ways``: in which each fault of the scenario can occur; mocks need not distinguish them. A fault that is not in it may have any.
+
     Raises:
-        FaultError: an operator does no such thing.
+        FaultError: an operator does no such thing, or the fault can't occur in this way.
         SkillRuntimeError: the behaviour has no such fault.
     """
     acts_of(faults)
     for fault in faults:
         if not is_operator(fault) and not kills_managers(fault, skillsets):
-            behaviour.fault(fault)
+            name, _ = behaviour.fault(fault)
+            if name == fault.what and fault.what in ways:
+                check_fault(fault, ways)
 
 
 class Listener(Recorder, Protocol):

@@ -180,6 +180,8 @@ def test_what_a_mission_can_not_be_given_is_refused_before_it_begins(door):
         mission_of(door).odds()
     with pytest.raises(AlulaError, match="there is no scenario 'delivr'"):
         Mission.load("delivr", ROOT / "examples/rover")
+    with pytest.raises(AlulaError, match=r"fault 'laser:frozn': laser can't be 'frozn'; .*did you mean `frozen`\?"):
+        Mission.load("patrol", ROOT / "examples/rover").run("laser:frozn")
 
 
 def test_a_run_is_opened_held_against_the_models_and_decided_again(tmp_path):
