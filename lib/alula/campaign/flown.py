@@ -83,7 +83,7 @@ class Ticks:
             self._ticks[-1].asked.append(execution_id)
 
     def report(self, skillset: str, handle: SkillHandle) -> None:
-        """Ignore it: the leaf tells what the tree sees of it."""
+        """Ignore it: the leaf's status is what the tree sees of it."""
 
     def sample(self, skillset: str, data: str, value: object, stamp_ns: int | None) -> None:
         """Take no notice."""

@@ -16,7 +16,7 @@ Warn = Callable[[str], object]
 
 
 def models_of(robot: RobotFolder, warn: Warn) -> tuple[Skillset, ...]:
-    """Return the models of a robot as far as they can be read; ``warn`` is told which have errors."""
+    """Return the models of a robot as far as they can be read; ``warn`` receives which have errors."""
     if robot.robots:
         return tuple(one for name, member in robot.robots.items() for one in in_fleet(name, models_of(member, warn)))
     files = check_files(models_in(str(robot.skillsets)))
@@ -27,7 +27,7 @@ def models_of(robot: RobotFolder, warn: Warn) -> tuple[Skillset, ...]:
 
 
 def part_of(robot: RobotFolder, warn: Warn) -> MissionPart:
-    """Return what a robot adds to missions; nothing where that can't be imported, and ``warn`` is told why."""
+    """Return what a robot adds to missions; nothing where that can't be imported: ``warn`` receives the reason."""
     try:
         part = robot.part("missions")
     except RobotError as error:

@@ -19,7 +19,7 @@ _WORD = re.compile(r"@?[A-Za-z_]\w*")
 
 
 def never_read(whole: Whole) -> Iterator[Problem]:
-    """Yield the first writing of each entry that nothing in the files reads; who else reads entries of a foreign mission, nobody knows."""
+    """Yield the first writing of each entry that nothing in the files reads; programs may read those of a foreign mission."""
     roots = (whole.root, *whole.beside)
     if whole.given is None or whole.foreign or any(_reads_anything(wiring) for root in roots for wiring in root.walk()):
         return

@@ -68,7 +68,7 @@ class ShortestWays(Generic[Vertex, Step]):
 
     @property
     def open(self) -> Collection[Vertex]:
-        """What was found, and not all that follows it."""
+        """The nodes that were found and whose successors were not all looked at."""
         return self._todo
 
     def step_to(self, vertex: Vertex) -> Step | None:

@@ -68,7 +68,7 @@ class Located:
             raise self.wrong(" ".join(str(error).split())) from None
 
     def entries(self, what: str) -> dict[str, Located]:
-        """Return the parts of a mapping by key; raise where it is none, or says a thing twice."""
+        """Return the parts of a mapping by key; raise where it is none, or has a key twice."""
         if not isinstance(self._node, yaml.MappingNode):
             raise self.wrong(f"{what} should be a mapping (`name: value`), not {_shown(self._node)}")
         found: dict[str, Located] = {}

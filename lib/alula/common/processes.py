@@ -33,7 +33,7 @@ def die_with_parent() -> None:
 
 
 def ends_within(child: subprocess.Popen[bytes], timeout_s: float) -> bool:
-    """Wait for the end of a child; tell whether it has ended. ``Popen.wait`` with a timeout looks every few milliseconds."""
+    """Wait for the end of a child; return whether it has ended. ``Popen.wait`` with a timeout looks every few milliseconds."""
     if child.poll() is None:
         end = os.pidfd_open(child.pid)
         try:

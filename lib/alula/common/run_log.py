@@ -67,12 +67,12 @@ def read_held(out: Path) -> list[str]:
 
 
 def note_act(out: Path, stamp_s: float | None, act: Mapping[str, object]) -> None:
-    """Note what the operator did: ``{command, by, answer}``; seconds of mission clock, None before that is heard."""
+    """Note an act of the operator: ``{command, by, answer}``; seconds of mission clock, None before the clock is received."""
     note(out, ACT, {**({} if stamp_s is None else {"stamp_s": round(stamp_s, 3)}), **act})
 
 
 def note_mocked(out: Path, simulated_s: float, wall_s: float, faults: Iterable[FaultChange], notes: Sequence[str]) -> None:
-    """Note what a run over mocks tells in place of recordings: its faults, seconds of mission clock, what was wrong, how fast it was."""
+    """Note what a run over mocks has in place of recordings: its faults, seconds of mission clock, errors, and its speed."""
     for change in faults:
         note(out, FAULT, vars(change))
     note(out, MOCKED, {"simulated_s": simulated_s, "wall_s": wall_s, "factor": simulated_s / wall_s if wall_s else None, "notes": [*notes]})

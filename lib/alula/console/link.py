@@ -53,7 +53,7 @@ class Skillset(Protocol):
 
     @property
     def view(self) -> SkillsetView | None:
-        """What was heard of it."""
+        """What was received of it."""
         ...
 
     def start(self, skill: str, inputs: dict[str, object]) -> SkillHandle:

@@ -27,7 +27,7 @@ def later(_tick: Job) -> None:
 
 
 def say_nothing(_line: str) -> None:
-    """Say nothing."""
+    """Ignore the line."""
 
 
 class MissionDriver:

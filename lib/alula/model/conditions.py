@@ -124,7 +124,7 @@ def in_si(atom: DataIs) -> float:
 
 
 def present(condition: Expression, states: States, data: Data) -> str:
-    """Say how what a condition asks is: ``axes_authority is USED, battery.level is 0.15, fps has no fresh value``."""
+    """Return what a condition asks about, as it is: ``axes_authority is USED, battery.level is 0.15, fps has no fresh value``."""
     resources = dict.fromkeys(atom.resource for atom in atoms(condition) if isinstance(atom, ResourceIs))
     words = [f"{resource} is {states[resource]}" for resource in resources]
     for atom in data_of(condition):

@@ -98,7 +98,7 @@ class MissionSteps:
         return self._system.resource(state.state, name) if known else None
 
     def resources(self, state: Place) -> dict[str, str]:
-        """Return the states of all resources that the mission hangs on, by ``skillset.resource``."""
+        """Return the states of all resources that the mission depends on, by ``skillset.resource``."""
         names = [f"{of.name}.{one.name}" for of in self._system.skillsets for one in of.resources]
         found = ((name, self._system.resource(state.state, name)) for name in names)
         return {name: known for name, known in found if known is not None}

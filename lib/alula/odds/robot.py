@@ -40,7 +40,7 @@ def mission_of(
     changed: Path | None = None,
     models: Sequence[Skillset] | None = None,
 ) -> tuple[Callable[[str], System], Callable[[System], MissionSteps], Figures]:
-    """Return what reads a mission's file of this robot, as for ``look_at``, what can happen to it then, and the figures that it hangs on.
+    """Return a reader of a mission's file for this robot, as ``look_at`` takes it, the events that can occur, and the figures used.
 
     Args:
         path: of the mission.

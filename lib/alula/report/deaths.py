@@ -13,7 +13,7 @@ from alula.report.files import finite
 
 @dataclass(frozen=True)
 class Death:
-    """A process that ended without being told to.
+    """A process that ended without a request to end.
 
     ``when_s``: absolute mission clock, None before it runs. ``again_s``: when it ran again, 0 before the mission clock runs; None: it
     stayed dead.

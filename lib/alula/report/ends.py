@@ -56,7 +56,7 @@ def true_reason(reason: str | None, ended: ReportedEnd | None) -> str | None:
 
 
 def with_dead(reason: str | None, died: Sequence[Death]) -> str | None:
-    """Return the reason of a mission that heard no clock with the processes that had died for good; any other as it is."""
+    """Return the reason of a mission, with the processes that had died for good where it received no clock."""
     gone = ", ".join(f"{one['name']} died ({one['how']})" for one in died if one["when_s"] is not None and one["again_s"] is None)
     if reason is None or not gone or not reason.startswith(CLOCK_STANDS):
         return reason

@@ -9,7 +9,7 @@ from typing import TypedDict
 
 
 class Death(TypedDict):
-    """A process that ended without being told to: when, absolute mission clock, None if unknown; when it ran again, None: never."""
+    """A process that ended without a request: when, absolute mission clock, None if unknown; when it ran again, None: never."""
 
     name: str
     when_s: float | None

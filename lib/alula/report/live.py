@@ -15,7 +15,7 @@ from alula.runtime.core.events import EngineEvent, TransitionEvent, read_event
 
 
 def event_line(event: EngineEvent, lift_off_s: float | None = None, begun_s: float = 0.0) -> str | None:
-    """Return the line that tells of an event; None for events that are not shown.
+    """Return the line that shows an event; None for events that are not shown.
 
     Times count from lift-off; before it, and marked so, from ``begun_s``: no matter where the mission clock begins to count.
     """

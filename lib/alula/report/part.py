@@ -68,7 +68,7 @@ class Task:
 @public("alula.parts")
 @dataclass(frozen=True)
 class Findings:
-    """The results of a robot's part of the report. ``landed``: whether it came back, by its own recordings; None: they do not tell."""
+    """The results of a robot's part of the report. ``landed``: whether it came back, by its own recordings; None: not known."""
 
     values: Mapping[str, Any] = field(default_factory=dict)
     """What goes into ``summary.json`` besides what every run has."""

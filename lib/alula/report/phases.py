@@ -44,7 +44,7 @@ def home() -> tuple[str, str] | None:
 
 
 def status_changes(history: History) -> list[TransitionEvent]:
-    """Return the transitions of the resource that tells whether the robot is away."""
+    """Return the transitions of the resource whose state shows whether the robot is away."""
     place = home()
     return [] if place is None else [change for change in history.transitions if change.resource == place[0]]
 

@@ -92,7 +92,7 @@ def read_bridge(facts: RunFacts, problems: Problems) -> dict[str, object] | None
 
 
 def came_back(history: History, observed: Observed, phases: Phases) -> bool | None:
-    """Return whether the robot is said to be back in its state of departure; None: it never departed, or nothing is said."""
+    """Return whether the robot's last state is that of departure; None: it never departed, or the state is not known."""
     place = home()
     if not phases.departed or place is None:
         return None

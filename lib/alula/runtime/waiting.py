@@ -166,7 +166,7 @@ class Pending(Waitable, Generic[T]):
         self._settle(value, "")
 
     def fail(self, reason: str) -> None:
-        """Say why there will be no response; ignored when there is one."""
+        """End without a response, for this reason; ignored when there is one."""
         self._settle(None, reason or "there is no answer")
 
     def _settle(self, value: T | None, failure: str) -> None:

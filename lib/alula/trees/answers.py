@@ -127,7 +127,7 @@ class Answers:
         self._chance = random.Random(self.seed)  # noqa: S311 - no secret: a run that can be had again
 
     def of(self, name: str) -> Sequence[Answer | Step] | None:
-        """Return what a leaf answers, None where nothing is said of it."""
+        """Return what a leaf answers, None where the file does not name it."""
         return self.script.get(name, self.script.get(OTHERS))
 
     def next(self, leaf: Node, call: str) -> Step:

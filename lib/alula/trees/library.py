@@ -166,7 +166,7 @@ def _steps(one: Path, other: Path) -> int:
 
 
 def models_of(element: Element, report: Report) -> Iterator[NodeType]:
-    """Yield the types of node that a <TreeNodesModel> tells of."""
+    """Yield the types of node that a <TreeNodesModel> declares."""
     for one in element.children:
         category = CATEGORIES.get(one.tag)
         if category is None:

@@ -90,7 +90,7 @@ class Wiring:
 
     @property
     def described(self) -> NodeClass | None:
-        """The class that tells how it ticks its children and ends; None where nobody does, or where it has not the children for that."""
+        """The class that describes how it ticks its children and ends; None without one, or where its number of children is wrong."""
         return self.type.described if self.is_whole else None
 
     @property
@@ -427,7 +427,7 @@ class TickableType(NodeType):
 
     @property
     def teller(self) -> NodeClass | None:
-        """The class that tells of its nodes: the one that makes them, unless another one does."""
+        """The class that describes its nodes: the one that makes them, unless another one does."""
         return self.tells or (self.make if _is_class(self.make) else None)
 
     def wired(self, wiring: Wiring) -> Node:

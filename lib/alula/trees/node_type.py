@@ -27,7 +27,7 @@ CATEGORIES = {category.value: category for category in Category}
 
 
 class NodeClass(Protocol):
-    """What a class of nodes says of them before any tree is built; `node.Node` says what each means."""
+    """What a class of nodes declares before any tree is built; see `node.Node`."""
 
     @property
     def may_run(self) -> bool | None: ...  # noqa: D102
@@ -69,12 +69,12 @@ class NodeType:
 
     @property
     def teller(self) -> NodeClass | None:
-        """The class that tells of its nodes, whether or not what it tells holds for them."""
+        """The class that describes its nodes, whether or not the description applies to them (see `described`)."""
         return self.tells
 
     @cached_property
     def described(self) -> NodeClass | None:
-        """The class of its nodes where that tells how they end (`Node.is_described`), else None: they may do anything."""
+        """The class of its nodes where it describes how they end (`Node.is_described`), else None: they may do anything."""
         known = self.teller
         return known if known is not None and known.is_described() else None
 
@@ -85,7 +85,7 @@ class NodeType:
 
     @property
     def may_run(self) -> bool | None:
-        """Whether it may take several ticks, its children aside; None: not known. A condition answers at once."""
+        """Whether it may answer RUNNING by itself, apart from its children; None: not known. A condition never does."""
         if self.category is Category.CONDITION:
             return False
         return self.described.may_run if self.described else self.runs

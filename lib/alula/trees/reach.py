@@ -10,7 +10,7 @@ _CONDITIONS: dict[str, Answer] = {"_skipIf": SKIPPED, "_while": SKIPPED, "_succe
 
 
 class Reach:
-    """What is known of the nodes of trees before anything is ticked; computed once for each."""
+    """How nodes of trees may end and run, found without ticking them; computed once for each."""
 
     def __init__(self) -> None:
         self._ends: dict[Wiring, Ends] = {}
@@ -30,7 +30,7 @@ class Reach:
         return ANY_END if known is None else known.may_end(wiring.ports.get, [self.ends(child) for child in wiring.children])
 
     def runs(self, wiring: Wiring) -> bool | None:
-        """Return whether a node, or one below it, may take several ticks; None: nobody knows."""
+        """Return whether a node, or one below it, may answer RUNNING; None: not known."""
         if wiring not in self._runs:
             answers = {wiring.may_run, *(self.runs(child) for child in wiring.children)}
             self._runs[wiring] = True if True in answers else None if None in answers else False

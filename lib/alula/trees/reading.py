@@ -52,7 +52,7 @@ class TreeFiles:
         return {name: tree for name, tree in self.trees.items() if tree.place.path in own or Path(tree.place.path).resolve() not in others}
 
     def declared(self) -> Palette:
-        """Return the types of node that a model tells of, without what makes them; subtrees are none."""
+        """Return the types of node that a model declares, without what makes them; subtrees are none."""
         return Palette(one for one in self.models.values() if one.category is not Category.SUBTREE)
 
     def uses(self, name: str) -> Iterator[Element]:
@@ -78,7 +78,7 @@ def read_files(path: Path, report: Report = refuse, *, main: str = "", library: 
 
 
 def read_models(path: Path) -> Palette:
-    """Return the types of node that a file tells of in its TreeNodesModel; it may have no trees. Raises FileError."""
+    """Return the types of node that a file declares in its TreeNodesModel; it may have no trees. Raises FileError."""
     files = TreeFiles()
     _Reader(files, refuse, Library()).add(modernised(read_document(path)), (path.resolve(),))
     return files.declared()

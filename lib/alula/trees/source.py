@@ -14,7 +14,7 @@ from alula.trees.reading import TreeFiles, read_files, read_text
 
 @dataclass(frozen=True)
 class TreeSource:
-    """What whoever reads, checks, proves or runs a tree is handed, so that all of them read the same.
+    """The file of a tree and all that is needed to read it, the same for reading, checks, proofs and runs.
 
     Attributes:
         path: its file.

@@ -112,7 +112,7 @@ def missing_trees(files: TreeFiles, users: Iterable[str] | None = None) -> dict[
 
 
 def is_slip(name: str, known: Iterable[str]) -> bool:
-    """Return whether a name that nobody knows is another one with a slip of the pen."""
+    """Return whether an unknown name is a known one misspelt."""
     return bool(difflib.get_close_matches(name, known, n=1, cutoff=ALIKE))
 
 

@@ -69,6 +69,6 @@ class Tree:
         self.answer = IDLE
 
     def watch(self, watcher: Watcher) -> Callable[[], None]:
-        """Have each change of a node's status told; returns what ends that."""
+        """Call ``watcher`` at each change of a node's status; the return value unsubscribes."""
         self._shared.watchers.append(watcher)
         return lambda: self._shared.watchers.remove(watcher)

@@ -33,7 +33,7 @@ def literal(text: str) -> object:
 
 
 class StandIn:
-    """What stands in the place of a value that nobody knows, as in a search of all runs: it says itself what a port reads of it."""
+    """A placeholder for an unknown value, as in a search of all runs; it decides what a port reads of it."""
 
     __slots__ = ()
 
@@ -42,7 +42,7 @@ class StandIn:
         raise NotImplementedError
 
     def says(self, number: float) -> bool:
-        """Tell of a text whether it is one for a number."""
+        """Return whether the value is a text for this number."""
         raise NotImplementedError
 
 

@@ -37,7 +37,7 @@ class Source:
 class NodeView:
     """A node at one moment; ``status`` is the last one that said something: a node that is left keeps it.
 
-    ``source`` is None for a node that no file tells of.
+    ``source`` is None for a node that stands in no file.
     """
 
     name: str

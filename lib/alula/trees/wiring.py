@@ -41,11 +41,11 @@ class Nothing:
     """No names beyond the blackboard's."""
 
     def value(self, name: str) -> object:  # noqa: ARG002
-        """Know none."""
+        """Return None."""
         return None
 
     def call(self, name: str, arguments: Sequence[object]) -> object:  # noqa: ARG002
-        """Know none."""
+        """Raise KeyError."""
         raise KeyError(name)
 
 

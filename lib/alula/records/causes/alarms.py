@@ -49,7 +49,7 @@ class Alarms:
 
 
 def alarms_of(skillsets: Iterable[Skillset], shown: Iterable[str] | None = None) -> Alarms:
-    """Return the alarms of models; ``shown`` are patterns of what faults show, ``skillset.resource STATE``; None: nothing tells them."""
+    """Return the alarms of models; ``shown`` are patterns of what faults show, ``skillset.resource STATE``; None: they are not known."""
     patterns = [pattern for pattern in shown or () if not pattern.endswith(f" {ANY}")]
     always: set[str] = set()
     away: set[str] = set()

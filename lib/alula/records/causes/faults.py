@@ -67,7 +67,7 @@ class Traced:
 
 
 def faults_told(changes: Sequence[FaultChange], effects: EffectsByFault) -> list[tuple[FaultChange, Fault]]:
-    """Return the faults that recordings tell, each with its change; one lasts until the next change of the same thing."""
+    """Return the faults in recordings, each with its change; a fault lasts until the next change of the same thing."""
     found = []
     for at, change in enumerate(changes):
         if change.mode != MENDED:

@@ -21,7 +21,7 @@ def spoken(name: str) -> str:
 
 
 def fault_text(name: str, mode: str, *, injected: bool) -> str:
-    """Say what failed; mocks do not tell in which way."""
+    """Return what failed, and in which way, in words; mocks record no way."""
     if injected:
         return f"{spoken(name)} failed ({mode}, injected)" if mode and mode != MOCKED else f"{spoken(name)} failed (injected)"
     return f"the process {name} died" if mode == DIED else f"{spoken(name)} was lost"
@@ -61,7 +61,7 @@ def state_of_affairs(event: ExecutionEvent) -> str:
 
 
 def end_text(event: ExecutionEvent) -> str:
-    """Say how an execution failed, as a sentence."""
+    """Return how an execution failed, as a sentence."""
     name, why = f"{event.skillset}.{event.skill}", state_of_affairs(event)
     behind = f": {why}" if why else ""
     if event.state is S.RESOURCE_INVARIANT_VIOLATED:

@@ -21,7 +21,7 @@ GAP = 0.6
 
 
 def draw(compared: Compared, path: Path) -> None:
-    """Write the picture; its suffix says as what."""
+    """Write the picture, in the format of the file's suffix."""
     with mpl.rc_context(SVG_STYLE):
         figure = _timeline(compared) if len(compared.sides) <= SIDE_BY_SIDE else _distributions(compared)
         figure.savefig(path, metadata={"Date": None} if path.suffix == ".svg" else None)

@@ -34,7 +34,7 @@ FIGURES: Mapping[str, tuple[tuple[str, ...], str]] = {
 
 
 def known_figures(robot: RobotFolder | None) -> Mapping[str, tuple[tuple[str, ...], str]]:
-    """Return FIGURES, and those that a robot says it has; without the factors by which reports tell them."""
+    """Return FIGURES and those of the robot's ``page``, without the factors by which reports scale them."""
     of_robot = (USUAL_PAGE if robot is None else robot.page)["figures"]
     own = {path.replace(".", " "): (tuple(path.split(".")), told["unit"] if told["factor"] == 1 else "") for path, told in of_robot.items()}
     return {**FIGURES, **own}

@@ -70,7 +70,7 @@ class Monitor:
 
     @property
     def verdict(self) -> ConformanceVerdict:
-        """What is known by now."""
+        """The verdict up to now."""
         monitors = self._monitors
         findings = [monitor.finding for monitor in monitors.values() if monitor.finding is not None]
         return ConformanceVerdict(

@@ -17,7 +17,7 @@ LATE_S = 1.0
 
 @dataclass(frozen=True)
 class Difference:
-    """The first decision that is not as it was; ``then`` or ``now`` None: none was made. ``why`` says what else is not."""
+    """The first decision that differs; ``then`` or ``now`` None: none was made. ``why`` names what else differs."""
 
     t_s: float
     then: RecordedDecision | None

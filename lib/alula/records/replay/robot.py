@@ -127,7 +127,7 @@ class ReplayedRobot:
         return self._recorded.get(execution_id)
 
     def over(self) -> None:
-        """Take note that the record has no more to say."""
+        """Take that the record has ended."""
         self.host.mocked |= set(self.world.managers)
 
 
@@ -189,7 +189,7 @@ class RecordedSkills(ReplayedRobot):
         return None if recorded_id is None else self._progress.get(recorded_id, 0.0)
 
     def stops_later(self, execution_id: str) -> bool:
-        """Return whether the record has yet to say that an execution was interrupted."""
+        """Return whether the record has the interruption of an execution at a later moment."""
         recorded_id = self._recorded.get(execution_id)
         if recorded_id is None or recorded_id in self._passed:
             return False

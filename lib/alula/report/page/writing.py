@@ -42,7 +42,7 @@ def make_page(*, title: str, entries: Iterable[Wire] | None = None) -> str:
 
 
 def write_report(folder: Path, more: Iterable[Wire] = (), *, title: str, summary: Mapping[str, object] | None = None) -> Explanation:
-    """Write ``report.html`` into a run's folder: what the folder tells, and ``more`` (``OF_RECORDINGS``) that its other recordings tell.
+    """Write ``report.html`` into a run's folder, from its files and from ``more``, the entries of other recordings (``OF_RECORDINGS``).
 
     The live page of a run that is over takes the latter from the report, and so says what it says, to the last digit. ``summary`` is the
     run's where it is not written yet. Return what the report says of failures and their causes.

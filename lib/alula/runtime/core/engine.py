@@ -61,7 +61,7 @@ def run_at_once(job: Job) -> None:
 
 
 def log_error(text: str) -> None:
-    """Tell of an error that has no execution to end."""
+    """Log an error that belongs to no execution."""
     _LOG.error(text)
 
 

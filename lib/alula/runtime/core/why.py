@@ -47,6 +47,6 @@ def resources_of(skill: Skill) -> tuple[str, ...]:
 
 
 def sentence(found: tuple[Unmet, ...], refusal: str, closed: str) -> str:
-    """Say in one sentence what keeps the skill from running; "" for nothing."""
+    """Return in one sentence what keeps the skill from running; "" for nothing."""
     parts = [closed, refusal, *(one.reason for one in found)]
     return "; ".join(part for part in parts if part)

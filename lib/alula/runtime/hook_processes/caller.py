@@ -81,7 +81,7 @@ class RemoteHooks:
         return process is None or hook in process.written
 
     def on_step(self, events: Sequence[EngineEvent]) -> None:
-        """Tell each process of its executions."""
+        """Send each skill's process the events of its executions."""
         for event in events:
             process = self._processes.get(event.skill) if isinstance(event, ExecutionEvent) else None
             if process is not None and isinstance(event, ExecutionEvent):

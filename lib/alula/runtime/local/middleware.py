@@ -220,7 +220,7 @@ class VirtualMiddleware:
     # --- heartbeats ----------------------------------------------------------------------------------------------------
 
     def announce(self, instance_id: str, on_rival: OnError) -> None:  # noqa: ARG002 - a world refuses rivals itself
-        """Tell all watchers that these managers live."""
+        """Send a heartbeat of these managers to all watchers."""
         self._served.instance_id = instance_id
         for on_heartbeat, _ in self.bus.watchers.get(self.skillset, ()):
             self.bus.send(functools.partial(on_heartbeat, instance_id, 0))
@@ -236,7 +236,7 @@ class VirtualMiddleware:
             self.bus.send(lambda: heard(instance_id, 0))
 
     def close_hooks(self, timeout_s: float) -> bool:  # noqa: ARG002 - hooks are jobs of the clock, and can't hang
-        """Tell that no hook is left behind."""
+        """Return True: no hook runs on here."""
         return True
 
     def close(self) -> None:
