@@ -63,7 +63,7 @@ class MissionClock:
 
     @property
     def standstill(self) -> str:
-        """Say how it stands still."""
+        """Return for how long it has stood still, or not begun, in words."""
         if self.began:
             return f"the mission clock stood still for {STANDSTILL_TIMEOUT_S:g} s"
         return f"the mission clock did not begin within {START_TIMEOUT_S:g} s"

@@ -272,7 +272,7 @@ class Supervisor:
             note_death(self._out, Death(name="front", how="gone", when_s=self._clock.now_s))
 
     def _abort_mission(self, launch: Any) -> None:
-        """Tell the mission to stop what runs; it ends by itself when the robot is at rest."""
+        """Request the mission's abort; it ends by itself when the robot is at rest."""
         mission = process_of(launch.pm, "mission")
         if mission is not None:
             with contextlib.suppress(ProcessLookupError):

@@ -65,7 +65,7 @@ class Heartbeat:
             logger.warning("a heartbeat failed: %s", error)
 
     def close(self, within_s: float) -> None:
-        """Say that the bridge stops, and stop beating."""
+        """Publish that the bridge stops, and send no more heartbeats."""
         self._ending.set()
         self._wake.set()
         if self._thread.is_alive():

@@ -172,7 +172,7 @@ class Pairing:
         return Plan(ros1_type, ros2_type, tuple(leaves), tuple(names1.values()), tuple(names2.values()))
 
     def _refusal(self, ros1_type: str, ros2_type: str, one: str, two: str) -> str:
-        """Say which fields have no counterpart, and what to write into a mapping so that they have."""
+        """Return which fields have no counterpart, and the mapping to write for them, in words."""
         both = _both(ros1_type, ros2_type)
         problem = f"message type {both} differs: only ROS 1 has field '{one}' and only ROS 2 has field '{two}'; "
         hint = self._hint(ros1_type, ros2_type, one, two)

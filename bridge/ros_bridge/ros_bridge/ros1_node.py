@@ -216,7 +216,7 @@ class _SlaveApi:
         return [OK, "", 0]
 
     def requestTopic(self, _caller: str, topic: str, protocols: list[list[Any]]) -> list[Any]:  # noqa: N802
-        """Tell a subscriber where to connect to."""
+        """Return to a subscriber the address to connect to."""
         place = self._node.offers(topic)
         if place is None:
             return [FAILED, f"not a publisher of [{topic}]", []]
@@ -229,11 +229,11 @@ class _SlaveApi:
         return [OK, "", os.getpid()]
 
     def getMasterUri(self, _caller: str) -> list[Any]:  # noqa: N802
-        """Tell which master this node belongs to."""
+        """Return the URI of this node's master."""
         return [OK, "", self._node.master_uri]
 
     def getSubscriptions(self, _caller: str) -> list[Any]:  # noqa: N802
-        """Tell what is subscribed to."""
+        """Return the subscribed topics."""
         return [OK, "", self._node.topics(Kind.SUBSCRIBER)]
 
     def getPublications(self, _caller: str) -> list[Any]:  # noqa: N802
@@ -249,7 +249,7 @@ class _SlaveApi:
         return [OK, "see the bridge's figures", []]
 
     def paramUpdate(self, _caller: str, _key: str, _value: object) -> list[Any]:  # noqa: N802
-        """Hear from the master that a parameter has changed."""
+        """Take the master's message that a parameter has changed."""
         self._node.parameter_changed()
         return [OK, "", 0]
 

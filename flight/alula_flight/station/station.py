@@ -65,7 +65,7 @@ class Station:
 
     @property
     def mission(self) -> str:
-        """Say which mission runs; empty: none."""
+        """Return the mission that runs, in words; empty: none."""
         return states.holder(self.folder / states.MISSION_LOCK)
 
     def begin(self, until: int = 0) -> None:

@@ -223,7 +223,7 @@ class LidarMapping:
             self._slam.T_map_odom = np.asarray(np.linalg.inv(flown), float)
 
     def _report(self) -> None:
-        """Tell the skillset whether pose and map are to be trusted."""
+        """Report to the skillset whether pose and map can be trusted."""
         problem = self._slam.problem
         if problem:
             self._host.warn("lost", f"the map is lost: {problem}")

@@ -121,7 +121,7 @@ class HealthWatch:
         self._arrived_ns: deque[int] = deque(maxlen=INTERVALS + 1)
 
     def take(self, finding: Finding, arrived_ns: int) -> None:
-        """Tell of a measurement that arrived at this moment."""
+        """Take the finding about a measurement that arrived at ``arrived_ns``, nanoseconds."""
         self._arrived_ns.append(arrived_ns)
         if finding.ok:
             self._good(arrived_ns)

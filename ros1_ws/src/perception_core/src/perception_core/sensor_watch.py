@@ -43,7 +43,7 @@ class SensorWatch:
             return self._stamps.finding(stamp_ns, self._host.now_ns())
 
     def take(self, finding: Finding) -> None:
-        """Tell what was found of a measurement that has just arrived."""
+        """Take the finding about a measurement that has just arrived."""
         with self._lock:
             self._watch.take(finding, self._host.now_ns())
 
@@ -54,7 +54,7 @@ class SensorWatch:
             self._stamps.limits = stamps
 
     def garbage(self, reason: str) -> None:
-        """Tell of something that is no measurement at all."""
+        """Report a message that is no measurement."""
         self.take(broken(FaultKind.FORMAT, reason))
 
     @property

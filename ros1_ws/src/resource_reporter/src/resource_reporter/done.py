@@ -1,4 +1,4 @@
-"""Say how far a node has come, so that a simulator can wait and a person can see how far behind the node is."""
+"""Publish how far a node has come, so that a simulator can wait and a person can see how far behind the node is."""
 
 from __future__ import annotations
 
@@ -33,7 +33,7 @@ class DoneReporter:
         self._publisher = rospy.Publisher("~done", Header, queue_size=QUEUE, tcp_nodelay=True)
 
     def done(self, stamp_ns: int) -> None:
-        """Tell that nothing is left to do for the measurement, or the tick, of ``stamp_ns``."""
+        """Report that the measurement, or the tick, of ``stamp_ns`` is processed."""
         job: Callable[[], None] = partial(self._publisher.publish, Header(stamp=rospy.Time(*divmod(stamp_ns, NS))))
         for each in self._told:
             job = partial(each.when_settled, job)

@@ -34,7 +34,7 @@ def ends_the_node(job: JobT) -> JobT:
 
 
 def end_node(error: Exception) -> None:
-    """Say what happened, shut the node down as rospy does, and end the process with exit code 1."""
+    """Log what happened, shut the node down as rospy does, and end the process with exit code 1."""
     where = threading.current_thread().name
     told = "".join(traceback.format_exception(type(error), error, error.__traceback__))
     rospy.logfatal("an error in the thread %s ends this node:\n%s", where, told)

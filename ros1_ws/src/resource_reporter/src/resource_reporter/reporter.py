@@ -26,7 +26,7 @@ SETTLE_LIMIT_S = 10.0
 
 
 class ResourceReporter:
-    """Tell a skillset the states of resources that only the hardware knows (its extern transitions).
+    """Report to a skillset the states of resources that only the hardware has (its extern transitions).
 
     To be made after ``rospy.init_node``. ``report`` may be called from any thread, as often as one likes, and never blocks: the
     service is called by a thread of its own, at once, and until ``/<skillset>/resource_states`` agrees with what was reported last.
@@ -53,7 +53,7 @@ class ResourceReporter:
         self._subscriber = rospy.Subscriber(f"/{skillset}/resource_states", ResourceStates, self._on_states, tcp_nodelay=True)
 
     def report(self, resource: str, state: str, reason: str = "", *, insist: bool = True) -> None:
-        """Say that the hardware's resource has this state, and why, in words, where that is known.
+        """Report the state of a resource, and the reason in words where it is known.
 
         Without ``insist`` nothing is to change: the reason is told where the skillset has that state already.
         """

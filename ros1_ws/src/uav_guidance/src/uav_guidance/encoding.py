@@ -15,7 +15,7 @@ COMPANION_SYSTEM, COMPANION_COMPONENT = 1, 191
 
 
 def heartbeat_message() -> Any:
-    """Say that the companion lives."""
+    """Return a heartbeat of the companion computer."""
     return mavlink.MAVLink_heartbeat_message(
         mavlink.MAV_TYPE_ONBOARD_CONTROLLER, mavlink.MAV_AUTOPILOT_INVALID, 0, 0, mavlink.MAV_STATE_ACTIVE, 3
     )

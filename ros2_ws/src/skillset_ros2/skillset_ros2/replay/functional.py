@@ -101,7 +101,7 @@ class SwitchedSkill(SkillHooks):
         hooks.on_dispatch(execution)
 
     def progress(self, execution: Execution) -> float:
-        """Tell how far it is."""
+        """Return how far it is, 0 to 1."""
         return self._of(execution).progress(execution)
 
     def on_interrupt(self, execution: Execution) -> bool | None:
