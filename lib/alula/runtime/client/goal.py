@@ -86,7 +86,7 @@ class GoalTracker:
                 self._timer = self._middleware.later(ACKNOWLEDGE_S, self._look)
 
     def on_event(self, event: ExecutionEvent, after: int) -> None:
-        """Take an event of this execution; its end is told when the resources are known as they were after event ``after``."""
+        """Take an event of this execution; its end is reported once the resources after event ``after`` have been received."""
         self.instance_id = event.instance_id
         self._acknowledge()
         self._cancel_timer()

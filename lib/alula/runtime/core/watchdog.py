@@ -57,7 +57,7 @@ class Watchdog:
             return True
 
     def tick(self, passed_s: float) -> bool:
-        """Let time pass; tell whether any call is watched still."""
+        """Let time pass, seconds; return whether any call is still watched."""
         with self._lock:
             for watch in self._watches:
                 watch.left_s -= passed_s

@@ -96,7 +96,7 @@ class ActionSkill(FunctionSkill[Goal]):
         return execution.progress if goal is None else goal.progress
 
     def on_interrupt(self, execution: Execution) -> bool | None:
-        """Cancel the goal; the interruption is done when the server says that the goal is over."""
+        """Cancel the goal; the interruption is complete when the server reports the goal's end."""
         with self._lock:
             goal = self._calls.get(execution.id)
             if goal is None or goal.ended or not goal.sent:

@@ -127,7 +127,7 @@ class FunctionSkill(SkillHooks, Generic[CallT]):
         self.lose(call, f"{call.server} {why}")
 
     def waited_s(self, call: CallT) -> float:
-        """Return for how long nothing is heard."""
+        """Return how long ago the server was last received from, seconds of mission clock."""
         return self.watch.now_s - call.since_s
 
     def is_open(self, call: CallT) -> bool:
@@ -196,7 +196,7 @@ def filled(message: Any, inputs: object, place: str) -> Any:
 
 
 def said_by(answer: object) -> str:
-    """Return what an answer says for people: its field ``message``."""
+    """Return the reason in an answer: its field ``message``."""
     return str(getattr(answer, "message", ""))
 
 

@@ -190,7 +190,7 @@ class MissionNode(Node):  # type: ignore[misc]  # rclpy is not typed
 
 
 def tick_to_the_end(node: MissionNode, signals: list[signal.Signals]) -> End:
-    """Tick until the mission is over; ``signals`` grows when the process is told to end."""
+    """Tick until the mission is over; ``signals`` grows when the process receives a signal to end."""
     executor = NodeExecutor()
     executor.add_node(node)
 

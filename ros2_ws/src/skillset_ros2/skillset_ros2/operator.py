@@ -84,7 +84,7 @@ def parse(arguments: Sequence[str]) -> tuple[list[Act], Path]:
 
 
 def main(arguments: Sequence[str] | None = None) -> int:
-    """Act until the process is told to end."""
+    """Act until the process receives a signal to end."""
     words = list(sys.argv if arguments is None else arguments)
     acts, out = parse(remove_ros_args(words)[1:])
     ends: list[object] = []

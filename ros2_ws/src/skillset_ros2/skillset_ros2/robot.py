@@ -36,7 +36,7 @@ class RobotClient:
         return all(client.ready for client in self.clients.values())
 
     def wait_ready(self, timeout_s: float, skillsets: Sequence[str] = ()) -> bool:
-        """Wait (wall clock) until the skillsets (with none named: all) can be called; tell whether they can.
+        """Wait (wall clock) until the skillsets (with none named: all) can be called; return whether they can.
 
         Spins the node when no executor does. Raises CannotWaitError on the thread that spins it.
         """

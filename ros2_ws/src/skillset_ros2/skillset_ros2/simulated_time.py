@@ -38,7 +38,7 @@ class _Elsewhere(MutuallyExclusiveCallbackGroup):  # type: ignore[misc]  # rclpy
     """Holds what no executor waits for."""
 
     def can_execute(self, entity: Any) -> bool:  # noqa: ARG002 - rclpy's signature
-        """Tell that it may not."""
+        """Return False: it may not."""
         return False
 
 

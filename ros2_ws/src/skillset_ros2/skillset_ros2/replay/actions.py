@@ -27,7 +27,7 @@ def values_of_goal(value: object) -> object:
 
 
 class RecordedGoal:
-    """A goal that was sent then: what of it is heard, as rclpy's handle of it tells."""
+    """A recorded goal, with the methods of rclpy's handle."""
 
     def __init__(self, feedback: Callable[[Any], None] | None) -> None:
         self.accepted = True
@@ -40,7 +40,7 @@ class RecordedGoal:
         return self._ended
 
     def cancel_goal_async(self) -> RecordedFuture:
-        """Do nothing: what came of it then, the record tells."""
+        """Do nothing: the record has the goal's end."""
         return RecordedFuture()
 
     def answer(self, *, accepted: bool = True) -> None:
@@ -50,13 +50,13 @@ class RecordedGoal:
             self.answered.resolve(self)
 
     def hear(self, feedback: object) -> None:
-        """Tell how it goes."""
+        """Report the goal's feedback."""
         self.answer()
         if self._feedback is not None:
             self._feedback(SimpleNamespace(feedback=feedback))
 
     def end(self, status: int, result: object) -> None:
-        """Tell how it ended."""
+        """Report the goal's end."""
         self.answer(accepted=status != REFUSED)
         if status in STATUS:
             self._ended.resolve(SimpleNamespace(status=STATUS[status], result=result))
@@ -81,7 +81,7 @@ class RecordedActionClient:
         subscribers.setdefault(f"{name}/result", []).append(self._on_result)
 
     def server_is_ready(self) -> bool:
-        """Tell that it is there."""
+        """Return True: the record answers."""
         return True
 
     def send_goal_async(self, goal: object, feedback_callback: Callable[[Any], None] | None = None) -> RecordedFuture:

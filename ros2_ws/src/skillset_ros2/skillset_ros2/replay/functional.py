@@ -235,7 +235,7 @@ class RecordedFunctions(ReplayedRobot):
         return future
 
     def over(self) -> None:
-        """Take note that the bag has no more to say."""
+        """Take that the bag has ended."""
         super().over()
         self._silent = True
         for managers in self.world.managers.values():

@@ -51,7 +51,7 @@ class RecordedService:
         self._answer = answer
 
     def service_is_ready(self) -> bool:
-        """Tell that it is there."""
+        """Return True: the record answers."""
         return True
 
     def wait_for_service(self, timeout_sec: float) -> bool:  # noqa: ARG002 - rclpy's signature
@@ -87,7 +87,7 @@ class BagNode:
         self._action = action
 
     def get_clock(self) -> BagNode:
-        """Return what tells the time."""
+        """Return the clock of the replay."""
         return self
 
     def now(self) -> SimpleNamespace:
