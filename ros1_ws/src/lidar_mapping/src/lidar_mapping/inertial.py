@@ -50,7 +50,8 @@ class ImuReading:
 class InertialNoise:
     """Densities of the noise (per root hertz) and what is known at the start (standard deviations).
 
-    Readings that spread more than by ``gyro`` and ``accel`` are believed less (`Shaking`).
+    Readings that spread more than by ``gyro`` and ``accel`` are believed less (`Shaking`). The gyro's bias changes by ``gyro_walk`` only:
+    along bare walls each scan is laid onto what the last ones have turned, and a bias that gives way learns that turn and goes on with it.
 
     Without inertial readings the vehicle is assumed to keep its velocity and attitude; ``free_m_s2`` and ``free_rad_s`` say how badly
     (root mean square over one second). The autopilot's attitude is off by ``autopilot_tilt_rad`` about each horizontal axis and by
@@ -60,7 +61,7 @@ class InertialNoise:
 
     gyro: float = 0.0005
     accel: float = 0.05
-    gyro_walk: float = 5e-5
+    gyro_walk: float = 1e-5
     accel_walk: float = 5e-4
     free_rad_s: float = 0.5
     free_m_s2: float = 3.0
