@@ -10,6 +10,7 @@ from lidar_mapping_yard import Path
 from scipy.spatial.transform import Rotation
 
 from lidar_mapping import Slam, SlamSettings
+from lidar_mapping.inertial import GYRO_BIAS
 from lidar_mapping.standing import StandingGyro
 from perception_core import NS, PoseBuffer
 
@@ -66,6 +67,31 @@ def test_what_was_told_while_it_stood_is_kept_in_flight_and_told_anew_by_the_nex
     assert gyro.bias is told
     hear(gyro, STANDING, 13.0, 17.5, bias=-BIAS)
     assert gyro.bias == pytest.approx(-BIAS, abs=0.0008)
+
+
+def test_a_stand_says_how_well_it_tells_the_bias_and_that_this_is_over_with_time() -> None:
+    gyro = StandingGyro()
+    hear(gyro, STANDING, 0.0, 1.5)
+    assert gyro.sigma_rad_s(NS) == np.inf
+    hear(gyro, STANDING, 1.5, 4.5)
+    assert gyro.sigma_rad_s(5 * NS) == pytest.approx(0.0005, abs=5e-5)
+    assert gyro.sigma_rad_s(105 * NS) - gyro.sigma_rad_s(5 * NS) == pytest.approx(0.001)
+
+
+def test_a_vehicle_that_turns_so_slowly_that_it_seems_to_stand_tells_the_bias_within_that() -> None:
+    gyro = StandingGyro()
+    hear(gyro, Path(lambda _t: np.zeros(3), lambda t: 0.008 * t), 0.0, 4.5)
+    off = float(np.abs(gyro.bias - BIAS).max())
+    assert 0.007 < off < gyro.sigma_rad_s(4 * NS) + 0.0005
+
+
+@pytest.mark.parametrize(("said", "begins"), [(np.inf, 0.003), (0.0005, 0.0005), (0.02, 0.003)])
+def test_a_slam_begins_with_the_bias_as_well_as_it_is_known_but_no_worse_than_any(said, begins) -> None:
+    path, slam = Path(from_rest, across_deg=17.0), Slam(SlamSettings())
+    slam.gyro_bias_rad_s = said
+    slam.add(path.sweep(0.0, seed=1), path.readings(0.0, 0.1, np.random.default_rng(7)), path.autopilot(0.1), np.eye(4))
+    known = slam._odometry.filter.covariance[GYRO_BIAS, GYRO_BIAS]
+    assert np.sqrt(np.diag(known)) == pytest.approx(np.full(3, begins), rel=0.05)
 
 
 def test_a_gap_in_the_readings_begins_a_window_anew() -> None:

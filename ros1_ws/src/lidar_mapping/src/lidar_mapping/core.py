@@ -190,7 +190,7 @@ class LidarMapping:
             if not self.enabled:
                 return
             self._begin_as_flown()
-            self._slam.gyro_bias = self._standing.bias
+            self._slam.gyro_bias, self._slam.gyro_bias_rad_s = self._standing.bias, self._standing.sigma_rad_s(sweep.end_ns)
             readings = self._usable(self._readings.take_until(sweep.end_ns), sweep.end_ns)
             registration = self._slam.add(sweep, readings, poses, self._vehicle.mount(frame))
             self._publish_state(sweep.stamp_ns, registration)

@@ -2,8 +2,9 @@
 
 from __future__ import annotations
 
+import math
 from collections import deque
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -70,6 +71,8 @@ class Slam:
         self.T_map_odom: Floats = np.eye(4)
         self.gyro_bias: Floats = np.zeros(3)
         """What the gyro says at rest, (3,) rad/s about the body's axes, as far as it is known when track is taken up."""
+        self.gyro_bias_rad_s = math.inf
+        """How well that is known: a standard deviation; what the settings say of any gyro holds where it is less."""
         self._graph = PoseGraph(settings.graph, settings.odometry.registration)
         self._odometry: LidarInertialOdometry | None = None
         self._lost_since_ns: int | None = None
@@ -172,7 +175,10 @@ class Slam:
         place = self.T_map_odom @ poses.at([sweep.stamp_ns]).matrix()
         error = rotation_vector(self.T_map_odom[:3, :3].T)
         start = InertialState(place[:3, :3], velocity, place[:3, 3], gyro_bias=self.gyro_bias, autopilot_error=error)
-        self._odometry = LidarInertialOdometry(self._settings.odometry, self.keyframes, sweep.stamp_ns, start)
+        noise = self._settings.odometry.noise
+        noise = replace(noise, start_gyro_bias=min(noise.start_gyro_bias, self.gyro_bias_rad_s))
+        settings = replace(self._settings.odometry, noise=noise)
+        self._odometry = LidarInertialOdometry(settings, self.keyframes, sweep.stamp_ns, start)
 
     def _take(self, step: Step, T_odom_base: Floats) -> None:  # noqa: N803 -- T_target_source
         assert self._odometry is not None  # noqa: S101 -- called by add only
