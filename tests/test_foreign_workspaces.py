@@ -26,6 +26,22 @@ OF_PYPI = {"yaml": "PyYAML", "z3": "z3-solver", "py_trees": "py-trees", "lsproto
 ROS = re.compile(r"rclpy|rospy|roslib|rosgraph|rosbag|genpy|actionlib|alula|dynamic_reconfigure|\w+_(msgs|srvs|interfaces|managers)")
 STUBS = {"_typeshed"}
 """What only a type checker imports."""
+ONE_FILE_A_LIBRARY = r"""
+function(read_headers_once)
+  get_property(targets DIRECTORY PROPERTY BUILDSYSTEM_TARGETS)
+  foreach(target IN LISTS targets)
+    get_target_property(kind ${target} TYPE)
+    if(kind STREQUAL "SHARED_LIBRARY")
+      set_target_properties(${target} PROPERTIES UNITY_BUILD ON UNITY_BUILD_BATCH_SIZE 0)
+      get_target_property(sources ${target} SOURCES)
+      list(FILTER sources INCLUDE REGEX "__description\\.c$")  # two that hold a third type each define its hash
+      set_source_files_properties(${sources} PROPERTIES SKIP_UNITY_BUILD_INCLUSION ON)
+    endif()
+  endforeach()
+endfunction()
+cmake_language(DEFER CALL read_headers_once)
+"""
+"""Has the compiler read ROS's headers once a library, which takes most of the time; the same libraries are built of the same sources."""
 LAUNCHED = re.compile(r"\$\(find (\w+)\)|pkg=\"(\w+)\"")
 
 
@@ -55,7 +71,9 @@ def test_the_general_packages_of_ros_2_are_built_by_plain_colcon(tmp_path: Path)
     workspace = copy(tmp_path, INTERFACES, LIBRARY, ALULA_ROOT / "ros2_ws/src/skillset_ros2")
     ros = {"PATH": f"{VENV2}/bin:/usr/bin:/bin", "ROS_VERSION": "2", "ROS_DISTRO": "jazzy"}
     prefix = {"AMENT_PREFIX_PATH": str(VENV2), "CMAKE_PREFIX_PATH": str(VENV2)}
-    build(workspace, {**ros, **prefix}, "colcon", "build", "--merge-install")
+    (tmp_path / "one_file.cmake").write_text(ONE_FILE_A_LIBRARY, encoding="utf-8")
+    compiled_quickly = ("--cmake-args", f"-DCMAKE_PROJECT_INCLUDE={tmp_path / 'one_file.cmake'}", "-DCMAKE_RULE_MESSAGES=OFF")
+    build(workspace, {**ros, **prefix}, "colcon", "build", "--merge-install", *compiled_quickly)
     site = workspace / f"install/lib/python{sys.version_info.major}.{sys.version_info.minor}/site-packages"
     names = ("alula.runtime.middleware", "skillset_ros2", "skillset_interfaces.srv")
     files = imported_from(site, str(VENV2 / "bin/python"), *names)
