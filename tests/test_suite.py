@@ -142,6 +142,7 @@ PLACES = {
     "ROS 1 world": "flight/test/test_members.py",
     "ROS 2 world": "bridge/ros_bridge/test/test_ros_bridge_layout.py",
     "across the rooms": "tests/test_manifests.py",
+    "builds and Pythons": "tests/test_pythons.py",
     "early ends and the rover": "tests/test_endings.py",
     "flights": "tests/test_flights.py",
     "proofs": "lib/test/prove/skillset",
