@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import json
 from collections.abc import Callable, Mapping
+from functools import cached_property
 from typing import Any
 
 from alula.model.json_form import to_json
@@ -30,10 +31,13 @@ class SkillsetServices:
         self._engine = engine
         self._servers = servers
         self._make_inputs = make_inputs
-        self._model_json = to_json(engine.skillset)
         middleware.serve("describe", lambda _, reply: reply(self._model_json))
         middleware.serve("why", self._why)
         middleware.serve("pause", self._pause)
+
+    @cached_property
+    def _model_json(self) -> str:
+        return to_json(self._engine.skillset)
 
     def _why(self, request: Mapping[str, Any], reply: Reply) -> None:
         skill = request["skill"]
