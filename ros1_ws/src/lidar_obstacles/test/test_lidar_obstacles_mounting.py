@@ -163,6 +163,13 @@ def test_few_things_along_a_sideways_way_are_no_sensor_that_repeats_what_it_saw(
             assert check.finding(sweep, mount, poses, self_m=0.85).verdict is not Verdict.BROKEN
 
 
+def test_a_sensor_that_repeats_what_it_saw_is_frozen_also_where_most_walls_are_along_the_way() -> None:
+    corridor = np.array([-13.0, -2.5, 0.0]), np.array([16.0, 2.5, 3.5])
+    along = [(0.13 * k, 0.0, 0.0) for k in range(30)]
+    assert {finding.verdict for finding in fly(along, beams=DENSE, box=corridor)} == {Verdict.OK}
+    assert fly(along, repeat_from=5, beams=DENSE, box=corridor)[-1].fault is FaultKind.FROZEN
+
+
 def test_a_dense_sensor_that_repeats_what_it_saw_with_noise_is_frozen() -> None:
     findings = fly(FORTH, repeat_from=5, beams=DENSE)
     first = next(k for k, finding in enumerate(findings) if not finding.ok)

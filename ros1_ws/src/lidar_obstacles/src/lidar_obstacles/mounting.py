@@ -44,6 +44,7 @@ FITTING = ((0.7, 0.2), (0.4, 0.3))  # shares of the pairs that fit with the sens
 """Where motion and walls do not tell, all shares are alike; among trees fewer fit."""
 ALIKE = 0.01  # by which two shares may differ that tell nothing apart: on a way straight to a wall, turned back and mirrored are the same
 SAME_M, REPEATED = 0.1, 0.9  # apart at most, and share, of what a sensor that repeats what it saw has where it was: all, but for noise
+TELLING_M, STILL = 0.3, 0.8  # that the motion makes of walls and posts which tell a repeat from a good sensor; share that it did not move
 LEAST_REPEATED = 16  # walls and posts: of eight all stay by chance, where the ground and a fence are cut out alike on the way
 LOOKS = 2  # in a row that say the same
 ACROSS = 0.7  # of a wall's normal along one of two axes: walls along the way do not show whether the sensor is displaced along it
@@ -205,6 +206,9 @@ class MountCheck:
             self._unjudged_ns += abs(now.stamp_ns - before.stamp_ns)
             return
         found = self._times >= LOOKS
+        if _stands_still(before, now):
+            self._times, self._suspected = (self._times + 1 if FROZEN in self._suspected else 1), {FROZEN}
+            return
         if as_told > 1.0 - FITTING[0][1] and not found:
             self._suspected, self._times, self._as_told = set(), 0, True
             return
@@ -273,6 +277,21 @@ def _repeated(before: _Look, now: _Look) -> float:
         return 0.0
     share = float(np.mean(cKDTree(before.places).query(now.places)[0] < SAME_M))
     return share if share >= REPEATED else 0.0
+
+
+def _stands_still(before: _Look, now: _Look) -> bool:
+    """Return whether the sensor sees nearly all where it saw it, what the vehicle's motion must have moved, too.
+
+    In a street most walls are along the way, and fit with the motion and without it: a few across it tell.
+    """
+    if not _repeated(before, now):
+        return False
+    came_m = np.einsum("nji,nj->ni", now.rotations, now.origins - before.origins.mean(axis=0))
+    moves_m = np.where(now.posts, np.linalg.norm(came_m, axis=1), np.abs(np.einsum("nj,nj->n", now.normals, came_m)))
+    telling = now.places[moves_m >= TELLING_M]
+    if len(telling) < PAIRS:
+        return False
+    return bool(np.mean(cKDTree(before.places).query(telling)[0] < SAME_M) >= STILL)
 
 
 def _back(good: _Look, now: _Look) -> bool | None:
