@@ -111,6 +111,12 @@ class MissionSteps:
         """Return whether a fault is there that can bring about this end of an execution, ``skillset.skill END``."""
         return any(_any(self._faults[name].ends, end) for name in state.faults)
 
+    def taken_away(self, before: Place, after: Place) -> frozenset[str]:
+        """Return the resources that a step takes out of a state which a fault that is there shows: ``skillset.resource``."""
+        there = [self._faults[name].states for name in before.faults]
+        moved = ((at, state) for at, state in self.resources(before).items() if there and state != self.resource(after, at))
+        return frozenset(at for at, state in moved if any(_any(states, f"{at} {state}") for states in there))
+
     def comes_later(self, state: Place, shown: str) -> bool:
         """Return whether a state, ``skillset.resource STATE``, comes only of what is done about the faults that are there."""
         several = [self._faults[name] for name in state.faults]

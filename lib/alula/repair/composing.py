@@ -68,10 +68,22 @@ class Sources:
         same = [one.get(parameter.name) for tree in trees for one in tree.iterate() if type_name(one) == purpose.name]
         if any(same):
             return next(one for one in same if one)
-        named = [one for one in self.ports if parameter.name in one.split("_")]
-        if named:
-            return f"{{{named[0]}}}"
+        named = self._named(purpose, parameter)
+        if named is not None:
+            return f"{{{named}}}"
         return self._written(within, parameter) or (f"{{{parameter.name}}}" if self.asks else None)
+
+    def _named(self, purpose: Purpose, parameter: Parameter) -> str | None:
+        """Return the mission's input that is named after skill and parameter, else after a skill without others, else after the parameter.
+
+        So ``back_off_m`` is the ``distance`` of ``back_off`` rather than ``distance_m``.
+        """
+        words = {one: set(one.split("_")) for one in self.ports}
+        skill = set(purpose.skill.name.split("_"))
+        of_skill = [one for one in self.ports if skill <= words[one]]
+        of_parameter = [one for one in self.ports if parameter.name in words[one]]
+        of_both = [one for one in of_skill if one in of_parameter]
+        return next(iter([*of_both, *(of_skill if len(purpose.skill.inputs) == 1 else []), *of_parameter]), None)
 
     def _written(self, within: Element | None, parameter: Parameter) -> str | None:
         kind, unit = type_of(parameter.type), told_unit(parameter.comment)

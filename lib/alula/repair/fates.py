@@ -2,10 +2,11 @@
 
 The world's moves are those that the odds are computed from (`MissionSteps`): what a mission's skills bring about, what the functional layer
 does in time, the chosen faults in their order, each at any moment, and whatever a fault that is there may bring about. A fault that has
-come stays, but it ends skills badly, or has requests refused by data, no more often than faults may come. Requests are not refused, and
-executions not ended, by data of which nothing is known, unless a fault that is there does that. Data are told, and actions of the robot's
-own do not fail of which nobody knows what they do. Executions end well; fairness is the prover's: what can happen again and again happens
-some time. So a mission survives when, from every situation that it can come into, it can still be accomplished.
+come stays, but it ends skills badly, has requests refused by data, or brings back a state that a skill has taken away, no more often than
+faults may come. Requests are not refused, and executions not ended, by data of which nothing is known, unless a fault that is there does
+that. Data are told, and actions of the robot's own do not fail of which nobody knows what they do. Executions end well; fairness is the
+prover's: what can happen again and again happens some time. So a mission survives when, from every situation that it can come into, it can
+still be accomplished.
 
 A state that comes `later`, of what others do about a fault, such as an autopilot that flies home by itself, may be one after which no
 mission can do anything. So situations without such states are looked at first: a mission that survives in these does under an assumption.
@@ -27,15 +28,23 @@ from alula.prove.mission.state import Kind as Happens
 
 GOOD = frozenset({Outcome.ACCOMPLISHED, Outcome.DEGRADED})
 MOST_FAULTS = 2
-"""How often a fault strikes that ends skills, unless more is asked for."""
+"""How often a fault strikes that ends skills, or comes again once a skill has taken its state away, unless more is asked for."""
 
 
 class Here(NamedTuple):
-    """A situation, how many of the faults have come, and how often they have ended skills badly."""
+    """A situation, how many of the faults have come, and how often they have struck again.
+
+    Attributes:
+        place: the situation.
+        come: how many have come, in their order.
+        struck: how often they have ended skills badly, had requests refused by data, or brought back what a skill had taken away.
+        away: the resources that a success has taken out of the state of a fault, and that are not back in it.
+    """
 
     place: Place
     come: int = 0
     struck: int = 0
+    away: frozenset[str] = frozenset()
 
 
 @dataclass(frozen=True)
@@ -73,6 +82,7 @@ class Fate:
         refused: what is refused on the shortest way from there to an end: ``skillset.skill``, and the precondition.
         chosen: what the tick that leads there took a value for that nobody knows, in words.
         situations: how many were looked at.
+        again: whether a fault struck more than once in these runs, or could have: the answer holds for as often as was asked.
         assuming: where it does not survive, the states, ``skillset.resource STATE``, without which it would, of those that come later;
             with them it ends safely all the same. Empty: there are no such states.
     """
@@ -87,6 +97,7 @@ class Fate:
     assuming: tuple[str, ...] = ()
     refused: tuple[tuple[str, str], ...] = ()
     chosen: tuple[str, ...] = ()
+    again: bool = False
 
     @property
     def answered(self) -> bool:
@@ -119,7 +130,7 @@ def fate_of(
     """Return it; None: there are more situations than ``most``. ``rest`` are states of resources, in one of which each robot is safe.
 
     With a ``goal``, a mission survives, too, when it comes to be true after the faults; what has to be ``reached`` is true at a good end.
-    Faults end skills badly ``strikes`` times.
+    Faults strike ``strikes`` times.
 
     Raises OutOfTimeError.
     """
@@ -151,7 +162,8 @@ def fate_of(
     refused = () if lost is None else _refused(lost, following, lambda here: steps.outcome(here.place) is not None)
     before = None if lost is None else graph.ways.before(lost)
     chosen = () if lost is None or before is None else steps.chosen(before.place, lost.place)
-    return Fate(tuple(faults), outcomes, lost is None, safe, run, states, len(graph.ways.found), assuming, refused, chosen)
+    again = any(one.struck or one.away for one in graph.ways.found)
+    return Fate(tuple(faults), outcomes, lost is None, safe, run, states, len(graph.ways.found), assuming, refused, chosen, again)
 
 
 def _refused(
@@ -242,30 +254,40 @@ def _following(
     found: list[tuple[Step[Place], Here]] = []
     several = list(steps.steps(place))
     can_start = {step.name for step in several if step.uses and step.kind is Kind.NOW}
-    for step in several:
+    for step in (one for one in several if not _is_left_out(one, ends, also_failing=also_failing)):
         there = here._replace(place=step.target)
         match step.kind:
             case Kind.FAULT:
                 if here.come < len(faults) and step.name == faults[here.come]:
                     found.append((step, there._replace(come=here.come + 1)))
-            case _ if step.kind is Kind.MENDED or (step.failing and not also_failing):
-                pass
-            case Kind.END if step.result not in ends.good[step.name]:
-                pass
+            case Kind.END:
+                found.append((step, there._replace(away=here.away | steps.taken_away(place, step.target))))
             case Kind.NOW if place.coming:
                 struck = steps.only_ends(place.coming) and step.target.state != place.state
                 found.append((step, there._replace(struck=min(here.struck + struck, strikes))))
             case Kind.NOW if step.result and step.name in can_start:  # a refusal by data, which are as they should be without a fault
-                if here.struck < strikes and steps.may_end(place, f"{step.name} {step.result}"):
-                    found.append((step, there._replace(struck=here.struck + 1)))
+                if steps.may_end(place, f"{step.name} {step.result}"):
+                    found += _again(step, there, strikes)
             case Kind.ANY if step.name in ends.bad:
-                if here.struck < strikes:
-                    found.append((step, there._replace(struck=here.struck + 1)))
+                found += _again(step, there, strikes)
+            case Kind.ANY if (resource := step.name.rpartition(" ")[0]) in here.away:  # it has come once with the fault
+                found += _again(step, there._replace(away=here.away - {resource}), strikes - 1)
             case _:
                 if step.target != place:
                     found.append((step, there))
     now = [one for one in found if one[0].kind in {Kind.NOW, Kind.FAULT}]
     return now if any(step.kind is Kind.NOW for step, _ in now) else found
+
+
+def _is_left_out(step: Step[Place], ends: _Ends, *, also_failing: bool) -> bool:
+    """Return whether a step is none here: a fault stays, and nothing else fails."""
+    fails = bool(step.failing) and not also_failing and step.kind is not Kind.FAULT
+    return step.kind is Kind.MENDED or fails or (step.kind is Kind.END and step.result not in ends.good[step.name])
+
+
+def _again(step: Step[Place], there: Here, most: int) -> list[tuple[Step[Place], Here]]:
+    """Return a step with which a fault strikes again; nothing where it has struck often enough."""
+    return [(step, there._replace(struck=there.struck + 1))] if there.struck < most else []
 
 
 def _told(step: Step[Place]) -> str:

@@ -110,7 +110,7 @@ class Answer:
 
     ``impossible``: it can't be accomplished with the fault, as ``reasons`` show; a repair then brings it to a safe end. Else, without a
     repair, nobody knows; ``stopped``: not all branches were tried, as the time was over, or somebody ended the search. ``strikes``: how
-    often the fault comes at most, where it is no more than bad ends of skills; 0: it comes once, and stays. ``refused``: the branches that
+    often the fault comes at most, where it may come again; 0: it comes once, and stays. ``refused``: the branches that
     were tried and are none.
     """
 
@@ -200,8 +200,7 @@ class Search:
         fault = (self._question.fault,) if self._question.fault else ()
         fate = self._judge.fate(text, fault) if fault else None
         if fate is not None and fate.answered:
-            ends_only = not self._subject.faults[self._question.fault].states
-            return Answer(tuple(failing), fate, strikes=self._question.most_faults if ends_only else 0)
+            return Answer(tuple(failing), fate, strikes=self._question.most_faults if fate.again else 0)
         self._tell(f"{'; '.join(dict.fromkeys(one.words for one in failing))}: {_told(fate)}")
         reasons = next((lines for one in failing if (lines := self._why_impossible(text, one))), [])
         if reasons and (fate is None or fate.safe):
