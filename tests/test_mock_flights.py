@@ -56,6 +56,13 @@ def test_the_behaviour_of_the_page_on_mocks_is_flown_as_it_says(tmp_path: Path) 
     assert not (flight.out / "map.png").exists()
 
 
+def test_the_picture_of_a_tree_is_drawn_by_a_flight_over_mocks(tmp_path: Path) -> None:
+    """Else: copy the ``tree.svg`` of `alula run mapping --mock --fail zed@12` to ``docs/pictures/tree-zed-fails.svg``."""
+    flight = start_flight(tmp_path / "run", "--mock", "--fail", "zed@12")
+    flight.end(0)
+    assert (flight.out / "tree.svg").read_text() == (ALULA_ROOT / "docs/pictures/tree-zed-fails.svg").read_text()
+
+
 def test_a_behaviour_that_can_not_be_read_leaves_nothing_behind(tmp_path: Path) -> None:
     behaviour = tmp_path / "wrong.yaml"
     behaviour.write_text("skills:\n  navigation.land: {result: CRASHED}\n", encoding="utf-8")

@@ -135,6 +135,11 @@ def test_the_drawing_has_a_band_for_each_node_of_the_branch(repaired: Repaired) 
     assert bands == nodes + 1  # and the use of its tree
 
 
+def test_the_picture_of_the_page_is_what_its_command_draws(repaired: Repaired) -> None:
+    """Else: copy the file that the page's second command draws to ``docs/pictures/repaired.svg``."""
+    assert (repaired.robot / "my_repair.svg").read_text() == (ALULA_ROOT / "docs/pictures/repaired.svg").read_text()
+
+
 def test_the_pages_commands_repair_the_mission(repaired: Repaired, monkeypatch: pytest.MonkeyPatch, tmp_path: Path) -> None:
     """The search was run before; `check` is in a test of its own."""
     kinds = [words.split()[0] for _, words in PAGE]
