@@ -59,9 +59,12 @@ class Blackboard:
         """Return its own entries by name."""
         return dict(self._entries)
 
-    def recall(self, entries: Mapping[str, tuple[PortType, object]]) -> None:
-        """Have these entries of its own, types and values, and no others; each with a value counts as written once."""
-        known, self._entries = self._entries, {}
+    def recall(self, entries: Mapping[str, tuple[PortType, object]], held: dict[str, Entry] | None = None) -> None:
+        """Have these entries of its own, types and values, and no others; each with a value counts as written once.
+
+        ``held``: an empty dict that holds them from then on, and may tell what is looked at.
+        """
+        known, self._entries = self._entries, {} if held is None else held
         for key, (type_, value) in entries.items():
             entry = self._entries[key] = known.get(key) or Entry(type_)
             entry.type, entry.value, entry.sequence = type_, value, int(value is not None)

@@ -18,6 +18,7 @@ from alula.prove.mission.oracle import UndecidedError
 from alula.prove.mission.own import MOST, Run
 from alula.prove.mission.reading import ANOTHER, Read
 from alula.prove.mission.robot import Handle, Memory, Robot
+from alula.prove.mission.touched import Touched, TouchedEntries
 from alula.prove.mission.unknown import Unknown, UnknownItems, UnknownNumber, UnknownText, is_unknown
 from alula.trees.access import Key
 from alula.trees.blackboard import Entry
@@ -30,6 +31,8 @@ FEW = 2
 STATUS_OF = {one.value: one for one in Status}
 TAKE_TEXT = (STRING, ANY)
 """Types of entries that any text can be written into."""
+Frozen = tuple[str, PortType, Hashable]
+"""An entry of a memory: its name, type and value."""
 PLAIN = frozenset({type(None), bool, int, float, str, Status, Skipped})
 """Types whose values are kept as they are."""
 
@@ -72,7 +75,7 @@ class TreeMemory(NamedTuple):
     waits: Hashable
     stops: bool
     nodes: tuple[Hashable, ...]
-    boards: tuple[Hashable, ...]
+    boards: tuple[tuple[Frozen, ...], ...]
     leaves: tuple[tuple[int, bool], ...]
     first_failure: str
     ends: frozenset[str]
@@ -81,6 +84,18 @@ class TreeMemory(NamedTuple):
     def held(self) -> frozenset[int]:
         """The leaves whose executions the tree still hangs on."""
         return frozenset(leaf for leaf, _ in self.leaves)
+
+
+class Looked(NamedTuple):
+    """What can still matter of a mission that is somewhere in its trees: the values of its nodes, what is ahead, and what is live.
+
+    ``entries``: what is kept of entries that are as before.
+    """
+
+    nodes: tuple[Hashable, ...]
+    ahead: Ahead
+    live: Live | None
+    entries: dict[Hashable, Frozen]
 
 
 @dataclass(frozen=True)
@@ -111,7 +126,11 @@ class Keeper:
         self._boards = list(dict.fromkeys(subtree.blackboard for tree in body.trees for subtree in tree.subtrees))
         self._looking = Looking(body.trees, body.read)
         self._living = Liveness(body.trees, self._looking)
-        self._known: dict[tuple[str, bool, tuple[Hashable, ...]], tuple[tuple[Hashable, ...], Ahead, Live | None]] = {}
+        self._known: dict[tuple[str, bool, tuple[Hashable, ...]], Looked] = {}
+        self.looked: Looked | None = None
+        """What can still matter of the memory that was taken last; None where the mission is over."""
+        self.touched = Touched(lambda: len(body.robot.oracle.asked))
+        """What the tick from the memory that was put back last has looked at."""
         self._places: list[tuple[tuple[str, ...], int, int]] = []
         self._values_of: list[_Value] = []
         for node, names, all_names, _, _ in self._nodes:
@@ -130,10 +149,13 @@ class Keeper:
         director, board = self._body.director.memory, self._body.board
         started = director.start_s is not None
         self._left, moments = self._values()
+        self.touched.end()
         if director.end is not None:
+            self.looked = None
             outcome = director.end.outcome
             return TreeMemory(director.phase, outcome, started, None, director.stops, self._first, (), (), "", frozenset())
-        nodes, ahead, live = self._looked(director.phase, director.stops, self._left)
+        self.looked = self._looked(director.phase, director.stops, self._left)
+        nodes, ahead, live, _ = self.looked
         first = board.failures[0].skill if board.failures and ahead.first else ""
         return TreeMemory(
             director.phase,
@@ -151,13 +173,24 @@ class Keeper:
     def leave(self) -> None:
         """Leave the nodes as a memory has them that was put back, and was not ticked."""
         self._left = self._values()[0]
+        self.touched.end()
+
+    def kept(self, number: int, entry: Frozen, looked: Looked) -> Frozen:
+        """Return what is kept of an entry of a blackboard that a tick has left as it was, with what is ahead after the tick."""
+        key = (number, *exact(entry))
+        if key not in looked.entries:
+            name, kind, value = entry
+            thawed = Entry(kind)
+            thawed.value = self._thawed(value)
+            looked.entries[key] = self._entry(number, name, thawed, looked.ahead, looked.live)
+        return looked.entries[key]
 
     def _looked(
         self,
         phase: str,
         stops: bool,  # noqa: FBT001
         values: tuple[Hashable, ...],
-    ) -> tuple[tuple[Hashable, ...], Ahead, Live | None]:
+    ) -> Looked:
         """Return the values of the nodes, those of nodes that are not ticked any more as at first, what is ahead, and what is live."""
         key = (phase, stops, values)
         if key not in self._known:
@@ -168,7 +201,7 @@ class Keeper:
                 if number and number not in ahead.nodes and values[start] != RUNS:  # the root's status says how it ended
                     kept[start:end] = self._first[start:end]
             live = None if ahead.everything else self._living.live(phase, stops=stops, values=dict(enumerate(by_node)))
-            self._known[key] = tuple(kept), ahead, live
+            self._known[key] = Looked(tuple(kept), ahead, live, {})
         return self._known[key]
 
     def _values(self) -> tuple[tuple[Hashable, ...], dict[int, tuple[str, Moment | Later]]]:
@@ -209,12 +242,12 @@ class Keeper:
         entry = node.entry(node.watches[name])
         return bool(getattr(node, name) == (0 if entry is None else entry.sequence))
 
-    def _entries(self, number: int, ahead: Ahead, live: Live | None) -> Hashable:
-        board = self._boards[number]
-        entries = board.entries()
-        return tuple(
-            (name, entries[name].type, _frozen(self._needed((board, name), entries[name], ahead, live))) for name in sorted(entries)
-        )
+    def _entries(self, number: int, ahead: Ahead, live: Live | None) -> tuple[Frozen, ...]:
+        entries = self._boards[number].entries()
+        return tuple(self._entry(number, name, entries[name], ahead, live) for name in sorted(entries))
+
+    def _entry(self, number: int, name: str, entry: Entry, ahead: Ahead, live: Live | None) -> Frozen:
+        return name, entry.type, _frozen(self._needed((self._boards[number], name), entry, ahead, live))
 
     def _follows(self, number: int, node: SkillNode, ahead: Ahead, live: Live | None) -> bool:
         """Return whether an execution of a leaf matters: of one that was left, where a script asks whether it still runs."""
@@ -282,7 +315,9 @@ class Keeper:
             )
         )
         for number, frozen in enumerate(memory.boards):
-            self._boards[number].recall({name: (kind, self._thawed(value)) for name, kind, value in frozen})  # type: ignore[attr-defined]
+            entries = {name: (kind, self._thawed(value)) for name, kind, value in frozen}
+            self._boards[number].recall(entries, TouchedEntries(number, self.touched))
+        self.touched.begin()
         self._put_nodes(memory)
         body.board.recall_failures(memory.first_failure, memory.ends)
         handles = {leaf: self._handle(leaf) for leaf in memory.held}
@@ -333,6 +368,12 @@ class Keeper:
             case (_, *_):
                 return self._thawing.moment(value)
         return value
+
+
+def exact(entry: Frozen) -> tuple[Hashable, ...]:
+    """Return what an entry is compared by: numbers and truth values that are equal are not the same."""
+    name, kind, value = entry
+    return name, kind, value, repr(value) if isinstance(value, tuple) else type(value)
 
 
 def _exactly(node: Node, name: str, value: object) -> Hashable:

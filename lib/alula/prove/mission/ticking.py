@@ -20,6 +20,7 @@ from alula.prove.mission.measured import of_data
 from alula.prove.mission.memory import Body, Keeper, TreeMemory
 from alula.prove.mission.oracle import Answer, Asked, Oracle, Question, UndecidedError, View
 from alula.prove.mission.own import ANSWER, DOES
+from alula.prove.mission.repeated import Effect, Repeated
 from alula.prove.mission.unknown import COMPARE, MisfitError
 from alula.trees.node import Node
 from alula.trees.status import Status
@@ -84,6 +85,7 @@ class Ticker:
         self._body = body
         self._oracle = oracle
         self._keeper = Keeper(body)
+        self._repeated = Repeated(self._keeper)
         self.leaves = self._keeper.leaves
         self.nodes = body.nodes()
         self.memories: list[TreeMemory] = []
@@ -148,9 +150,18 @@ class Ticker:
         return found
 
     def _run(self, memory: int, act: str, view: View, answers: Sequence[Answer]) -> None:
-        """Do a tick by the engine, and keep what it came to."""
+        """Do a tick, and keep what it came to: as one that has read the same before, else by the engine."""
         if self.deadline is not None:
             self.deadline.check()
+        before = self.memories[memory]
+        known = self._repeated.find(before, act, view, answers)
+        asked, effect = known or self._by_engine(memory, act, view, answers)
+        after = self._number(self._repeated.after(before, effect) if known else effect.after)
+        choices = tuple(one for one in asked if one.options)
+        self.about_data.update(dict.fromkeys(one.question for one in of_data(choices)))
+        self._keep(memory, act, asked, Outcome(after, effect.started, effect.interrupted, choices, effect.nodes))
+
+    def _by_engine(self, memory: int, act: str, view: View, answers: Sequence[Answer]) -> tuple[list[Asked], Effect]:
         self.runs += 1
         self._doing = (memory, act)
         self._oracle.begin(view, answers)
@@ -162,13 +173,11 @@ class Ticker:
             director.abort("asked from outside")
         else:
             self._step(director)
-        after = self._number(self._keeper.take())
-        asked = self._oracle.asked
-        robot = self._body.robot
-        choices = tuple(one for one in asked if one.options)
-        self.about_data.update(dict.fromkeys(one.question for one in of_data(choices)))
-        outcome = Outcome(after, tuple(robot.started), tuple(robot.interrupted), choices, frozenset(self._touched))
-        self._keep(memory, act, asked, outcome)
+        after = self._keeper.take()
+        robot, asked = self._body.robot, self._oracle.asked
+        effect = Effect(after, self._keeper.looked, tuple(robot.started), tuple(robot.interrupted), frozenset(self._touched))
+        self._repeated.keep(self.memories[memory], act, asked, effect, self._keeper.touched)
+        return asked, effect
 
     def _step(self, director: Director) -> None:
         """Do what the driver of a mission does: a tree that can't be ticked is left, and the robot brought to rest.
@@ -187,6 +196,7 @@ class Ticker:
 
     def _come_again(self, begin: int) -> bool:
         """Return whether all is as it was after other answers from the same question on: what follows from here follows from there, too."""
+        self._keeper.touched.all()
         asked = self._oracle.asked
         # What is asked of leaves and unknown values is chosen anew each time; all else has one answer for the whole tick.
         lasting = frozenset((one.question, one.answer) for one in asked[begin:] if one.question[0] not in CHOSEN_ANEW)
