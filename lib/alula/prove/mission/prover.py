@@ -86,19 +86,22 @@ def prove_within(
 
 @dataclass(frozen=True)
 class _Seen:
-    """What was found up to now; ``regions`` are None where none could be looked at."""
+    """What was found up to now; ``system`` is None where no runs could be looked at.
+
+    Which situations were looked at is not kept: what is looked at afterwards has others, and both together take much memory.
+    """
 
     path: Path
-    regions: Regions | None
+    system: System | None
     found: tuple[Diagnostic, ...] = ()
     rows: tuple[Row, ...] = ()
     bounds: tuple[Diagnostic, ...] = ()
 
     def proved(self) -> Proved:
         """Return it without what the file accepts."""
-        if self.regions is None:
+        if self.system is None:
             return Proved([*self.found, *self.bounds], [], complete=False)
-        known = acceptances(self.regions.system.nodes)
+        known = acceptances(self.system.nodes)
         complete = not self.bounds
         found, accepted = divided(self.found, known, str(self.path), complete=complete)
         return Proved([*found, *self.bounds], list(self.rows), complete, accepted)
@@ -138,7 +141,7 @@ class _Search:
             helped = one.kind not in SINGLE and not one.within and not seen.finding and seen.complete
             found += list(unless_held_up(regions.system, one)) if helped else []
         bounds = () if complete and not undecided else (_bound(self._path, len(regions.regions), given, undecided),)
-        return _Seen(self._path, regions, tuple(found), tuple(answers.rows), bounds)
+        return _Seen(self._path, regions.system, tuple(found), tuple(answers.rows), bounds)
 
     def _regions(self, deadline: Deadline) -> tuple[Regions, bool]:
         """Return what was looked at within a time, and whether a property needs some of that; raises as ``System.of``."""
@@ -155,10 +158,10 @@ class _Search:
 
     def also(self, before: _Seen, deadline: Deadline, given: str) -> _Seen:
         """Look at runs in which hooks raise, managers die, or somebody aborts or pauses the mission; of those, what is new."""
-        if before.regions is None or before.bounds:
+        if before.system is None or before.bounds:
             return before
         try:
-            regions = Regions(before.regions.system.looking_at(ALSO), deadline)
+            regions = Regions(before.system.looking_at(ALSO), deadline)
             _explore(regions)
             # What nothing answers is not told: the last of all answers can always fail so. What never happens was told before.
             found = leaving_and_fighting(regions)
