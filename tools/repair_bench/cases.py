@@ -92,6 +92,14 @@ def without_chances(root: Path, folder: Path) -> Case:
     return Case(robot, folder / "patrol.xml", "person")
 
 
+def without_charge(root: Path, folder: Path) -> Case:
+    """Return the rover's patrol without what charges a battery that is low, and goes on."""
+    robot = root / "examples/rover"
+    copied(robot, folder)
+    put(folder / "answers.xml", "", r' *<Sequence name="charge and go on">(?:(?!</Sequence>).)*</Sequence>\n')
+    return Case(robot, folder / "patrol.xml", "battery")
+
+
 def without_the_others_turn(root: Path, folder: Path) -> Case:
     """Return the mission of drone and rover without what has the rover sent to where the drone came, when it can't fly on."""
     robot = root / "examples/two_robots"
@@ -117,6 +125,7 @@ ROBOTS: Mapping[str, Callable[[Path, Path], Case]] = {
     "drone, lidar": without_sensor,
     "drone, radio": without_video_end,
     "rover, person": without_chances,
+    "rover, battery": without_charge,
     "two robots, zed": without_the_others_turn,
 }
 
