@@ -176,6 +176,22 @@ def test_a_figure_that_is_not_measured_any_more_is_a_gap(browser: Any, tmp_path:
     assert quality < rate < distance
 
 
+def test_a_robot_that_names_no_figures_has_the_first_that_change(browser: Any, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    (tmp_path / "robot.yaml").write_text("name: arm\n", encoding="utf-8")
+    monkeypatch.setenv("ALULA_ROBOT", str(tmp_path))
+    told = [{"still": 1.0, "joints": {"a": t_s, "b": -t_s, "c": t_s % 3}, "last": t_s, "text": "x"} for t_s in map(float, range(20))]
+    samples = [
+        (LIFT_OFF_S + t_s, DATA, {"skillset": "arm", "data": "pose", "value": value, "stamp_s": 1.0}) for t_s, value in enumerate(told)
+    ]
+    others = [entry for entry in failing_story() if entry[1] != DATA]
+    page = Page(browser, make_report(tmp_path, sorted([*others, *samples], key=lambda entry: entry[0]), recordings=[]))
+    page.wait(DRAWN)
+    page.choose(10.0)
+    drawn = [one for one in page.text("#charts figcaption").split(" | ") if one.startswith("arm.")]
+    assert drawn == ["arm.pose.joints.a10 ", "arm.pose.joints.b-10 ", "arm.pose.joints.c1 "]
+    assert page.complaints() == []
+
+
 def test_a_plot_is_interrupted_where_no_data_came(browser: Any, tmp_path: Path) -> None:
     kept = [entry for entry in failing_story() if entry[1] != DATA or not LIFT_OFF_S + 20 < entry[0] < LIFT_OFF_S + 40]
     page = Page(browser, make_report(tmp_path, kept))

@@ -1,6 +1,7 @@
 // Numbers in time, a small chart each: height and speed of the path, and what the skillsets' data hold.
 
 const MAX_CHARTS = 9;
+const FIRST_CHARTS = 3; // of a robot that names none
 const CHART = { width: 320, height: 96, left: 58, bottom: 16 };
 
 class FiguresView {
@@ -21,7 +22,7 @@ class FiguresView {
       this.shown = names;
       this.charts = new Map(names.map((name) => [name, this.frame(name)]));
       byId("charts").replaceChildren(...[...this.charts.values()].map(({ figure }) => figure));
-      if (!names.length) byId("charts").append(el("p", { class: "hint" }, "The record holds no figures: a run over mocks measures nothing."));
+      if (!names.length) byId("charts").append(el("p", { class: "hint" }, "The record holds no figures that change."));
     }
     if (run.data.size !== this.offeredOf || this.news !== run.news) this.offer();
     [this.offeredOf, this.news] = [run.data.size, run.news];
@@ -31,13 +32,19 @@ class FiguresView {
 
   names() {
     const all = this.all();
-    const wanted = robotWords(this.run).charts.filter((name) => all.includes(name));
+    const named = robotWords(this.run).charts.filter((name) => all.includes(name));
+    const wanted = named.length ? named : all.filter((name) => this.changes(name)).slice(0, FIRST_CHARTS);
     const path = this.run.path.t.length ? [...(robotWords(this.run).flat ? [] : ["height"]), "ground speed"] : [];
     return [...new Set([...this.added.filter((name) => all.includes(name)), ...path, ...wanted])].slice(0, MAX_CHARTS);
   }
 
   all() {
     return [...this.run.data].flatMap(([name, { columns }]) => [...columns].filter(([, column]) => column.some((value) => typeof value === "number")).map(([field]) => `${name}.${field}`));
+  }
+
+  changes(name) {
+    const values = this.series(name).v.filter((value) => typeof value === "number");
+    return values.some((value) => value !== values[0]);
   }
 
   offer() {
