@@ -8,7 +8,7 @@ from dataclasses import dataclass, replace
 from heapq import heappop, heappush
 from typing import Generic, TypeVar
 
-from alula.odds.figures import ANY_CHANCE, Figures, Range
+from alula.odds.figures import ANY_CHANCE, ANY_RATE, Figures, Range
 from alula.odds.system import Kind, LabelledSystem, Outcome, Step
 
 State = TypeVar("State", bound=Hashable)
@@ -114,6 +114,24 @@ class _Search(Generic[State]):
                 self._numbers[step.target] = len(self._states)
                 self._states.append(step.target)
         return outcome, tuple(dict.fromkeys(_numbered(step, self._numbers) for step in found))
+
+
+def without_figures(graph: Graph, figures: Figures) -> list[str]:
+    """Return the names of the faults, transitions and skills in a graph that have no figures, sorted.
+
+    Of a skill these are the chances of its results: one result without a chance takes what the others leave, two share it anyhow.
+    """
+    lacking: set[str] = set()
+    open_ends: dict[str, set[str]] = {}
+    for step in (step for steps in graph.steps for step in steps):
+        if step.kind is Kind.FAULT:
+            of_fault = figures.fault(step.name)
+            lacking |= {step.name} if of_fault.rate == ANY_RATE and not of_fault.chances else set()
+        elif step.kind is Kind.END:
+            of_skill = figures.skill(step.name)
+            lacking |= set() if step.name in figures.skills else {step.name}
+            open_ends.setdefault(step.name, set()).update({step.result} - {*of_skill.results, *of_skill.fails})
+    return sorted(lacking | {skill for skill, ends in open_ends.items() if len(ends) > 1})
 
 
 def likelihoods(steps: Sequence[Step[int]], figures: Figures) -> list[float]:

@@ -9,7 +9,7 @@ from dataclasses import dataclass
 from alula.common.located_yaml import choices
 from alula.odds.errors import OddsError
 from alula.odds.figures import NEVER, Figures, Range
-from alula.odds.graph import Graph
+from alula.odds.graph import Graph, without_figures
 from alula.odds.hurry import unhurried
 from alula.odds.process import Process, contracted, quantify
 from alula.odds.storm import Number, Storm
@@ -46,7 +46,17 @@ class Cost:
 
 @dataclass(frozen=True)
 class Odds:
-    """All of it; ``seconds`` has None where the time to the end has no bound."""
+    """The odds of a mission.
+
+    Attributes:
+        outcomes: the chance of each way to end.
+        seconds: the mean time to the end, least and greatest; None where it has no bound.
+        costs: of the faults, the greatest first.
+        situations: how many the mission can come into.
+        states: of the decision process that they were reduced to.
+        open: how many situations were found and not looked at.
+        lacking: the faults, transitions and skills of this mission that have no figures, so that their chances are 0 to 1.
+    """
 
     outcomes: dict[str, Between]
     seconds: tuple[Number | None, Number | None]
@@ -54,6 +64,7 @@ class Odds:
     situations: int
     states: int
     open: int
+    lacking: tuple[str, ...] = ()
 
 
 def odds_of(graph: Graph, figures: Figures, *, costs: bool = True) -> Odds:
@@ -71,6 +82,7 @@ def odds_of(graph: Graph, figures: Figures, *, costs: bool = True) -> Odds:
         len(graph.steps) + graph.left - bool(graph.left),
         len(process.choices),
         graph.left,
+        tuple(without_figures(graph, figures)),
     )
 
 

@@ -9,7 +9,7 @@ from alula.odds.storm import Number
 
 WORDS = {"accomplished": "accomplished", "degraded": "degraded", "given_up": "given up in order", "neither": "neither"}
 COLOURS = {"accomplished": "#2a9d78", "degraded": "#f0a202", "given_up": "#4a90c4", "neither": "#c8322b"}
-MOST_COSTS = 12
+MOST_COSTS = MOST_LACKING = 12
 WIDTH_PX, LEFT_PX, BAR_PX, ROW_PX, TOP_PX = 760, 160, 420, 30, 44
 FONT = "font-family='DejaVu Sans, Helvetica, sans-serif'"
 
@@ -18,6 +18,11 @@ def as_text(title: str, odds: Odds, changes: dict[str, Odds]) -> str:
     """Return lines for a terminal."""
     lines = [title, *(f"  {WORDS[name]:<18} {_chance(one)}" for name, one in odds.outcomes.items())]
     lines += [f"  {'mean time to end':<18} {_seconds(odds)}"]
+    if odds.lacking:
+        more = len(odds.lacking) - MOST_LACKING
+        names = ", ".join(odds.lacking[:MOST_LACKING]) + (f" and {more} more" if more > 0 else "")
+        lines += [f"no figures for {names}: their chances count as anything from 0 to 1"]
+        lines += ["write them in the robot's `faults.yaml`, under `faults`, `transitions` and `skills` (docs/how-to/odds.md)"]
     if odds.costs:
         lines += ["what costs most, of the least chance that it is accomplished, degraded or not:"]
         lines += [f"  {one.name:<34} {_cost(one)}" for one in odds.costs[:MOST_COSTS]]
@@ -40,6 +45,7 @@ def as_dict(odds: Odds, changes: dict[str, Odds]) -> dict[str, object]:
         "situations": odds.situations,
         "states": odds.states,
         "open": odds.open,
+        "lacking": list(odds.lacking),
     }
     return found | ({"with": {change: as_dict(other, {}) for change, other in changes.items()}} if changes else {})
 

@@ -185,6 +185,21 @@ def test_what_nobody_knows_makes_a_range_and_a_search_that_stops_holds(carrier: 
     assert exactly(odds(capsys, carrier / "missions/once.xml"), "accomplished") == (0, 1)
 
 
+def test_what_has_no_figures_is_named_with_where_they_are_written(carrier: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    assert odds(capsys, carrier / "missions/once.xml")["lacking"] == []
+    path = carrier / "skillsets/faults.yaml"
+    known = path.read_text(encoding="utf-8")
+    wheel = "faults:\n  wheel: {ends: {carrier.drive: STUCK}}\n"
+    path.write_text(wheel + known.replace("{PICKED: 0.6, MISSED: 0.4}", "{}"), encoding="utf-8")
+    assert odds(capsys, carrier / "missions/once.xml")["lacking"] == ["carrier.pick", "wheel"]
+    path.write_text(wheel, encoding="utf-8")
+    assert main([str(carrier / "missions/once.xml")]) == 0
+    lines = capsys.readouterr().out.splitlines()
+    assert "  accomplished       0 to 1" in lines
+    why = lines.index("no figures for carrier.drive, carrier.pick, carrier.put, wheel: their chances count as anything from 0 to 1")
+    assert lines[why + 1] == "write them in the robot's `faults.yaml`, under `faults`, `transitions` and `skills` (docs/how-to/odds.md)"
+
+
 def test_the_text_and_the_picture(carrier: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
     picture = tmp_path / "odds.svg"
     assert main([str(carrier / "missions/retry.xml"), "--svg", str(picture)]) == 0
