@@ -185,6 +185,8 @@ def _verify_children(element: Element, known: NodeType, report: Report) -> None:
     count, (least, most) = len(element.children), known.children
     if count < least or (most is not None and count > most):
         expected = "none" if most == 0 else str(least) if most == least else f"{least} or more" if most is None else f"{least} to {most}"
+        if most == 1 and count > 1:
+            expected += ": put them into a Sequence"
         place = element.place if count < least or most is None else element.children[most].place
         report(Problem(place, f"'{known.name}' has {count or 'no'} {'child' if count == 1 else 'children'}", f"it takes {expected}"))
 

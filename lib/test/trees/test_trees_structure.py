@@ -15,7 +15,7 @@ WRONG = {
     "<Action ID='Navigate'/>": "9: unknown node 'Navigate'; see `alula palette`",
     "<Action/>": "1: <Action> has no ID; it names the type of the node",
     "<Sequence/>": "1: 'Sequence' has no children; it takes 1 or more",
-    "<Inverter><AlwaysSuccess/><AlwaysSuccess/></Inverter>": "27: 'Inverter' has 2 children; it takes 1",
+    "<Inverter><AlwaysSuccess/><AlwaysSuccess/></Inverter>": "27: 'Inverter' has 2 children; it takes 1: put them into a Sequence",
     "<Switch2 variable='1'><AlwaysSuccess/></Switch2>": "1: 'Switch2' has 1 child; it takes 3",
     "<AlwaysSuccess><AlwaysSuccess/></AlwaysSuccess>": "16: 'AlwaysSuccess' has 1 child; it takes none",
     "<IfThenElse><AlwaysSuccess/></IfThenElse>": "1: 'IfThenElse' has 1 child; it takes 2 to 3",
