@@ -11,6 +11,7 @@ from pathlib import Path
 from typing import Any
 
 import pytest
+from key_tables import COMMAND, pages
 
 from alula_testing.waits import until
 from manual_site import contents
@@ -100,6 +101,10 @@ def test_the_pages_are_counted_apart_from_what_programs_write() -> None:
 def test_the_list_of_pages_is_current() -> None:
     text = contents.PAGE.read_text(encoding="utf-8")
     assert text == contents.page(text), f"write it again: {contents.COMMAND}"
+
+
+def test_the_tables_of_keys_are_current() -> None:
+    assert [path.name for path, text in pages() if path.read_text(encoding="utf-8") != text] == [], f"write them again: {COMMAND}"
 
 
 def test_a_page_is_listed_with_the_first_sentence_below_its_title() -> None:

@@ -51,6 +51,7 @@ TYPED = [
     "tools/mission_mutations",
     "tools/api_page",
     "tools/manual_site",
+    "tools/key_tables",
     *(f"ros2_ws/src/{name}/{name}" for name in ROS2_PACKAGES),
     *(f"ros1_ws/src/{name}/src/{name}" for name in ROS1_PACKAGES),
     "examples/rover/ros2_ws/src/rover_robot/rover_robot",

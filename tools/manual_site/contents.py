@@ -16,10 +16,10 @@ from pathlib import Path
 import yaml
 
 from alula.common.files import write_text
+from alula.common.generated import replaced
 
 ALULA_ROOT = Path(__file__).resolve().parents[2]
 PAGE = ALULA_ROOT / "docs/index.md"
-MARK = "<!-- Below this line: written by"
 COMMAND = "setup/in_ros2 python -m manual_site.contents"
 
 
@@ -31,10 +31,9 @@ def main() -> int:
 
 def page(text: str) -> str:
     """Return the page with its list replaced."""
-    above, _, _ = text.partition(MARK)
     nav = yaml.safe_load((ALULA_ROOT / "mkdocs.yml").read_text(encoding="utf-8"))["nav"]
     parts = [line for entry in nav for title, inside in entry.items() if isinstance(inside, list) for line in _part(title, inside)]
-    return "\n".join([f"{above}{MARK} `{COMMAND}`, from mkdocs.yml and the pages' first sentences. -->", *parts, ""])
+    return replaced(text, COMMAND, "mkdocs.yml and the pages' first sentences", parts[1:])
 
 
 def _part(title: str, entries: list[dict[str, object]]) -> Iterator[str]:

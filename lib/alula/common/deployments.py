@@ -13,18 +13,52 @@ from typing import TypeVar
 from urllib.parse import urlsplit
 
 from alula.common.errors import AlulaError
+from alula.common.keys import Key
 from alula.common.located_yaml import Located, choices, read_yaml
 from alula.common.network import DOMAINS, NAMESPACE
 from alula.common.robots import RobotError, RobotFolder, find_robot
 from alula.common.suggestions import nearest
 
 FOLDER = "deployments"
-KEYS = ("about", "ros1", "ros2", "managers", "processes", "silence", "bridge", "record", "page")
-ROS1_KEYS, ROS2_KEYS = ("master", "address"), ("domain", "discovery", "peers", "namespace")
-RECORD_KEYS, PAGE_KEYS = ("topics", "disk_gb"), ("users", "address", "port")
 LOOPBACK = "127.0.0.1"
 PAGE_PORT, MAX_PORT = 8440, 65535
 DISK_GB, MAX_DISK_GB = 20.0, 1e6
+KEYS: Mapping[str, Key] = {
+    "about": Key("a sentence"),
+    "ros1": Key("the ROS 1 that runs already", "needed"),
+    "ros2": Key("the ROS 2 of what runs here", "needed"),
+    "managers": Key(
+        "what makes the hooks of each skillset served here, `MODULE:FACTORY`; or a command, which has its own process", "none run here"
+    ),
+    "processes": Key(
+        "`single`: one serves them, the part `managers`; `skillsets`: one each; `separate`: one for each skill, too", "`single`"
+    ),
+    "silence": Key("after how many seconds without its reporter a resource is unknown, as `{rover.link: 4}`", "as the model says"),
+    "bridge": Key("its configuration: one that set-up generates, by its name, or a file", "it runs elsewhere"),
+    "record": Key("what is recorded", "no recorder"),
+    "page": Key("the operator's page", "no page"),
+}
+ROS1_KEYS: Mapping[str, Key] = {
+    "master": Key("URI of the ROS 1 master that runs already", "needed"),
+    "address": Key("this computer's address, as the base's nodes reach it", LOOPBACK),
+}
+ROS2_KEYS: Mapping[str, Key] = {
+    "domain": Key("DDS domain", "0"),
+    "discovery": Key("how far nodes look: `LOCALHOST`, `SUBNET` or `OFF`", "`LOCALHOST`"),
+    "peers": Key("computers that are found without multicast", "none"),
+    "namespace": Key("what names in ROS 2 begin with", "nothing"),
+}
+RECORD_KEYS: Mapping[str, Key] = {
+    "topics": Key("topics of ROS 1, recorded all the time and in each mission", "no recorder"),
+    "disk_gb": Key("1e9 bytes that all recordings and missions may take; what is oldest goes first", f"{DISK_GB:g}"),
+}
+PAGE_KEYS: Mapping[str, Key] = {
+    "users": Key(
+        "`here`: of this computer; `watchers`: others may watch; `operators`: others may command, over TLS, with a token", "`here`"
+    ),
+    "address": Key("this computer's, which others reach", LOOPBACK),
+    "port": Key("of TCP", str(PAGE_PORT)),
+}
 SHORTEST_SILENCE_S, LONGEST_SILENCE_S = 1.0, 3600.0
 """Of a resource whose reporter is not heard of, in a model or a deployment; reporters beat twice a second."""
 EnumT = TypeVar("EnumT", bound=Enum)

@@ -6,6 +6,7 @@ import functools
 from collections.abc import Callable, Mapping
 from typing import Any
 
+from alula.common.keys import Key
 from alula.common.located_yaml import Located
 
 Read = Callable[[Located], Any]
@@ -26,19 +27,38 @@ FIELDS = ("mode", "link")
 LISTS = ("links", "charts")
 CAMERAS, FIGURES, FENCE, FLAT = "cameras", "figures", "fence", "flat"
 FIGURE_KEYS = ("label", "unit", "digits", "factor")
+KEYS: Mapping[str, Key] = {
+    "departure": Key("the word for the departure", WORDS["departure"]),
+    "away": Key("for being away", WORDS["away"]),
+    "back": Key("for having come back", WORDS["back"]),
+    "moved": Key("for the way covered", WORDS["moved"]),
+    "stop": Key("for the act that ends a mission", WORDS["stop"]),
+    "controller": Key("for what else commands", WORDS["controller"]),
+    "tasks": Key("for what a mission is sent out for", WORDS["tasks"]),
+    "live": Key("what a live run is on, `default` and by option that is set"),
+    "modes": Key("those of the controller in which the mission does not command, and what the robot does in them"),
+    "glossary": Key("words of its field, explained"),
+    "mode": Key("`skillset.data.field`: the controller's mode"),
+    "link": Key("`skillset.data.field`: whether the controller is connected"),
+    "links": Key("resources that are links"),
+    "charts": Key("`skillset.data.field`: what is drawn first"),
+    CAMERAS: Key("by name: `about`, what it shows; with `data` the `figures` below its picture, by field"),
+    FIGURES: Key(
+        f"by path in `summary.json`: {', '.join(f'`{key}`' for key in FIGURE_KEYS)} (by which it is multiplied; 100 of a unit that begins "
+        "with %); on the page, in a run's last lines and in `compare`, after those of every robot"
+    ),
+    FENCE: Key("[radius, floor, ceiling] in m: the upright cylinder around home that it stays in"),
+    FLAT: Key("true: it moves on a floor. No heights are reported or drawn, and the map is the whole floor"),
+}
+"""What the manual says of each key (docs/reference/robots.md)."""
 
 
 def read_page(part: Located | None) -> dict[str, Any]:
     """Return what the page and the reports say and show of a robot, as JSON has it.
 
-    ``live`` says what a live run is on: of each option of the run that is set, and under ``default``. ``modes`` are those in which the
-    mission does not command, and what the robot does in them; ``glossary`` explains words of the robot's field. ``mode`` and ``link`` are
-    the fields of data with the controller's mode and whether it is heard of, None where there is none; ``links`` are resources that are
-    links, ``charts`` fields of data that are drawn first. ``cameras`` say what each shows, ``figures`` what numbers of ``summary.json``
-    are called besides those of every robot, by their path. ``fence``: ``{radius_m, z: [floor, ceiling]}``, metres, None: there is none.
-    ``flat``: it moves on a floor, so nothing is told or drawn of heights, and its map is the whole of what stands on that floor.
+    ``fence`` is ``{radius_m, z: [floor, ceiling]}``, metres; ``mode``, ``link`` and ``fence`` are None where there are none.
     """
-    said = {} if part is None else part.record("`page`", (*WORDS, *TABLES, *FIELDS, *LISTS, CAMERAS, FIGURES, FENCE, FLAT))
+    said = {} if part is None else part.record("`page`", KEYS)
     readers: Mapping[str, tuple[Any, Read]] = {
         **{key: (usual, functools.partial(_text, key)) for key, usual in WORDS.items()},
         **{key: ({}, functools.partial(_table, key, functools.partial(_text, key))) for key in TABLES},
@@ -49,7 +69,7 @@ def read_page(part: Located | None) -> dict[str, Any]:
         FENCE: (None, _fence),
         FLAT: (False, _flat),
     }
-    return {key: read(said[key]) if key in said else usual for key, (usual, read) in readers.items()}
+    return {key: readers[key][1](said[key]) if key in said else readers[key][0] for key in KEYS}
 
 
 def _text(key: str, part: Located) -> str:

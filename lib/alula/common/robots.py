@@ -21,6 +21,7 @@ from types import ModuleType
 from typing import Any
 
 from alula.common.errors import AlulaError
+from alula.common.keys import Key
 from alula.common.located_yaml import Located, choices, read_yaml
 from alula.common.public import public
 from alula.common.robot_page import USUAL_PAGE, read_page
@@ -29,25 +30,40 @@ FILE = "robot.yaml"
 VARIABLE = "ALULA_ROBOT"
 BEHAVIOUR, FAULTS = "mock.yaml", "faults.yaml"
 """Files beside the models: what mocks do, and what faults bring about."""
-PARTS = ("inputs", "missions", "hooks", "report", "run", "sensors", "areas")
-"""What a robot may add to the general commands, as ``module`` or ``module:name``; ``docs/reference/robots.md`` says what each has to be."""
-WORLD_KEYS = ("packages", "python", "debian", "underlays")
-KEYS = (
-    "name",
-    "about",
-    "robots",
-    "skillsets",
-    "scenarios",
-    "worlds",
-    "departure",
-    "taken",
-    "rest",
-    "page",
-    "python",
-    "parts",
-    "ros1",
-    "ros2",
-)
+PARTS: Mapping[str, str] = {
+    "inputs": "a function that reads a mission's inputs from the file of a world",
+    "missions": "an `alula.parts.MissionPart`: nodes of its own for [missions](mission-files.md)",
+    "hooks": "the package whose hooks a replay from the functional layer runs",
+    "report": (
+        "a function that makes an `alula.parts.ReportPart`: numbers, pictures, what became of the mission's tasks, entries of the page"
+    ),
+    "run": "a class, an `alula.parts.RunPart`: what is the robot's own in a live run",
+    "sensors": "a `SensorPart`, imported in the ROS 1 world: cores of nodes that perceive again in a replay from sensors",
+    "areas": "a function that reads the areas of the page's map from the file of a world",
+}
+"""What a robot may add to the general commands, as ``module`` or ``module:name``; the texts are those of ``docs/reference/robots.md``."""
+WORLD_KEYS: Mapping[str, Key] = {
+    "packages": Key("folders of packages, found as colcon and catkin find them", "`ros1_ws/src`, `ros2_ws/src`"),
+    "python": Key("a file of pinned Python packages, `name==version` a line"),
+    "debian": Key("Debian packages"),
+    "underlays": Key("workspaces or prefixes that are sourced [first](#underlays)"),
+}
+KEYS: Mapping[str, Key] = {
+    "name": Key("a-z, 0-9 and `_`; names the generated client and the bridge's configuration", "needed"),
+    "about": Key("a sentence"),
+    "robots": Key("of a [fleet](../how-to/fleets.md): its robots' folders by name; it has no models itself", "none"),
+    "skillsets": Key("folder of the models, with `types.yaml`, `bindings.yaml`, `mock.yaml`, `faults.yaml`", "`skillsets`"),
+    "scenarios": Key("folder of [scenarios](../how-to/scenarios.md)", "`scenarios`"),
+    "worlds": Key("folder of the files that scenarios name as `world`", "`worlds`"),
+    "departure": Key("`skillset.resource STATE`: when the robot is away"),
+    "taken": Key("`skillset.resource STATE`: when it is not the mission's any more"),
+    "rest": Key("`skillset.resource STATE`: in which it may be left away from where it departed; else a campaign counts that as trouble"),
+    "page": Key("words and facts of its [page and reports](#page)", "the usual words"),
+    "python": Key("folders of plain Python packages that [parts](#what-a-robot-adds) are imported from"),
+    "parts": Key("[what it adds](#what-a-robot-adds) to the general commands, as `module:name`"),
+    "ros1": Key("what it has in ROS 1: see below"),
+    "ros2": Key("what it has in ROS 2: see below"),
+}
 _NAME = re.compile(r"[a-z][a-z0-9_]*")
 
 

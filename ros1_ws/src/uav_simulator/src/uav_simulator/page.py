@@ -5,20 +5,18 @@ What a fault is, says the comment behind its `SensorMode`; what an imperfection 
 
 from __future__ import annotations
 
-import ast
 import inspect
-import itertools
 import re
 import sys
 from collections.abc import Iterator
 from pathlib import Path
 
 from alula.common.files import write_text
+from alula.common.generated import documented_fields, replaced, table
 from uav_simulator.imperfections import NAMES, PRESETS, Imperfections
 from uav_simulator.sensors.faults import FAULTS, SensorMode
 
 PAGE = Path(__file__).resolve().parents[2] / "README.md"
-MARK = "<!-- Below this line: written by"
 
 
 def main() -> int:
@@ -29,36 +27,21 @@ def main() -> int:
 
 def page(text: str) -> str:
     """Return the page with its tables replaced."""
-    above, _, _ = text.partition(MARK)
-    tables = "\n".join([*_faults(), "", *_imperfections()])
-    return f"{above}{MARK} `python -m uav_simulator.page`, from the code. -->\n\n{tables}\n"
+    return replaced(text, "python -m uav_simulator.page", "the code", [*_faults(), "", *_imperfections()])
 
 
 def _faults() -> Iterator[str]:
-    yield from ("## Ways to fail", "", "| how | of | what is published, or happens |", "|---|---|---|")
     meanings = re.findall(r'^    [A-Z_]+ = "(\w+)"  # (.+)$', inspect.getsource(SensorMode), re.MULTILINE)
-    for how, meaning in meanings:
-        yield f"| `{how}` | {', '.join(sensor for sensor, ways in FAULTS.items() if how in ways)} | {meaning} |"
+    rows = ((f"`{how}`", ", ".join(sensor for sensor, ways in FAULTS.items() if how in ways), meaning) for how, meaning in meanings)
+    yield from ("## Ways to fail", "", *table(("how", "of", "what is published, or happens"), *rows))
 
 
 def _imperfections() -> Iterator[str]:
-    yield from ("## Imperfections by name", "", "| name | realistic | what it is |", "|---|---|---|")
-    meanings = dict(_documented())
-    for name in NAMES:
-        value = getattr(PRESETS["realistic"], name)
-        yield f"| `{name}` | {f'{value:g}' if value != getattr(PRESETS['off'], name) else ''} | {meanings[name]} |"
-
-
-def _documented() -> Iterator[tuple[str, str]]:
-    """Yield each field with its docstring; one without has that of the field above."""
-    (definition,) = ast.parse(inspect.getsource(Imperfections)).body
-    assert isinstance(definition, ast.ClassDef)  # noqa: S101 - what getsource returns of a class
-    text = ""
-    for here, below in itertools.pairwise([*definition.body, ast.Pass()]):
-        if isinstance(here, ast.AnnAssign):
-            if isinstance(below, ast.Expr) and isinstance(below.value, ast.Constant):
-                text = str(below.value.value)
-            yield ast.unparse(here.target), text
+    meanings = dict(documented_fields(Imperfections))
+    off, realistic = PRESETS["off"], PRESETS["realistic"]
+    values = {name: getattr(realistic, name) for name in NAMES}
+    rows = ((f"`{name}`", f"{value:g}" if value != getattr(off, name) else "", meanings[name]) for name, value in values.items())
+    yield from ("## Imperfections by name", "", *table(("name", "realistic", "what it is"), *rows))
 
 
 if __name__ == "__main__":

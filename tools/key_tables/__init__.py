@@ -1,0 +1,49 @@
+"""Writes the tables of keys of files on the manual's pages, from the code that refuses the others.
+
+PYTHONPATH=tools setup/in_ros2 python -m key_tables
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterable, Iterator, Mapping
+from pathlib import Path
+
+from alula.common import deployments, robot_page, robots
+from alula.common.generated import key_table, replaced, table
+from alula.common.keys import Key
+
+ALULA_ROOT = Path(__file__).resolve().parents[2]
+COMMAND = "PYTHONPATH=tools setup/in_ros2 python -m key_tables"
+
+
+def pages() -> Iterator[tuple[Path, str]]:
+    """Yield each page with its text as it should be."""
+    for name, lines in PAGES.items():
+        path = ALULA_ROOT / name
+        yield path, replaced(path.read_text(encoding="utf-8"), COMMAND, "the code that reads the file", lines())
+
+
+def _robot() -> Iterator[str]:
+    yield from ("## `robot.yaml`", "", *key_table(robots.KEYS), "", "Of `ros1` and `ros2`:", "", *key_table(robots.WORLD_KEYS), "")
+    parts = ((f"`{name}`", text) for name, text in robots.PARTS.items())
+    yield from ("## What a robot adds", "", *table(("part", "what it names"), *parts), "")
+    yield from ("## Page", "", "Of `page`; the drone's `robot.yaml` uses all of it.", "", *key_table(robot_page.KEYS))
+
+
+def _deployment() -> Iterator[str]:
+    parts = {
+        "ros1": deployments.ROS1_KEYS,
+        "ros2": deployments.ROS2_KEYS,
+        "record": deployments.RECORD_KEYS,
+        "page": deployments.PAGE_KEYS,
+    }
+    flat: dict[str, Key] = {}
+    for name, own in deployments.KEYS.items():
+        flat |= {name: own, **{f"{name}: {key}": text for key, text in parts.get(name, {}).items()}}
+    yield from ("## Keys of the file", "", *key_table(flat))
+
+
+PAGES: Mapping[str, Callable[[], Iterable[str]]] = {
+    "docs/reference/robots.md": _robot,
+    "docs/how-to/on-the-robot.md": _deployment,
+}
