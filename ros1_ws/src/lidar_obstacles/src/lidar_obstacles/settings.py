@@ -15,6 +15,7 @@ class LidarSettings:
     """Private parameters of /lidar_obstacles with their defaults; units in the names. Those with a range may be changed in flight."""
 
     enabled: bool = False
+    """whether it looks ahead from the start; else `~enable` begins it"""
     # health
     timeout_s: float = tunable(0.35, 0.1, 5.0, "without a good sweep until broken")
     recover_s: float = tunable(1.0, 0.1, 30.0, "of good sweeps until mended")

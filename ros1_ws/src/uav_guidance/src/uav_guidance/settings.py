@@ -19,9 +19,9 @@ class GuidanceSettings:
     """
 
     url: str = "tcp:127.0.0.1:5760"
-    """MAVLink connection as pymavlink writes it: tcp:HOST:PORT, udpin:HOST:PORT, udpout:HOST:PORT, /dev/ttyX."""
+    """MAVLink connection as pymavlink writes it: tcp:HOST:PORT, udpin:HOST:PORT, udpout:HOST:PORT, /dev/ttyX"""
     baud: int = 921600
-    """Of a serial port."""
+    """of a serial port"""
 
     fence_radius_m: float = tunable(FlightLimits.FENCE_RADIUS_M, 1.0, FlightLimits.FENCE_RADIUS_M, "from home, for targets")
     fence_height_m: float = tunable(FlightLimits.FENCE_HEIGHT_M, 1.0, FlightLimits.FENCE_HEIGHT_M, "above home, for targets")

@@ -14,15 +14,14 @@ from zed_depth.view_health import ViewLimits
 
 @dataclass(frozen=True)
 class ZedSettings:
-    """Private parameters of /zed_depth with their defaults; units in the names. Those with a range may be changed in flight.
-
-    ``rectified``: the images are, though their camera_info is that of the raw ones; otherwise the camera_info decides. ``threads``: of
-    OpenCV, which matches four bands of the image by itself; the result does not depend on them.
-    """
+    """Private parameters of /zed_depth with their defaults; units in the names. Those with a range may be changed in flight."""
 
     enabled: bool = False
+    """whether it looks ahead from the start; else `~enable` begins it"""
     threads: int = 2
+    """of OpenCV, which matches four bands of the image by itself; the result does not depend on them"""
     rectified: bool = False
+    """the images are, though their camera_info is that of the raw ones; else the camera_info decides"""
     # health
     timeout_s: float = tunable(0.35, 0.1, 5.0, "without a good pair until broken")
     recover_s: float = tunable(1.0, 0.1, 30.0, "of good pairs until mended")
