@@ -24,6 +24,7 @@ from alula.common.errors import AlulaError
 from alula.common.network import free_port
 from alula.common.robots import VARIABLE as ROBOT
 from alula.common.robots import find_robot
+from alula.common.run_log import read_held
 from alula.generate.scaffold.skeleton import files_of
 from alula.report.deaths import read_deaths
 from alula.report.ends import read_end
@@ -568,6 +569,15 @@ def test_a_mission_on_what_runs_leaves_a_robot_at_rest(robot, monkeypatch, code,
     monkeypatch.setattr(supervisor, "_start", start)
     assert supervisor.run() == ended
     assert part.rested >= rested if rested else part.rested == 0
+
+
+def test_a_mission_on_what_runs_says_what_it_waits_for(robot, monkeypatch):
+    monkeypatch.setattr(attachments, "LOOK_S", 0.01)
+    monkeypatch.setattr("alula_flight.waits.TELL_HELD_S", 0.0)
+    assert attached(robot, Watched(looks=4), "exit(1)").run() == 1
+    said = read_held(robot / "runs/patrol")
+    assert said
+    assert all(how.startswith("the pilot has it, at 3.0 m, for ") for how in said)
 
 
 def test_a_limit_ends_a_mission_on_what_runs_and_a_run_that_watches_on(robot, monkeypatch):

@@ -23,6 +23,7 @@ from alula_flight.mission_clock import MissionClock
 from alula_flight.mission_watch import SILENT_S
 from alula_flight.outcome import GIVEN_UP, finish
 from alula_flight.supervisor import Supervisor, Watch
+from alula_flight.waits import Held
 
 
 @dataclass
@@ -237,6 +238,32 @@ def test_a_run_goes_on_as_long_as_somebody_else_has_the_robot(code: int, flight:
     for _ in range(2):
         live.show_new()
     assert said == [f"waiting: {how}" for how in read_held(tmp_path)], "each is said once"
+
+
+@pytest.mark.parametrize(
+    ("looks", "said"),
+    [
+        ([(0.0, "in BRAKE, at 3.0 m"), (9.9, "in BRAKE, at 3.0 m")], []),
+        (
+            [(0.0, "in BRAKE, at 3.0 m"), (10.0, "in BRAKE, at 3.1 m"), (11.0, "in LAND, at 3.0 m"), (20.5, "in LAND, at 1.2 m")],
+            ["in BRAKE, at 3.1 m, for 10 s", "in LAND, at 1.2 m, for 20 s"],
+        ),
+        ([(0.0, BRAKE), (8.0, ""), (12.0, BRAKE), (21.0, BRAKE), (22.0, BRAKE)], [f"{BRAKE}, for 10 s"]),
+        ([(0.0, BRAKE), (35.0, BRAKE), (36.0, BRAKE), (45.0, BRAKE)], [f"{BRAKE}, for 35 s", f"{BRAKE}, for 45 s"]),
+        ([(None, BRAKE), (4.0, BRAKE), (13.0, BRAKE), (14.0, BRAKE)], [f"{BRAKE}, for 10 s"]),
+    ],
+    ids=["not yet", "as it is now", "given back and taken again", "after a late look", "before the clock is known"],
+)
+def test_what_a_run_waits_for_is_said_each_ten_seconds(looks: list[tuple[float | None, str]], said: list[str], tmp_path: Path) -> None:
+    part, clock = Part(), MissionClock()
+    clock.begin(simulated=True)
+    part.hold = iter([words for _, words in looks])
+    held = Held(RunSpec("mapping", str(tmp_path), "id"), part, clock)
+    for now_s, words in looks:
+        if now_s is not None:
+            clock._tick(SimpleNamespace(clock=SimpleNamespace(to_sec=lambda now_s=now_s: now_s)))
+        assert held.look() == bool(words)
+    assert read_held(tmp_path) == said
 
 
 def test_who_wants_a_run_to_end_that_watches_ends_it(flight: Flight, tmp_path: Path) -> None:

@@ -11,6 +11,7 @@ import pytest
 import yaml
 from campaign_mocks import fly_recorded
 
+from alula.campaign.live import words_of_run
 from alula.campaign.plan import SIMULATOR, PlannedRun, load_campaign
 from alula.campaign.rows import rows_of
 from alula.campaign.running import offer_of
@@ -118,6 +119,18 @@ def test_a_drawn_campaign_names_every_way_of_all_that_can_fail(file):
         kinds = {kind if isinstance(kind, str) else next(iter(kind)) for entry in entries for kind in entry}
         known = {**offer.faults, **dict(load_scenario(name).faults)}
         assert kinds == {f"{what}:{how}" for what, ways in known.items() if what not in NOT_THERE[name] | {"motor"} for how in ways}
+
+
+@pytest.mark.parametrize("scenario", ["inspection", "mapping"])
+def test_a_campaign_that_lists_its_faults_may_name_every_process_of_a_flight(scenario, tmp_path):
+    known = load_scenario(scenario)
+    faults = [f"{process}:{how}@3" for process in dict(known.processes) for how in dict(known.faults)[process]]
+    assert {"uav_guidance:killed@3", "ros_bridge:hung@3"} <= set(faults)
+    file = tmp_path / "c.yaml"
+    file.write_text(yaml.safe_dump({"over": SIMULATOR, "scenarios": [scenario], "faults": [[one] for one in faults]}), encoding="utf-8")
+    campaign = load_campaign(file)
+    check_faults(campaign, offer_of(campaign))
+    assert [words_of_run(planned)[-2:] for planned in campaign.runs] == [["--fail", one] for one in faults]
 
 
 @pytest.mark.parametrize(
