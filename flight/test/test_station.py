@@ -11,6 +11,7 @@ import signal
 import socket
 import subprocess
 import sys
+import threading
 from dataclasses import replace
 from pathlib import Path
 
@@ -500,6 +501,33 @@ def test_a_master_that_does_not_answer_is_said_before_anything_begins(robot, cap
     assert "`ros1: master`" in told
     assert not (robot / "runs").exists()
     assert "not known" in why_no_master("http://no-such-host.invalid:11311")
+
+
+NOT_HTTP, A_PAGE, NOT_FOUND = (
+    b"SSH-2.0-OpenSSH_9.2p1\r\n",
+    b"HTTP/1.0 200 OK\r\nContent-Type: text/html\r\n\r\n<html><p>Welcome</html>",
+    b"HTTP/1.0 404 Not Found\r\nContent-Length: 0\r\n\r\n",
+)
+
+
+@pytest.mark.parametrize("answer", [NOT_HTTP, A_PAGE, NOT_FOUND], ids=["no HTTP", "a page", "not found"])
+def test_another_program_at_the_masters_port_is_told(answer: bytes) -> None:
+    with socket.create_server(("127.0.0.1", 0)) as server:
+
+        def serve() -> None:
+            connection, _ = server.accept()
+            with connection:
+                connection.recv(65_536)
+                connection.sendall(answer)
+                connection.shutdown(socket.SHUT_WR)
+                while connection.recv(65_536):  # what is left unread would reset the connection
+                    pass
+
+        thread = threading.Thread(target=serve)
+        thread.start()
+        told = why_no_master(f"http://127.0.0.1:{server.getsockname()[1]}")
+        thread.join()
+    assert told == "another program than a ROS master has that port"
 
 
 def test_a_mission_keeps_the_parts_from_being_changed(robot, capsys):

@@ -15,6 +15,7 @@ from collections.abc import Callable
 from dataclasses import dataclass
 from typing import Any
 from urllib.parse import urlsplit
+from xml.parsers.expat import ExpatError
 from xmlrpc.client import Error as XmlRpcError
 from xmlrpc.client import ServerProxy, Transport, dumps
 
@@ -43,8 +44,10 @@ def why_no_master(uri: str) -> str:
         return f"nothing answers within {MASTER_S:g} s"
     except socket.gaierror:
         return "the name of its computer is not known here"
-    except (OSError, XmlRpcError) as error:
-        return getattr(error, "strerror", None) or str(error)
+    except OSError as error:
+        return error.strerror or str(error)
+    except (XmlRpcError, ExpatError, http.client.HTTPException, ValueError):  # as a web server answers, or a file of its own
+        return "another program than a ROS master has that port"
     return ""
 
 
