@@ -272,6 +272,22 @@ def test_a_wrong_option_is_one_line_before_anything_is_set_up(name: str, tmp_pat
     assert not (tmp_path / "nothing").exists()
 
 
+NAMING = ["up rbot", "down rbot", "status rbot", "doctor rbot", "service install rbot", "run patrol --on rbot", "fly patrol --on=rbot"]
+
+
+@pytest.mark.parametrize("words", [*NAMING, "console --on rbot", "skills --on rbot"])
+def test_an_unknown_deployment_is_one_line_before_anything_is_set_up(words: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setenv("ALULA_STATE", str(tmp_path / "nothing"))
+    robot = tmp_path / "rover"
+    (robot / "deployments").mkdir(parents=True)
+    (robot / "robot.yaml").write_text("name: rover\n", encoding="utf-8")
+    (robot / "deployments/robot.yaml").touch()
+    done = alula(*words.split(), "--robot", str(robot))
+    said = f"alula: there is no deployment 'rbot' in {robot / 'deployments'}; did you mean `robot`?\n"
+    assert (done.returncode, done.stdout, done.stderr) == (2, "", said)
+    assert not (tmp_path / "nothing").exists()
+
+
 def test_the_nearest_option_and_choice_are_named() -> None:
     assert alula("skills", "--domain", "300").stderr.startswith("alula skills: --domain: 300 does not lie between 0 and 232; ")
     assert alula("check", "--jsno").stderr == "alula check: there is no option --jsno; did you mean `--json`?\n"

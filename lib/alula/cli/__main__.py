@@ -17,8 +17,9 @@ from pathlib import Path
 
 from alula.cli.checkout import ROBOT, Checkout, checkout
 from alula.cli.help import usage
-from alula.cli.parser import WRONG
+from alula.cli.parser import WRONG, Parser
 from alula.cli.table import COMMANDS, VERSION, Command
+from alula.common.deployment_names import why_no_deployment
 from alula.common.suggestions import nearest
 
 OPTION = "--robot"
@@ -83,11 +84,31 @@ def do(command: Command, words: Sequence[str], robot: Path | None, here: Checkou
         return 0
     if command.robot and robot is None:
         raise WordsError(f"there is no {ROBOT_FILE} in {Path.cwd()} or above; name the robot's folder with {OPTION} DIR, or {MAKE_ONE}")
+    why = next((why for name in deployments_in(command, words) if robot and (why := why_no_deployment(name, robot))), "")
+    if why:
+        raise WordsError(why)
     if here is not None:
         return here.do(command, words)
     if not command.module:
         raise WordsError(f"{command.name}: {command.elsewhere}")
     return run_module(command, words)
+
+
+def deployments_in(command: Command, words: Sequence[str]) -> list[str]:
+    """Return the deployments that a command's words name."""
+    parser = command.parser()
+    named = parser.completed_by("deployments")
+    if not named:
+        return []
+    if not command.open:
+        given = parser.parse_args(words)
+    else:  # the robot's own options are not known yet
+        options = Parser(prog=parser.prog, add_help=False, allow_abbrev=False)
+        for action in named:
+            options.add_argument(*action.option_strings, dest=action.dest, default=action.default)
+        given, _ = options.parse_known_args(words)
+    values = [getattr(given, action.dest) for action in named]
+    return [name for name in (value[-1] if isinstance(value, list) else value for value in values) if name]
 
 
 def run_module(command: Command, words: Sequence[str]) -> int:

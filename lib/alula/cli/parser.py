@@ -29,6 +29,10 @@ class Parser(argparse.ArgumentParser):
         more = "" if text.endswith("?") else f"; '{self.prog} --help' lists what it takes"
         self.exit(WRONG, f"{self.prog}: {text}{more}\n")
 
+    def completed_by(self, words: str) -> list[argparse.Action]:
+        """Return the arguments that these words of the robot complete."""
+        return [action for action in self._actions if words_completing(action) == words]
+
     def _parse_known_args(self, arg_strings: list[str], *others: Any) -> Any:
         self._typed = tuple(arg_strings)
         return super()._parse_known_args(arg_strings, *others)

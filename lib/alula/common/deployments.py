@@ -12,14 +12,13 @@ from pathlib import Path
 from typing import TypeVar
 from urllib.parse import urlsplit
 
+from alula.common.deployment_names import FOLDER, names_in, why_no_deployment
 from alula.common.errors import AlulaError
 from alula.common.keys import Key
 from alula.common.located_yaml import Located, choices, read_yaml
 from alula.common.network import DOMAINS, NAMESPACE
 from alula.common.robots import RobotError, RobotFolder, find_robot
-from alula.common.suggestions import nearest
 
-FOLDER = "deployments"
 LOOPBACK = "127.0.0.1"
 PAGE_PORT, MAX_PORT = 8440, 65535
 DISK_GB, MAX_DISK_GB = 20.0, 1e6
@@ -177,22 +176,19 @@ def makes_hooks(words: Sequence[str]) -> bool:
 
 def deployment_names(robot: RobotFolder | None = None) -> list[str]:
     """Return the names of a robot's deployments; raises RobotError where none is named and there is no robot."""
-    return sorted(path.stem for path in ((robot or find_robot()).root / FOLDER).glob("*.yaml"))
+    return names_in((robot or find_robot()).root)
 
 
 def load_deployment(name: str, robot: RobotFolder | None = None) -> Deployment:
     """Read a deployment; raises DeploymentError."""
     try:
-        folder = (robot or find_robot()).root / FOLDER
+        root = (robot or find_robot()).root
     except RobotError as error:
         raise DeploymentError(str(error)) from None
-    names = sorted(path.stem for path in folder.glob("*.yaml"))
-    if name not in names:
-        hint = nearest(name, names) or (
-            f"there are {', '.join(names)}" if names else "write one: docs/how-to/on-the-robot.md says what is in it"
-        )
-        raise DeploymentError(f"there is no deployment '{name}' in {folder}; {hint}")
-    return read_deployment(folder / f"{name}.yaml")
+    why = why_no_deployment(name, root)
+    if why:
+        raise DeploymentError(why)
+    return read_deployment(root / FOLDER / f"{name}.yaml")
 
 
 def read_deployment(path: Path) -> Deployment:
