@@ -11,6 +11,7 @@ from skillset_ros2.heartbeat import Heartbeat
 from skillset_ros2.node import SkillsetNode
 from skillset_ros2.robot import Robot
 from skillset_ros2.service_skill import ServiceSkill
+from skillset_ros2.slower_clock import SlowerClock
 from skillset_ros2.spin import run_skillset
 from skillset_ros2.watch import Watch
 
@@ -26,6 +27,7 @@ __all__ = [
     "SkillHandle",
     "SkillsetClient",
     "SkillsetNode",
+    "SlowerClock",
     "Watch",
     "run_skillset",
 ]

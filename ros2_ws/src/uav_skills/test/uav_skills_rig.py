@@ -9,7 +9,7 @@ import time
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 
-from uav_skills_functional_fake import LONG_WAY_STEP_M, FakeFunctional
+from uav_skills_functional_fake import LONG_WAY_STEP_M, STEP_S, WALL_STEP_S, FakeFunctional
 
 from alula_testing.ros2 import end_spinning, spin
 
@@ -70,16 +70,23 @@ class Rig:
         return min([*heard_s, *(follower() for follower in self.followers)])
 
     def _kept(self, make_hooks):
+        from skillset_ros2 import SlowerClock
+
         def make(node):
             hooks = make_hooks(node)
             self._hooks += hooks.values()
+            for api in self._apis(hooks.values()):  # their monotonic clock runs as fast as the functional layer's
+                api._slower = SlowerClock(lambda api=api: api.now_s, lambda: time.monotonic() * STEP_S / WALL_STEP_S)
             return hooks
 
         return make
 
+    def _apis(self, hooks):
+        return [api for hook in hooks for api in vars(hook).values() if hasattr(api, "_calls")]
+
     def _calls_are_answered(self) -> bool:
         """Return whether no call of a test before is still on its way: it would look like one of the next test's."""
-        apis = [api for hook in self._hooks for api in vars(hook).values() if hasattr(api, "_calls")]
+        apis = self._apis(self._hooks)
         assert apis, "the hooks have no functional interface any more: look here"
         return not any(api._calls._calls for api in apis)
 

@@ -4,6 +4,11 @@ The functional layer lives in another world behind the bridge: a service may be 
 served by different threads. So calls wait in one queue, and the next is sent when the last got its response, or when it was sent
 long enough ago to have arrived: a response may take seconds (the guidance arms the vehicle first), and a call that stops the
 vehicle must not wait for it. A call without a response in time gets one from here, that is no refusal: nobody knows whether it arrived.
+
+What is waited for passes through discovery and the bridge, which know wall clock; simulated time does not wait for it in lockstep, and
+may run ahead. So all three limits count one clock, the slower one of mission and monotonic clock: on a robot those are one, a slow machine
+refuses nothing, and a fast simulation waits for more of its own seconds. That makes a run longer, and a service that is away is missed
+later in it; who hears its response in time sees no difference.
 """
 
 from __future__ import annotations
@@ -86,7 +91,7 @@ def read_response(response: Any) -> Response:
 
 
 class CallQueue:
-    """Sends calls in order; thread-safe. ``now_s``: mission clock. ``tick`` is to be called several times a second of it."""
+    """Sends calls in order; thread-safe. ``now_s``: the slower clock. ``tick`` is to be called several times a second of it."""
 
     def __init__(self, now_s: Callable[[], float]) -> None:
         self._now_s = now_s

@@ -6,6 +6,7 @@ answer comes to a callback; reports are kept and passed on to listeners.
 
 from __future__ import annotations
 
+import time
 from collections.abc import Callable, Collection
 from typing import Any
 
@@ -18,7 +19,7 @@ from std_srvs.srv import SetBool, Trigger
 from uav_msgs.msg import GuidanceState, MappingState, Obstacle, VideoState
 from uav_msgs.srv import Command, SetHeadingReference, SetPositionReference, Stream, Takeoff
 
-from skillset_ros2 import QUIET, Watch
+from skillset_ros2 import QUIET, SlowerClock, Watch
 from uav_skills.calls import CallQueue, Reply, ignore_response
 
 WATCH_PERIOD_S = 0.1
@@ -38,16 +39,18 @@ class FunctionalPart:
 
     ``clock`` is what ``watch_of`` has made, where several parts of a node share it. ``now_s`` is mission clock without its jumps: when
     the clock itself did not come through for a while (the bridge was started again), nothing else came either, and what was not heard
-    meanwhile must not count as silent.
+    meanwhile must not count as silent. Watchers count it: the vehicle moves by it, so two seconds without a depth map are two seconds of
+    flight that nobody looks ahead, however slow the machine. Calls count the slower one of it and the monotonic clock ``steady_s``.
     """
 
-    def __init__(self, node: Node, clock: Watch | None = None) -> None:
+    def __init__(self, node: Node, clock: Watch | None = None, steady_s: Callable[[], float] = time.monotonic) -> None:
         self.now_s = 0.0
         self._node = node
         self._group = ReentrantCallbackGroup()
         self._clock = clock or watch_of(node)
         self._clock_s = self._clock.now_s
-        self._calls = CallQueue(lambda: self.now_s)
+        self._slower = SlowerClock(lambda: self.now_s, steady_s)
+        self._calls = CallQueue(lambda: self._slower.now_s)
         self._watchers: list[Callable[[], None]] = []
         self._clock.every(self._watch)
 
@@ -59,6 +62,7 @@ class FunctionalPart:
         clock_s = self._clock.now_s
         self.now_s += min(max(clock_s - self._clock_s, 0.0), LONGEST_STEP_S)
         self._clock_s = clock_s
+        self._slower.look()
         self._calls.tick()
         for watcher in self._watchers:
             watcher()
