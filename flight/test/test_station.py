@@ -387,6 +387,18 @@ def test_a_part_that_is_killed_is_started_again(kept, monkeypatch):
     assert (one.state.deaths, one.state.why.partition(":")[0]) == (1, "signal SIGKILL")
 
 
+def test_a_part_that_looks_dead_before_all_of_its_threads_are_tells_how_it_ended(kept, monkeypatch):
+    one = kept(sleeper())
+    one.look()
+    with monkeypatch.context() as looks_dead:
+        looks_dead.setattr(PartState, "process", None)
+        one.look()
+        assert one.state.deaths == 0
+        os.kill(one.state.pid, signal.SIGKILL)
+        turned(one, lambda: one.state.deaths, "its end is seen")
+    assert one.state.why.partition(":")[0] == "signal SIGKILL"
+
+
 def test_a_part_that_says_that_it_can_not_run_is_not_started_again_until_it_is_asked_for(kept):
     one = kept(Part("bridge", (sys.executable, "-c", "import sys; print('no such file'); sys.exit(2)"), os.environ))
     turned(one, lambda: one.state.state == states.REFUSED, "it is refused")

@@ -120,7 +120,7 @@ class Kept:
     def look(self) -> bool:
         """Start it where that is due, and note its end; tell whether something has changed."""
         before = (self.state.state, self.state.pid)
-        if self.state.pid and self.state.process is None:
+        if self.state.pid and self._has_ended():
             self._note_end()
         elif self.state.pid:
             if self.state.state == states.STARTING and time.monotonic() - self._begun_s >= LIVES_S:
@@ -152,6 +152,10 @@ class Kept:
         self._begun_s = time.monotonic()
         self.state.start = states.start_of(self._child.pid)
         log.info("%s is started, process %d", self.part.name, self._child.pid)
+
+    def _has_ended(self) -> bool:
+        # One that is killed looks dead before all of its threads are, which is when it tells how it ended.
+        return self.state.process is None if self._child is None else self._child.poll() is not None
 
     def _note_end(self) -> None:
         code = None if self._child is None else self._child.poll()
