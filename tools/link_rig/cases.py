@@ -29,6 +29,8 @@ LINK = ("link", "heartbeat", "silent")
 OFFSET_S = 0.5
 """So nearly is a clock's step of an hour told; the base's clock is right."""
 HOUR_S = 3600
+ON_A_LEG = ("to-base", "to-decision", "bad", "bridge", "managers", "mission")
+"""Cases of the rover that come to a flight, too."""
 Act = Callable[[TwoComputers, Mission], AbstractContextManager[None]]
 Phase = Callable[[TwoComputers, Mission], bool]
 
@@ -167,7 +169,7 @@ def _cuts_of_a_flight(robot: Robot) -> dict[str, Case]:
     }
 
 
-CASES: Mapping[str, Case] = {
+ROVERS: Mapping[str, Case] = {
     "slow": Case("nothing, with a base that takes five seconds for one", _nothing, 0.0, (), robot=SLOW_PATROL, stops=False),
     "cut-0.2": Case("link cut for 0.2 s", _cut, 0.2, LINK),
     "cut-5": Case("link cut for 5 s", _cut, 5.0, LINK),
@@ -195,6 +197,10 @@ CASES: Mapping[str, Case] = {
         )
         for name, by_s in (("back", -HOUR_S), ("ahead", HOUR_S))
     },
+}
+
+CASES: Mapping[str, Case] = {
+    **ROVERS,
     "mapping-reboot": Case(
         "mapping, on a leg: decision computer off for 10 s", _reboot, 10.0, ("no summary",), again=True, robot=MAPPING, phase=_on_a_leg
     ),
@@ -211,6 +217,12 @@ CASES: Mapping[str, Case] = {
     ),
     **_cuts_of_a_flight(MAPPING),
     **_cuts_of_a_flight(INSPECTION),
+    **{
+        f"mapping-{name}": replace(case, name=f"mapping, on a leg: {case.name}", robot=MAPPING, phase=_on_a_leg)
+        for name, case in ROVERS.items()
+        if name in ON_A_LEG
+    },
+    "mapping-leg-120": Case("mapping, on a leg: link cut for 120 s", _cut, 120.0, LINK, robot=MAPPING, phase=_on_a_leg),
 }
 
 
