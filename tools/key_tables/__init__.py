@@ -11,6 +11,7 @@ from pathlib import Path
 from alula.common import deployments, robot_page, robots
 from alula.common.generated import key_table, replaced, table
 from alula.common.keys import Key
+from ros_bridge import config_file, discovery_options
 
 ALULA_ROOT = Path(__file__).resolve().parents[2]
 COMMAND = "PYTHONPATH=tools setup/in_ros2 python -m key_tables"
@@ -43,7 +44,15 @@ def _deployment() -> Iterator[str]:
     yield from ("## Keys of the file", "", *key_table(flat))
 
 
+def _bridge() -> Iterator[str]:
+    routes = {key: config_file.KEYS[key] for key in (*config_file.NAMES, *config_file.TOPIC_KEYS, *config_file.SERVICE_KEYS)}
+    yield from ("## Keys of a route", "", *key_table(routes), "")
+    options = ((f"`{name}`", option.help) for name, option in discovery_options.OPTIONS.items())
+    yield from ("## Keys of `discover`", "", *table(("key", "what it does"), *options))
+
+
 PAGES: Mapping[str, Callable[[], Iterable[str]]] = {
     "docs/reference/robots.md": _robot,
     "docs/how-to/on-the-robot.md": _deployment,
+    "docs/reference/bridge.md": _bridge,
 }

@@ -8,6 +8,7 @@ from enum import Enum
 from pathlib import Path
 from typing import Any, TypeVar
 
+from alula.common.keys import Key
 from alula.common.located_yaml import Located, read_yaml
 from ros_bridge import config_values
 from ros_bridge.config import ActionRoute, BridgeConfig, Direction, Reliability, RosVersion, ServiceRoute, TopicRoute
@@ -44,6 +45,24 @@ RULE_KEYS: Mapping[str, Reader] = {
     "fields": config_values.mapping(config_values.field_path, config_values.field_path),
 }
 SECTIONS = ("topics", "services", "actions", "discover", "types")
+_TOPIC = TopicRoute("", "", Direction.ROS1_TO_ROS2, "")
+_SERVICE = ServiceRoute("", "", RosVersion.ROS1, "")
+KEYS: Mapping[str, Key] = {
+    "name": Key("of both worlds, absolute", "`ros1_name` and `ros2_name`"),
+    "ros1_name": Key("of ROS 1; parts of it may begin with a digit, which ROS 2 does not allow", "`name`"),
+    "ros2_name": Key("of ROS 2", "`name`"),
+    "direction": Key("of a topic: `ros1_to_ros2` or `ros2_to_ros1`", "needed"),
+    "server": Key("of a service or action: the world that the server is in, `ros1` or `ros2`", "needed"),
+    "type": Key("ROS 1's form, `package/Name`", "needed"),
+    "ros2_type": Key("ROS 2's type, where the rules do not have it", "by the rules"),
+    "latched": Key("ROS 1: latching; ROS 2: transient local, which the publisher has to be, too", str(_TOPIC.latched).lower()),
+    "depth": Key("bounds the queues on the way; the oldest message gives way", str(_TOPIC.depth)),
+    "reliability": Key("of the ROS 2 end; `best_effort` is needed for a publisher that offers no more", f"`{_TOPIC.reliability.value}`"),
+    "timeout_s": Key(
+        "wall clock; of a call with all its waiting; of an action, how long a goal waits for its answer", f"{_SERVICE.timeout_s:g}"
+    ),
+}
+"""What the manual says of the keys of routes (docs/reference/bridge.md)."""
 
 
 def load_config(paths: Iterable[Path], selection: Selection | None = None, namespace: str = "") -> BridgeConfig:

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import argparse
 from collections.abc import Iterable, Mapping
-from dataclasses import dataclass, field, fields, replace
+from dataclasses import dataclass, fields, replace
 from typing import Any
 
 from ros_bridge import config_values
@@ -15,11 +15,11 @@ from ros_bridge.selection import Selection
 
 @dataclass(frozen=True)
 class Option:
-    """How a value is read, and what argparse is told; an option without ``help`` is one of files only."""
+    """How a value is read, what it says, and what argparse is told; an option without ``argument`` is one of files only."""
 
     reader: Reader
-    help: str = ""
-    argument: Mapping[str, Any] = field(default_factory=dict)
+    help: str
+    argument: Mapping[str, Any] | None = None
 
 
 PATTERNS = {"action": "append", "metavar": "PATTERN"}
@@ -30,8 +30,11 @@ OPTIONS: Mapping[str, Option] = {
     "exclude": Option(config_values.patterns, "leave out names that match in either world", PATTERNS),
     "namespace1": Option(config_values.name, "put ROS 2's names below this one in ROS 1", NAME),
     "namespace2": Option(config_values.name, "put ROS 1's names below this one in ROS 2", NAME),
-    "rename": Option(config_values.mapping(config_values.ros1_name, config_values.name)),
-    "parameters": Option(config_values.flag),
+    "rename": Option(
+        config_values.mapping(config_values.ros1_name, config_values.name),
+        "ROS 1's name: ROS 2's, with all names below; wins over the namespaces",
+    ),
+    "parameters": Option(config_values.flag, "bridge ROS 1's parameters, as `all` does"),
 }
 """Each sets the field of ``Selection`` of its name; ``all`` and ``rename`` are made into fields by ``make_selection``."""
 READERS: Mapping[str, Reader] = {key: option.reader for key, option in OPTIONS.items()}
@@ -67,7 +70,7 @@ def below(namespace: str, selection: Selection) -> Selection:
 def add_arguments(parser: argparse.ArgumentParser) -> None:
     """Add the options of the command line."""
     for key, option in OPTIONS.items():
-        if option.help:
+        if option.argument is not None:
             parser.add_argument(f"--{key}", help=option.help, default=None, **option.argument)
 
 

@@ -8,7 +8,7 @@ import pytest
 
 from alula.language.robot import BridgedAction, BridgedService, BridgedTopic
 from ros_bridge.config import BridgeConfig, Direction, Reliability, RosVersion, ServiceRoute, TopicRoute
-from ros_bridge.config_file import SERVICE_KEYS, TOPIC_KEYS, load_config, read_config
+from ros_bridge.config_file import KEYS, SERVICE_KEYS, TOPIC_KEYS, load_config, read_config
 from ros_bridge.conversion import Types, ament_prefixes
 from ros_bridge.errors import ConfigError
 from ros_bridge.node import may_send_bulk
@@ -53,6 +53,7 @@ def test_reads_all_keys_and_defaults(parsed):
 
 
 def test_a_robots_bindings_have_the_keys_of_routes():
+    assert {*TOPIC_KEYS, *SERVICE_KEYS} == set(KEYS)
     assert {field.name for field in fields(BridgedTopic)} == set(TOPIC_KEYS)
     assert {field.name for field in fields(BridgedService)} == {field.name for field in fields(BridgedAction)} == set(SERVICE_KEYS)
 
