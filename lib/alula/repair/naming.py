@@ -20,6 +20,8 @@ _TIMES = {1: "one chance", 2: "two chances", 3: "three chances"}
 _WHERE = frozenset({"to", "into", "onto", "out", "around", "along", "through", "past", "behind", "up", "down", "back", "home", "there"})
 MOST_NAMED = 3
 """How many results of a skill are named side by side."""
+MOST_SHORT = 4
+"""Letters of a word that ends with an s, and still names one thing."""
 _OFTEN = {1: "once", 2: "twice", 3: "three times"}
 
 
@@ -88,7 +90,12 @@ def told_state(resource: str, *states: str, texts: Sequence[str] = ()) -> str:
     """
     words = [spelled(one, texts) for one in told_resource(resource).split()]
     either = listed((one if one == "OK" else one.lower().replace("_", " ") for one in states), "or")
-    return f"the {' '.join(words)} is {either}"
+    return f"the {' '.join(words)} {'are' if _several(words[-1]) else 'is'} {either}"
+
+
+def _several(word: str) -> bool:
+    """Return whether a word names several things: ``visitors``, but not ``chassis``, ``GPS`` or ``lens``."""
+    return len(word) > MOST_SHORT and word.endswith("s") and not word.endswith(("ss", "us", "is"))
 
 
 def told_resource(resource: str) -> str:

@@ -103,6 +103,9 @@ def test_one_word_alone_takes_the_place_of_another(old: str, new: str, text: str
         ("power.charger", "ON", "the charger is on"),
         ("perception.laser", "OK", "the laser is OK"),
         ("navigation.SDK_authority", "NOT_OURS", "the SDK authority is not ours"),
+        ("people.visitors", "LAGGING", "the visitors are lagging"),
+        ("base.chassis", "HOT", "the chassis is hot"),
+        ("base.gps", "LOST", "the gps is lost"),
     ],
 )
 def test_a_state_is_told_as_a_person_tells_it(resource: str, state: str, told: str) -> None:
