@@ -41,6 +41,8 @@ ARRIVALS = frozenset({Happens.START, Happens.REFUSE, Happens.INTERRUPT})
 TIME, PROGRESS = "time", "the progress of "
 """How the search asks whether a time is over, and whether the progress of a skill is large enough."""
 SECOND_NS = 1e9
+MOST_KNOWN = 1 << 14
+"""Situations of which it is kept what the system can do there."""
 
 
 class Place(NamedTuple):
@@ -82,6 +84,9 @@ class MissionSteps:
         self._states = {pair for several in brought.values() for pair in several}
         self._at_first = frozenset(at_first)
         self._actions = actions(system.nodes)
+        self._moves = lru_cache(maxsize=MOST_KNOWN)(lambda state: tuple(system.steps(state)))
+        """What the system can do in a situation: it is the same whichever faults are there, and asked for by each of them."""
+        self._never_comes = lru_cache(maxsize=MOST_KNOWN)(self._never)
 
     def initial(self) -> list[Place]:
         """Return the situation at power-up."""
@@ -124,7 +129,7 @@ class MissionSteps:
 
     def chosen(self, before: Place, after: Place) -> tuple[str, ...]:
         """Return, in words, what a tick that leads from one situation to another took a value for that nobody knows."""
-        steps = self._system.steps(before.state)
+        steps = self._moves(before.state)
         event = next((event for event, there in steps if event.kind is Happens.TICK and there == after.state), None)
         return () if event is None else tuple(words for one in _waited(event.choices)[1] if (words := choice(one)))
 
@@ -138,17 +143,17 @@ class MissionSteps:
             return
         begun = self._system.started(state.state)
         for step in self._all_steps(state):
-            if (begun or step.kind not in {Kind.FAULT, Kind.WAIT}) and not self._never(step):
+            if (begun or step.kind not in {Kind.FAULT, Kind.WAIT}) and not self._never_comes(step.kind, step.name, step.result):
                 yield step
 
-    def _never(self, step: Step[Place]) -> bool:
-        if step.kind is Kind.FAULT:
-            figures = self._figures.fault(step.name)
+    def _never(self, kind: Kind, name: str, result: str) -> bool:
+        if kind is Kind.FAULT:
+            figures = self._figures.fault(name)
             return figures.rate == NEVER and not figures.chances
-        return step.kind is Kind.END and self._figures.skill(step.name).fails.get(step.result) == NEVER
+        return kind is Kind.END and self._figures.skill(name).fails.get(result) == NEVER
 
     def _all_steps(self, state: Place) -> Iterator[Step[Place]]:
-        steps = list(self._system.steps(state.state))
+        steps = self._moves(state.state)
         if state.coming:
             yield from self._strikes(state, steps)
             return
@@ -229,7 +234,7 @@ class MissionSteps:
     def _with_brought(self, skill: str, state: State) -> State:
         """Return a situation with what a success of the skill brings about, or achieves, where the models have a transition for it."""
         for resource, wanted in (*self._brought.get(skill, ()), *self._achieved.get(skill, ())):
-            found = [after for event, after in self._system.steps(state) if _is_extern(event, resource, wanted)]
+            found = [after for event, after in self._moves(state) if _is_extern(event, resource, wanted)]
             state = found[0] if found else state
         return state
 

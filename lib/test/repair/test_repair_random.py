@@ -5,6 +5,7 @@ from __future__ import annotations
 import random
 from collections import Counter
 from collections.abc import Iterator, Mapping
+from itertools import permutations
 from pathlib import Path
 
 import pytest
@@ -22,6 +23,7 @@ from alula.prove.limits import Deadline
 from alula.prove.mission.wanted import PROPERTY
 from alula.repair.errors import RepairError
 from alula.repair.game import played
+from alula.repair.judging import Judge
 from alula.repair.repairing import Answer, Question, Search
 from alula.repair.subject import Subject
 
@@ -135,6 +137,18 @@ def test_twenty_more_do(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None
         told += attacked(seed, tmp_path / str(seed), monkeypatch, range(6))
     assert told["repaired"] >= 4
     assert told["impossible"] >= 4
+
+
+@pytest.mark.parametrize("seed", QUICK)
+def test_what_becomes_of_a_mission_does_not_hang_on_the_faults_that_were_looked_at_before(
+    seed: int, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setenv("ALULA_ROBOT", str(tmp_path))
+    subject = Subject.read(robot_of(random.Random(seed), tmp_path), quiet)  # noqa: S311 - for tests
+    judge, text = Judge(subject, Deadline.after(TIME_S, quiet)), subject.path.read_text()
+    of_all = judge.fates(text)
+    for faults in [(), *((one,) for one in subject.faults), *permutations(subject.faults, 2)]:
+        assert of_all(faults, None) == judge.fate(text, faults)
 
 
 @pytest.mark.parametrize("seed", QUICK)
