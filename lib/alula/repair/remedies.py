@@ -152,7 +152,8 @@ class Remedies:
             name = f"{plain(failing.skill)} has failed"
             after = [node("Script", name="it may go on", code=f"{entry} := ''")]
         words = f"{plain(course.steps[-1].name)} and go on"
-        top = node("Sequence", *opening(condition, name, "@degraded := true"), *steps, *after, name=words)
+        *asked, degraded = opening(condition, name, "@degraded := true")
+        top = node("Sequence", *asked, *steps, degraded, *after, name=words)
         use = node("SubTree", ID=self._tree(words), name=words, _autoremap="true")
         return Branch(use, top, place.wiring.element.place, _why(failing, course, steps, "then on with the work"))
 
@@ -161,7 +162,7 @@ class Remedies:
         element = place.wiring.element
         last = course.steps[-1]
         words = plain(last.name)
-        top = node("Sequence", *opening("", "", "@degraded := true"), *steps, name=words)
+        top = node("Sequence", *steps, *opening("", "", "@degraded := true"), name=words)
         use = node("SubTree", ID=self._tree(words), name=words, _autoremap="true")
         name = f"{node_name(element)}, or {words} first"
         fallback = node("Fallback", node(HOLE, name=node_name(element)), node("ForceFailure", use, name="then again"), name=name)

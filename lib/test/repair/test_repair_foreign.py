@@ -17,6 +17,7 @@ pytest.importorskip("py_trees")
 from repair_worlds import GOOD
 
 from alula.common.faults import FaultRequest
+from alula.missions.director import Outcome
 from alula.missions.mission_file import plan_of_file
 from alula.missions.mocked import MockedMission
 from alula.missions.part import NO_PART
@@ -223,3 +224,20 @@ def test_a_recovery_that_was_deleted_is_written_again(
     assert mended
     assert all(run[-1] in {"nav.follow_path", "guide.explain"} for run in runs)
     assert max(run.count(skills[-1]) for run in mended) == strikes
+
+
+@pytest.mark.parametrize(("called", "outcome"), [("CALLED", Outcome.DEGRADED), ("NOBODY", Outcome.ACCOMPLISHED)])
+def test_a_mission_is_degraded_only_where_the_recovery_has_succeeded(
+    called: str, outcome: Outcome, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """Where it fails, but the visitors come again by themselves, the tour is the one that was planned."""
+    subject, answer = repaired(GUIDE, "lagging", 1, tmp_path, monkeypatch)
+    assert answer.repair is not None
+    path, mocks = subject.path.with_name("flown.xml"), tmp_path / "skillsets/mock.yaml"
+    path.write_text(answer.repair.text)
+    mocks.write_text(mocks.read_text().replace("result: CALLED", f"result: {called}"))
+    plan = plan_of_file(path, "main", subject.skillsets, {}, NO_PART)
+    faults = [FaultRequest("lagging", begin_s=1.0)]
+    mission = MockedMission(subject.skillsets, load_behaviour([mocks], subject.skillsets), plan, faults=faults, limit_s=300.0)
+    assert mission.run().outcome == outcome
+    assert "guide.turn_and_call" in [f"{one.skillset}.{one.skill}" for one in mission.ended]
