@@ -87,6 +87,32 @@ def test_a_page_is_no_longer_than_it_may_be(name: str) -> None:
     assert (ALULA_ROOT / name).stat().st_size <= limit
 
 
+WRITTEN = "<!-- Below this line"
+MOST_COLUMNS = 120
+UNFOLDED = ("|", "#", "!", "<", "    ")
+"""Tables, headings, pictures, comments and code have one line each."""
+
+
+def too_long(text: str) -> list[int]:
+    """Return the numbers of the lines, written by hand and to be folded, that are longer than an editor beside another one shows."""
+    fenced, found = False, []
+    for number, line in enumerate(text.partition(WRITTEN)[0].splitlines(), start=1):
+        fenced ^= line.startswith("```")
+        if len(line) > MOST_COLUMNS and not fenced and not line.startswith(UNFOLDED):
+            found.append(number)
+    return found
+
+
+@pytest.mark.parametrize("name", [*NAMES, "CHANGELOG.md"])
+def test_lines_of_a_page_are_folded(name: str) -> None:
+    assert too_long((ALULA_ROOT / name).read_text(encoding="utf-8")) == []
+
+
+def test_a_line_that_is_not_folded_is_found() -> None:
+    long = "word " * 30
+    assert too_long(f"a\n{long}\n| {long}\n```\n{long}\n```\n- {long}\n{WRITTEN}: x -->\n{long}") == [2, 7]
+
+
 def test_the_pages_are_counted_apart_from_what_programs_write() -> None:
     page = size_of("a.md", "# A\n\nFor ü.\n\n<!-- Below this line: written by `x`. -->\n\nmore\n")
     assert (page.by_hand, page.generated) == (14, 48)
