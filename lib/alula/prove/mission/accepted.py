@@ -17,7 +17,7 @@ from alula.trees.errors import Place
 from alula.trees.node import Node
 
 DESCRIPTION = "_description"
-NEXT = r"\baccepted ALU7|\bproperty \w+:|\Z"
+NEXT = r"\baccepted ALU7|\bproperty\s+\w+\s*:|\Z"
 """Where what a description says for the search ends at the latest."""
 _ACCEPTED = re.compile(rf"\baccepted (?P<code>ALU7\d\d)(?: \((?P<words>[^)]*)\))?:(?P<reason>.*?)(?={NEXT})", re.DOTALL)
 

@@ -23,8 +23,10 @@ from alula.trees.document import Attribute
 from alula.trees.node import Node
 
 CODE = "ALU713"
-PROPERTY = re.compile(rf"\bproperty (?P<text>(?P<name>\w+):.*?)(?=;|{NEXT})", re.DOTALL)
+PROPERTY = re.compile(rf"\bproperty\s+(?P<text>(?P<name>\w+)\s*:.*?)(?=;|{NEXT})", re.DOTALL)
 """A property in a description; behind it may stand a semicolon."""
+ALMOST = re.compile(r"\bproperty\s+(?:(?!never\b|always\b|eventually\b)\w+\s+)?(?:never|always|eventually)\b")
+"""Reads like a property, and would be overlooked: the name or the colon behind it is missing."""
 OUTCOMES = tuple(one.value for one in Outcome if one is not Outcome.RUNNING)
 
 
@@ -43,8 +45,12 @@ def wanted(nodes: Sequence[Node], skillsets: Sequence[Skillset], faults: Collect
     names = {node.name for node in nodes}
     for node in nodes:
         attribute = node.wiring.element.attributes.get(DESCRIPTION)
-        for match in PROPERTY.finditer(attribute.value) if attribute else ():
-            assert attribute is not None  # noqa: S101 - it has a match
+        if attribute is None:
+            continue
+        for almost in ALMOST.finditer(attribute.value):
+            span = _span(attribute, almost.start(), Span("", 1, 1, 1 + len(almost[0])))
+            wrong.setdefault(span, _wrong(span, "a property has a name and a colon before what it says", HINT))
+        for match in PROPERTY.finditer(attribute.value):
             try:
                 one = _read(attribute, match["text"], match.start("text"))
                 _check(one, attribute, match.start("text"), {skillset.name: skillset for skillset in skillsets}, names, faults)

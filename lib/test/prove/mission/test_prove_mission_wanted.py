@@ -59,6 +59,8 @@ def about(found: Proved) -> list[Diagnostic]:
     ("wanted", "tree"),
     [
         ("property a: always drone.hover running => drone.axes == USED", TREE),
+        ("property  a : always drone.hover running => drone.axes == USED", TREE),
+        ("About a property that is always there", TREE),
         ("property a: never drone.lift running and drone.hover running", TREE),
         ("About it; property a: never drone.axes == FREE and drone.land running; accepted ALU702: so be it", TREE),
         ("property a: eventually outcome accomplished or outcome given_up assuming termination", TREE),
@@ -118,6 +120,8 @@ def test_what_does_not_hold_has_a_run_that_plays(wanted: str, tree: str, words: 
         ("property a: drone.control == OURS leads to outcome given_up within 0 ticks", "0", "a number of ticks from 1 to 1000"),
         ("property a: always drone.control == OURS or", "a: always", "found the end"),
         ("property a: always true; property a: never false", "a: always", "there are two properties `a`"),
+        ("property a  always drone.control == OURS", "property", "a property has a name and a colon"),
+        ("@property never drone.hover running", "property", "a property has a name and a colon"),
     ],
 )
 def test_a_bad_property_is_one_error_with_place_and_cure(wanted: str, at: str, message: str, tmp_path: Path) -> None:
