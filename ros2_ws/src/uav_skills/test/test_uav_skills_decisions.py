@@ -117,7 +117,7 @@ def test_a_reference_that_was_dropped_is_not_ours_although_it_keeps_its_id():
 
 def test_silence_and_time():
     assert decisions.decide_watch(2.0, "ZED") is None
-    assert decisions.decide_watch(2.1, "ZED") == SkillEnd("LOST", "no obstacle message of the ZED for 2.1 s")
+    assert decisions.decide_watch(2.1, "ZED") == SkillEnd("LOST", f"no obstacle message of the ZED for 2.1 s: {decisions.UNHEARD}")
     assert decisions.decide_stream(1.0, told_idle=True) is None
     assert decisions.decide_stream(1.1, told_idle=False) == SkillEnd(
         "LOST", f"nothing was heard of the video encoder for 1.1 s: {decisions.UNHEARD}"

@@ -123,7 +123,7 @@ def decide_watch(silent_s: float, source: str, limits: Thresholds = DEFAULT_THRE
     """End a depth map whose obstacle messages stopped; ``silent_s`` counts from the start until there was one."""
     if silent_s <= limits.silence_s:
         return None
-    return SkillEnd("LOST", f"no obstacle message of the {source} for {silent_s:.1f} s")
+    return SkillEnd("LOST", f"no obstacle message of the {source} for {silent_s:.1f} s: {UNHEARD}")
 
 
 def decide_stream(silent_s: float, *, told_idle: bool, limits: Thresholds = DEFAULT_THRESHOLDS) -> SkillEnd | None:
