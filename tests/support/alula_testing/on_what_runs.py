@@ -12,6 +12,7 @@ from pathlib import Path
 from typing import Any
 
 import psutil
+import pytest
 
 from alula.common.network import claim_domain, free_port
 from alula.common.processes import end_run, node_name, processes_of_run
@@ -57,8 +58,10 @@ def fly_on_what_runs(robot: Path, run: Run, environment: dict[str, str]) -> None
             assert base.poll() is None
             assert status(run)["master_problem"] == ""
         finally:
-            if state.exists():
-                end_run(json.loads(state.read_text(encoding="utf-8"))["run_id"])
+            if state.exists():  # keeper and page first, which do not carry the run's id
+                left = json.loads(state.read_text(encoding="utf-8"))["run_id"]
+                run("alula down robot || true")
+                end_run(left)
             os.killpg(base.pid, signal.SIGINT)
             base.wait(END_S)
 
@@ -110,9 +113,16 @@ def _a_mission_dies(robot: Path, run: Run) -> None:
     with ThreadPoolExecutor(1) as pool:
         flown = pool.submit(run, "alula run patrol --on robot --out runs/killed 2>&1 || true")
         record = folder / FILE
-        drives = lambda: any(one.topic == EVENTS and one.value.get("state") == "RUNNING" for one in follower.poll())  # noqa: E731
-        until(record.exists, "the mission writes its record", every_s=0.1)
+
+        def ended() -> bool:
+            return flown.done() and pytest.fail(f"it has ended without a drive: {flown.result()}")
+
+        until(lambda: record.exists() or ended(), "the mission writes its record", every_s=0.1)
         follower = RecordFollower(record)
+
+        def drives() -> bool:
+            return any(one.topic == EVENTS and one.value.get("state") == "RUNNING" for one in follower.poll()) or ended()
+
         until(drives, "it drives", every_s=0.1)
         run_id = json.loads((folder / "run.json").read_text(encoding="utf-8"))["run_id"]
         (mission,) = [one for one in processes_of_run(run_id) if node_name(one) == "mission"]
