@@ -70,8 +70,7 @@ def _two_missions(robot: Path, run: Run) -> None:
     run("alula up robot")
     begun = processes(run)
     assert tuple(begun) == PARTS
-    known = {"wheels": "FREE", "bumper": "CLEAR", "link": "UP"}
-    until(lambda: json.loads(run("alula skills --json"))["resources"] == known, "the base tells its resources, and hears the managers")
+    until(lambda: knows_the_base(run), "the base reports its resources, and receives the managers' heartbeat")
     stamps = []
     for name in ("first", "second"):
         assert "mission accomplished\n" in run(f"alula run patrol --on robot --out runs/{name}")
@@ -89,7 +88,7 @@ def _two_missions(robot: Path, run: Run) -> None:
     (robot / hooks).write_text(f"{(robot / hooks).read_text(encoding='utf-8')}\n# Tuned on the robot.\n", encoding="utf-8")
     assert f"managers is started again, changed: {hooks}\n" in run("alula up robot 2>&1")
     assert [name for name, pid in processes(run).items() if pid != begun[name]] == ["managers"]
-    until(lambda: json.loads(run("alula skills --json"))["resources"] == known, "the new managers know the resources")
+    until(lambda: knows_the_base(run), "the new managers know the resources")
 
 
 def _deaths(robot: Path, run: Run) -> None:
@@ -105,6 +104,7 @@ def _deaths(robot: Path, run: Run) -> None:
     run("alula up robot --restart recorder")
     after = processes(run)
     assert [name for name in PARTS if after[name] != before[name]] == ["recorder"]
+    until(lambda: knows_the_base(run), "the managers that were started again know the resources")
 
 
 def _a_mission_dies(robot: Path, run: Run) -> None:
@@ -141,6 +141,11 @@ def lives(pid: int) -> bool:
         return bool(psutil.Process(pid).status() != psutil.STATUS_ZOMBIE)
     except psutil.NoSuchProcess:
         return False
+
+
+def knows_the_base(run: Run) -> bool:
+    """Return whether the managers know what the base reports, and the base receives their heartbeat."""
+    return bool(json.loads(run("alula skills --json"))["resources"] == {"wheels": "FREE", "bumper": "CLEAR", "link": "UP"})
 
 
 def status(run: Run) -> dict[str, Any]:
