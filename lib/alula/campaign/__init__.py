@@ -1,1 +1,1 @@
-"""Does a campaign: many runs with faults, over mocks or in the simulator, and what became of each failure."""
+"""Campaigns: many runs with faults, over mocks or in the simulator, and the response of the mission to each failure."""

@@ -71,7 +71,7 @@ class Beside:
 
     @property
     def asked(self) -> Counter[str]:
-        """What was asked for, in words, and how often."""
+        """The skills requested, in words, each with its count."""
         return self._counted((words_of(self.place, one.asked), one) for one in self.flown)
 
     @property
@@ -86,7 +86,7 @@ class Beside:
 
     @property
     def can_ask(self) -> list[str]:
-        """What the tree can ask for, in words."""
+        """The reactions that the tree can show, in words."""
         can = {words_of(self.place, one) for one in self.proved.asked} if self.proved else set()
         return sorted(can, key=lambda words: (words == NOTHING, words))
 
@@ -98,7 +98,7 @@ class Beside:
         return counted
 
     def as_dict(self) -> dict[str, object]:
-        """Return the row as ``coverage.json`` has it."""
+        """Return the row in the form of ``coverage.json``."""
         one = self.proved
         can = {"asks": self.can_ask, "outcomes": sorted(one.outcomes), "ends": list(one.ends), "faults": list(one.faults)} if one else None
         did = {"times": self.times, "asks": dict(self.asked), "outcomes": dict(self.outcomes), "faults": dict(self.faults)}
@@ -108,7 +108,7 @@ class Beside:
 
 @dataclass(frozen=True)
 class MissionAnswers:
-    """The answers of a scenario's mission, side by side; ``unproved``: why the proof does not know all."""
+    """The proved and flown reactions of a scenario's mission; ``unproved``: why the proof is incomplete."""
 
     scenario: str
     rows: Sequence[Beside]
@@ -121,12 +121,12 @@ class MissionAnswers:
 
     @property
     def unknown(self) -> list[str]:
-        """Each flown answer that the proof does not know, in a line; nothing where the proof is not whole."""
+        """Each flown reaction that the proof does not have, one line each; empty where the proof is incomplete."""
         wrong = [(row, one) for row in self.rows for one in row.flown if not one.known]
         return [] if self.unproved else [_line(self.scenario, row, one) for row, one in wrong]
 
     def as_dict(self) -> dict[str, object]:
-        """Return it as ``coverage.json`` has it."""
+        """Return the comparison in the form of ``coverage.json``."""
         rows = [row.as_dict() for row in self.rows]
         return {"scenario": self.scenario, "unproved": self.unproved, "unknown": self.unknown, "rows": rows}
 
@@ -163,7 +163,7 @@ def _leaf(place: Path, places: Iterable[Path]) -> str:
 
 
 def words_of(failed: Path, asked: Asked) -> str:
-    """Return what is asked for in words: the branch of the tree that takes over, and the leaves."""
+    """Return a reaction in words: the branch of the tree that takes over, and the leaves whose skills it requests."""
     if not asked:
         return NOTHING
     first = min(asked)

@@ -26,7 +26,7 @@ _INCLUDED = re.compile(r"\$\(find (\w+)\)/launch/([\w.]+\.launch)")
 
 @dataclass
 class Cover:
-    """The runs with one way to fail. ``responses`` counts the branches of the tree that took over; clearance is of whole runs."""
+    """The runs in which one way to fail occurred. ``responses`` counts the branches that took over; clearances are those of whole runs."""
 
     way: Way
     responses: Counter[str] = field(default_factory=Counter)
@@ -40,7 +40,7 @@ class Cover:
         return self.responses.total()
 
     def as_dict(self) -> dict[str, object]:
-        """Return the row as ``coverage.json`` has it: recovery in seconds, clearance in metres."""
+        """Return the row in the form of ``coverage.json``: recovery in seconds, clearance in metres."""
         found = {"kind": self.way.kind, "name": self.way.name, "times": self.times, "answers": dict(self.responses.most_common())}
         worst = {"worst_recovery_s": self.worst_after_s, "worst_clearance_m": self.worst_clearance_m}
         return {**found, "outcomes": dict(self.outcomes.most_common()), **worst}
@@ -48,7 +48,7 @@ class Cover:
 
 @dataclass(frozen=True)
 class Coverage:
-    """The matrix and the runs that it is of."""
+    """The coverage matrix, and the runs that it summarizes."""
 
     covers: Sequence[Cover]
     runs: int
@@ -63,7 +63,7 @@ class Coverage:
 
     @property
     def unknown(self) -> list[str]:
-        """Each flown answer that the proof of its mission does not know, in a line."""
+        """Each flown reaction that the proof of its mission does not have, one line each."""
         return [line for mission in self.answers for line in mission.unknown]
 
     @property
@@ -72,7 +72,7 @@ class Coverage:
         return [cover.way for cover in self.covers if not cover.times]
 
     def as_dict(self) -> dict[str, object]:
-        """Return the whole matrix as ``coverage.json`` has it."""
+        """Return the whole matrix in the form of ``coverage.json``."""
         tried = [cover.as_dict() for cover in self.covers if cover.times]
         never = [vars(way) for way in self.never]
         answers = [mission.as_dict() for mission in self.answers]
@@ -106,7 +106,7 @@ def cover(rows: Iterable[Row], ways: Iterable[Way], answers: Sequence[MissionAns
 
 
 def is_troubled(row: Row) -> bool:
-    """Return whether something is wrong with a run, whatever failed in it."""
+    """Return whether a run has a defect that no failure excuses: unfinished, open executions, collision, wrong exit code, and the like."""
     unfinished = row["outcome"] in {"not_started", "running", None}
     wrong = row["open"] or row["collisions"] or row["landed"] is False or row["problems"]
     return bool(unfinished or wrong or not row["conforms"] or row["exit_code"] not in {None, CODE_OF.get(str(row["outcome"]))})
@@ -123,13 +123,13 @@ def _count(one: Cover, row: Row, response: str, after_s: float | None) -> None:
 
 
 def processes(scenarios: Iterable[Scenario]) -> list[str]:
-    """Return the names of the processes of a run, as the launch files start them; the recorder is none of the robot's."""
+    """Return the names of the processes of a run, as the launch files start them, without the recorder."""
     nodes = (node.get("name", "") for file in launch_files(scenarios) for node in ET.parse(file).iter("node"))  # noqa: S314 - our own
     return sorted({name for name in nodes if name and name != "record" and "$" not in name})
 
 
 def launch_files(scenarios: Iterable[Scenario]) -> list[Path]:
-    """Return the launch files of scenarios, and those that they include, as far as they are the robot's or the installation's."""
+    """Return the launch files of scenarios and those that they include, from the packages of the robot and of the installation."""
     installed = [Path(os.environ["ALULA_ROOT"]) / "ros1_ws/src"] if "ALULA_ROOT" in os.environ else []
     places = [*find_robot().ros1.packages, *installed]
     named = [(package, file) for package, _, file in (scenario.launch.partition("/") for scenario in scenarios)]

@@ -56,7 +56,7 @@ class Draw:
     lasts_s: tuple[float, float] | None
 
     def runs(self, scenarios: Sequence[str], count: int, seed: int) -> Iterator[DrawnRun]:
-        """Draw so many runs, the scenarios one after another; more runs leave the first ones as they were."""
+        """Yield ``count`` drawn runs, one scenario after another; a greater ``count`` does not change the first ones."""
         turns = Counter[str]()
         for number in range(count):
             chance = random.Random(f"{seed} {number}")  # noqa: S311 - nothing here is secret

@@ -1,6 +1,6 @@
 """How the tree of a flown mission reacted to each failure: the skills that it requested next, and what else ran at that moment.
 
-This is what the proof tells of all runs (``alula.prove.mission.answers``), of one: by ticks, not by the managers' events.
+This is what the proof states of all runs (``alula.prove.mission.answers``), of one: by ticks, not by the managers' events.
 """
 
 from __future__ import annotations
@@ -40,12 +40,12 @@ class FlownAnswer:
     asked: tuple[Path, ...]
 
     def as_dict(self) -> dict[str, object]:
-        """Return it as a table's row has it."""
+        """Return the reaction as plain values for a row of the table."""
         return asdict(self)
 
     @classmethod
     def read(cls, row: Mapping[str, Any]) -> FlownAnswer:
-        """Return what a table's row has."""
+        """Return the reaction that a row of the table holds."""
         texts = {name: str(row[name]) for name in ("id", "skill", "state", "result")}
         asked = tuple(tuple(place) for place in row["asked"])
         return cls(**texts, place=tuple(row["place"]), moment=tuple(row["moment"]), asked=asked)
@@ -83,13 +83,13 @@ class Ticks:
             self._ticks[-1].asked.append(execution_id)
 
     def report(self, skillset: str, handle: SkillHandle) -> None:
-        """Ignore it: the leaf's status is what the tree sees of it."""
+        """Ignore a report of a skill: the tree sees only the status of its leaf."""
 
     def sample(self, skillset: str, data: str, value: object, stamp_ns: int | None) -> None:
-        """Take no notice."""
+        """Ignore a sample of data."""
 
     def answers(self, places: Mapping[str, Path]) -> list[FlownAnswer]:
-        """Return the answers in the order of time; ``places`` says where executions were asked for, by their id."""
+        """Return the reactions in the order of time; ``places`` maps the IDs of executions to the leaves that requested them."""
         found: list[FlownAnswer] = []
         asked: tuple[Path, ...] = ()
         for tick in reversed(self._ticks):

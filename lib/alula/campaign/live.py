@@ -16,9 +16,9 @@ MOST_TRIES = 1000
 
 
 def run_live(planned: PlannedRun, options: Sequence[str], out: Path) -> tuple[Path, subprocess.CompletedProcess[str]]:
-    """Run to the end; return the run's folder, in the campaign's folder ``out``, and what the command said.
+    """Run to the end; return the run's folder, below the campaign's folder ``out``, and the completed command with its output.
 
-    A worker that dies takes the run with it: the kernel tells the run, which brings the robot to rest and ends.
+    A worker that dies takes the run with it: the kernel signals the run, which brings the robot to rest and ends.
     """
     folder = out / _name(planned)
     for number in range(2, MOST_TRIES):  # one that a crash has left half done stays as it is
@@ -37,7 +37,7 @@ def run_live(planned: PlannedRun, options: Sequence[str], out: Path) -> tuple[Pa
 
 
 def words_of_run(planned: PlannedRun) -> list[str]:
-    """Return the command line of a run but for the robot's own options, so that it can be done again alone."""
+    """Return the command line that repeats a run alone, without the robot's own options."""
     words = [entry(), "run", planned.scenario, "--seed", str(planned.seed)]
     if planned.world is not None:
         words += ["--world", str(planned.world.absolute())]

@@ -37,7 +37,7 @@ class PlannedRun:
 
 @dataclass(frozen=True)
 class Campaign:
-    """Runs, numbered from 0, and over what they are.
+    """A campaign: its runs, numbered from 0, and what they run over.
 
     ``options`` are the robot's own of a live run, by name, and ``limit_s`` is how long one may last, seconds of mission clock, 0: without a
     limit; ``at_once`` is how many at a time, None: one a core.

@@ -66,7 +66,7 @@ Key = tuple[Path, str, Path]
 
 @dataclass(frozen=True)
 class ProvedMission:
-    """The answers of a mission, by leaf, end and moment; ``unproved`` says why some, or all, are not known."""
+    """The proved reactions of a mission, by leaf, end and moment; ``unproved``: why some, or all, are missing."""
 
     answers: Mapping[Key, ProvedAnswer] = field(default_factory=dict)
     unproved: str = ""
@@ -74,7 +74,7 @@ class ProvedMission:
     """As what the tree sees each end of a leaf."""
 
     def key(self, place: Path, end: End, moment: Path) -> Key:
-        """Return what the answer to a failure is found by."""
+        """Return the key under which the reaction to a failure is stored."""
         return place, self.seen.get((place, end), end[1] or end[0]), moment
 
 

@@ -36,7 +36,7 @@ OBEYED = "the operator's act"
 
 
 def rows_of(runs: Sequence[PlannedRun], over: str, behaviour: tuple[str, ...], out: str, options: tuple[str, ...] = ()) -> list[Row]:
-    """Run one after another; return a row each. Runs in the simulator leave their folders in ``out``, the campaign's folder."""
+    """Do runs one after another; return one row of the table for each. Live runs leave their folders in the campaign's folder ``out``."""
     if over == SIMULATOR:
         return [_simulated(planned, options, Path(out)) for planned in runs]
     return [_mocked(planned, behaviour) for planned in runs]

@@ -39,7 +39,7 @@ Progress = Callable[[int], None]
 def run(
     campaign: Campaign, table: Table, out: Path, progress: Progress, options: tuple[str, ...] = (), dask: str | None = None
 ) -> list[int]:
-    """Do what is missing in the table; ``options`` are words of the command lines of live runs.
+    """Do the runs that the table lacks; ``options`` are words of the command lines of live runs.
 
     A worker that dies loses only the run that it did: others do again what it had, and what it had as the next.
 

@@ -26,7 +26,7 @@ Row = Mapping[str, Any]
 
 
 class Table:
-    """The rows in a folder. What a crash has cut off is done again.
+    """The table in a campaign's folder, one row for each run. A row that a crash cut off is done again.
 
     Raises:
         AnalysisError: the folder has another campaign in it, one is being done there, or it can't be used.

@@ -31,7 +31,7 @@ _ALL_KNOWN = "Each flown answer is one of the proved ones."
 
 
 def counted(names: Mapping[str, int]) -> str:
-    """Return ``12 navigation.hover, 3 no skill``."""
+    """Return names with their counts, as ``12 navigation.hover, 3 no skill``."""
     return ", ".join(f"{times} {name}" for name, times in names.items())
 
 
@@ -85,7 +85,7 @@ def _ends(row: Beside) -> str:
 
 
 def as_page(coverage: Coverage, title: str) -> str:
-    """Return a page that needs nothing else."""
+    """Return the matrix as one page of HTML that needs no other file."""
     most = max((cover.times for cover in coverage.covers), default=1) or 1
     head = "".join(f"<th{' class=n' if name == 'times' else ''}>{name}</th>" for name in _HEAD)
     rows = [_row(cover, most) for cover in coverage.covers if cover.times]
