@@ -36,7 +36,7 @@ _WORLD = re.compile(r"[^\x00-\x1f-][^\x00-\x1f]{0,300}")
 
 @dataclass(frozen=True)
 class WantedRun:
-    """A run that is asked for. ``world``: a name or a file, empty for the scenario's; ``options``: the robot's own, by name."""
+    """A run that the operator requests. ``world``: a name or a file, empty for the scenario's; ``options``: the robot's own, by name."""
 
     scenario: str
     seed: int
@@ -60,10 +60,10 @@ def world_names() -> list[str]:
 
 
 def read_wanted(asked: Mapping[str, object], known: Sequence[RunOption]) -> WantedRun:
-    """Return the run that a request describes; ``known`` are the robot's own options. What their values are worth, `alula run` tells.
+    """Return the run that a request describes; ``known`` are the robot's own options, whose values `alula run` checks.
 
     Raises:
-        ActError: the request makes no sense.
+        ActError: the request is malformed.
     """
     scenario, seed = asked.get("scenario"), asked.get("seed", 0)
     if scenario not in scenario_names():
@@ -134,7 +134,7 @@ def start(wanted: WantedRun) -> Path:
     """Start a run and return its folder, as soon as that is there.
 
     The run is a process of its own that this one does not end: a vehicle in the air must not fall because a page's server ended. Only
-    one that has said nothing for SILENT_S and has not begun is ended: whoever is told that it has not started may start another one.
+    one that has printed nothing for SILENT_S and has not begun is ended: who sees that it has not started may start another one.
 
     Raises:
         ActError: it does not start; the message is its own.
@@ -161,7 +161,7 @@ def start(wanted: WantedRun) -> Path:
 
 
 def end(process: subprocess.Popen[bytes]) -> None:
-    """End what a page has started, with all that it has started itself."""
+    """End a process that a page has started, with all its children."""
     for one in (signal.SIGTERM, signal.SIGKILL):
         with contextlib.suppress(ProcessLookupError):
             os.killpg(process.pid, one)

@@ -61,11 +61,11 @@ class Admission:
 
     @property
     def cookie(self) -> str:
-        """Return the header that has a browser keep the token where no script and no other site gets at it."""
+        """Return the value of ``Set-Cookie`` with which a browser keeps the token where no script and no other site can read it."""
         return f"{self._name}={self.token}; Path=/; HttpOnly; SameSite=Strict{'; Secure' if self.tls else ''}"
 
     def may_command(self, peer: str) -> bool:
-        """Return whether a peer may do more than watch: without TLS the network could read the token of a peer that is elsewhere."""
+        """Return whether a peer may command, not only watch: without TLS, others on the network could read the token of a remote peer."""
         return self.tls is not None or is_loopback(peer)
 
     @property

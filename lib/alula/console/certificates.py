@@ -14,7 +14,7 @@ NAME = "console.pem"
 
 
 def server_context(certificate: Path, key: Path) -> ssl.SSLContext:
-    """Return what a server needs to speak TLS 1.2 and later.
+    """Return the context of a server that speaks TLS 1.2 and later.
 
     Raises:
         ValueError: the files can't be read, or do not belong together; the message names them.

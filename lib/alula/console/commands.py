@@ -36,7 +36,7 @@ Asked = Mapping[str, Any]
 
 
 class Commands:
-    """The acts by name. They wait for answers, so they are called in threads. ``name_of`` returns what viewers call a run."""
+    """The operator's commands by name. They block until they are answered: call them in threads. ``name_of`` names a run for viewers."""
 
     def __init__(self, link: Link, options: Callable[[], Sequence[RunOption]], name_of: Callable[[Path], str]) -> None:
         self._options = options
@@ -56,10 +56,10 @@ class Commands:
         }
 
     def do(self, command: str, asked: Asked, run: Path | None) -> Done:
-        """Do it; ``run`` is the one that the viewer sees.
+        """Execute a command; ``run`` is the one that the viewer sees.
 
         Raises:
-            ActError, NoRunError, OSError: it can't be done.
+            ActError, NoRunError, OSError: the command can't be executed.
         """
         if command not in self._acts:
             raise ActError(f"there is no command {command}")
@@ -70,7 +70,7 @@ class Commands:
         return self._controls.of(load_run(run))
 
     def keep(self, watched: set[Path], manual: set[Path]) -> None:
-        """Be connected to the missions of the runs that are watched, ahead of any command, and to no others.
+        """Connect to the missions of the watched runs, ahead of any command; close the connections to all others.
 
         Listen to no skillsets but those of the runs under manual control: listening costs.
         """

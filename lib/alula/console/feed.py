@@ -52,13 +52,13 @@ class Feed:
         return self._follower.problems
 
     async def follow(self) -> None:
-        """Read what comes, until cancelled; viewers that wait for ``changed`` hear of it."""
+        """Read new entries until cancelled; wake the viewers that wait for ``changed``."""
         while True:
             self.add(await asyncio.to_thread(self.read))
             await asyncio.sleep(0 if self._follower.behind else POLL_S)
 
     def read(self) -> list[tuple[str, float | None, str]]:
-        """Return what came since the last call: topic, seconds of mission clock, and the entry as JSON."""
+        """Return the entries since the last call: topic, seconds of mission clock, and the entry as JSON."""
         with meaning(self._robot):
             return [(topic, t_s, written((topic, t_s, value))) for topic, t_s, value in self._follower.poll(READ_ENTRIES)]
 
@@ -96,7 +96,7 @@ class Feed:
 
 
 def place_of(asked: Mapping[str, object]) -> Place:
-    """Return the place that a viewer says it is at; a new one where that makes no sense. Facts are sent again."""
+    """Return the place that a viewer reports; a new one where the report is malformed. Facts are sent again."""
     session, entries = asked.get("session"), asked.get("entries")
     if isinstance(session, str) and isinstance(entries, int) and not isinstance(entries, bool) and entries >= 0:
         return Place(session, entries)

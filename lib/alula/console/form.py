@@ -30,7 +30,7 @@ class FormError(ValueError):
 
 @dataclass(frozen=True)
 class Field:
-    """One input: ``kind`` as ROS names it (``float64``, ``geometry_msgs/Point``), ``said`` its unit and what the model says of it."""
+    """One input: ``kind`` as ROS names it (``float64``, ``geometry_msgs/Point``), ``said`` its unit and the model's comment."""
 
     name: str
     kind: str
@@ -39,7 +39,7 @@ class Field:
 
     @property
     def label(self) -> str:
-        """Name, type, and what is said of it."""
+        """Name, type, unit and comment."""
         return f"{self.name} ({self.kind}{f', {self.said}' if self.said else ''})"
 
 
@@ -78,7 +78,7 @@ def default_text(kind: str) -> str:
 
 
 def values(made: Sequence[Field], texts: Mapping[str, str]) -> dict[str, object]:
-    """Return the inputs that the texts mean; raise FormError naming the first that means none."""
+    """Return the inputs that the texts of the fields stand for; raise FormError naming the first invalid one."""
     return {field.name: value_of(field, texts[field.name].strip()) for field in made}
 
 

@@ -15,14 +15,14 @@ if TYPE_CHECKING:
 
 
 class ActError(Exception):
-    """What was asked for can't be done; the message says why."""
+    """A request can't be executed; the message has the reason."""
 
 
 class Closable(Protocol):
-    """What listens, or is connected, until it is closed."""
+    """A subscription or connection, open until it is closed."""
 
     def close(self) -> None:
-        """End it; what runs on the robot goes on running, and calls that wait for an answer end with an ActError."""
+        """Close it; what runs on the robot keeps running, and calls that wait for an answer raise ActError."""
         ...
 
 
@@ -30,11 +30,11 @@ class Mission(Closable, Protocol):
     """The mission of a run. Its methods wait for the answer and may be called from any thread; asking again changes nothing."""
 
     def abort(self) -> str:
-        """Have it stop; return what it answers. Raises ActError where it gives no answer."""
+        """Abort the mission; return its answer. Raises ActError where it does not answer."""
         ...
 
     def set_paused(self, *, paused: bool) -> str:
-        """Have it hold, or go on; return what it answers. Raises ActError where it refuses, or gives no answer."""
+        """Pause or resume the mission; return its answer. Raises ActError where it refuses, or does not answer."""
         ...
 
 
@@ -53,7 +53,7 @@ class Skillset(Protocol):
 
     @property
     def view(self) -> SkillsetView | None:
-        """What was received of it."""
+        """What was received from its managers."""
         ...
 
     def start(self, skill: str, inputs: dict[str, object]) -> SkillHandle:
@@ -62,11 +62,11 @@ class Skillset(Protocol):
 
 
 class Skillsets(Closable, Protocol):
-    """The skillsets of one run, listened to until it is closed."""
+    """The skillsets of one run, subscribed to until closed."""
 
     @property
     def watched(self) -> Sequence[Skillset]:
-        """Those that have described themselves."""
+        """The skillsets that have described themselves."""
         ...
 
     @property
@@ -84,11 +84,11 @@ class Link(Protocol):
     """How robots are reached: by their run. Both methods take up to a second; what they return is used many times."""
 
     def connect(self, run: Run) -> Mission:
-        """Return the mission there, which may come later, end, and come again. Raises ActError where nothing can be reached at all."""
+        """Return the mission of a run, which may come later, end, and come again. Raises ActError where nothing can be reached at all."""
         ...
 
     def listen(self, run: Run) -> Skillsets:
-        """Return the skillsets there. Raises ActError where nothing can be reached at all."""
+        """Return the skillsets of a run. Raises ActError where nothing can be reached at all."""
         ...
 
 

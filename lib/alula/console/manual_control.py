@@ -26,7 +26,7 @@ QUESTIONS = frozenset({"why"})
 
 
 class ManualControl:
-    """Starts, stops and questions skills of a run without its mission, until it is closed; all methods may be called from any thread."""
+    """Starts, stops and inspects skills of a run without its mission, until it is closed; all methods may be called from any thread."""
 
     def __init__(self, skillsets: Skillsets) -> None:
         self._skillsets = skillsets
@@ -40,7 +40,7 @@ class ManualControl:
         }
 
     def close(self) -> None:
-        """End listening; what runs goes on running."""
+        """Stop listening; skills that run keep running."""
         self._skillsets.close()
 
     # --- what is shown -------------------------------------------------------------------------------------------------
@@ -67,12 +67,12 @@ class ManualControl:
     # --- what is done --------------------------------------------------------------------------------------------------
 
     def do(self, asked: Mapping[str, Any]) -> tuple[str, str]:
-        """Do what is asked for: ``{act, root, skill, texts}`` or ``{act: "transition", root, resource, to}``.
+        """Execute a request: ``{act, root, skill, texts}`` or ``{act: "transition", root, resource, to}``.
 
         Waits for the managers' answer; returns what was done in words, and the answer.
 
         Raises:
-            ActError: it makes no sense, or the managers do not answer.
+            ActError: the request is malformed, or the managers do not answer.
         """
         act, root = asked.get("act"), asked.get("root")
         one = next((one for one in self._skillsets.watched if one.root == root), None)

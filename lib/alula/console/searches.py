@@ -28,7 +28,7 @@ _FAULT = re.compile(r"[a-z][A-Za-z0-9_]{0,60}")
 
 @dataclass(frozen=True)
 class Found:
-    """How far a search is.
+    """The progress of a search, and its answer.
 
     Attributes:
         says: the last line of its progress.

@@ -1,4 +1,4 @@
-"""What the panel shows of one skillset, from what was heard of it; no ROS, no screen."""
+"""What the panel shows of one skillset, from what was received of it; no ROS, no screen."""
 
 from __future__ import annotations
 
@@ -25,7 +25,7 @@ VALUE_WIDTH = 60
 class ResourceRow:
     """A resource; ``targets`` are the states that an extern transition leads to from here, ``every_target`` those from anywhere.
 
-    ``reason``: why it is in its state, as the functional layer or the managers have told; empty where they told nothing.
+    ``reason``: why it is in its state, as the functional layer or the managers reported it; empty where they reported nothing.
     """
 
     name: str
@@ -99,7 +99,7 @@ class SkillsetView:
     # --- what was heard ----------------------------------------------------------------------------------------------
 
     def heard_states(self, states: Mapping[str, str], reasons: Mapping[str, str]) -> None:
-        """Take the states of all resources, and why they are so, by name."""
+        """Store the states of all resources, and the reasons for them, by name."""
         with self._lock:
             self._states, self._reasons = dict(states), dict(reasons)
             self.version += 1
@@ -109,7 +109,7 @@ class SkillsetView:
         self.say(f"{event.stamp_ns / NANOSECONDS:.2f}  {_told(event)}")
 
     def heard_skills(self, skills: Mapping[str, SkillRecord]) -> None:
-        """Take what is known by skill."""
+        """Store the records of the skills, by name."""
         with self._lock:
             open_ones = [(name, one) for name, skill in skills.items() for one in skill.open]
             progress = {identifier: one.progress for identifier, one in self._running.items()}
@@ -119,20 +119,20 @@ class SkillsetView:
             self.version += 1
 
     def heard_progress(self, execution_id: str, progress: float) -> None:
-        """Take the progress (0 to 1) of an execution; that of one that is not known to run is ignored."""
+        """Store the progress (0 to 1) of an execution; ignore that of an execution that is not known to run."""
         with self._lock:
             if execution_id in self._running:
                 self._running[execution_id] = replace(self._running[execution_id], progress=progress)
                 self.version += 1
 
     def heard_data(self, name: str, *, value_json: str, stamp_ns: int, stale: bool) -> None:
-        """Take the managers' answer on a data of which something was received."""
+        """Store the managers' answer on a data of which something was received."""
         with self._lock:
             self._readings[name] = _Reading(value_json, stamp_ns, stale)
             self.version += 1
 
     def heard_heartbeat(self, *, alive: bool) -> None:
-        """Learn whether the managers can be called."""
+        """Store whether the managers can be called."""
         with self._lock:
             if alive == self.alive:
                 return
