@@ -1,4 +1,4 @@
-"""What may come next at a place, told by the words before it: the line may be broken, as it is while it is written."""
+"""What may come next at a place, from the words before it: the line may be broken, as it is while it is written."""
 
 from __future__ import annotations
 

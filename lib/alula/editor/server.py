@@ -1,6 +1,6 @@
 """`alula editor`: a language server over the standard streams, for editors.
 
-It tells the checker's findings on every change and the proofs' when a file is saved, completes, shows and renames names, finds where
+It publishes the checker's findings on every change and the proofs' when a file is saved, completes, shows and renames names, finds where
 they are defined and used, lists symbols, indents, and offers the hints of findings as changes. Of missions (*.xml) it does
 so with the trees of the whole folder, too.
 """
@@ -165,26 +165,26 @@ def _location(ls: SkillLanguageServer, span: Span) -> lsp.Location:
 
 @server.feature(lsp.TEXT_DOCUMENT_DID_OPEN)
 def did_open(ls: SkillLanguageServer, params: lsp.DidOpenTextDocumentParams) -> None:
-    """Tell what is wrong with a file that was opened."""
+    """Publish the findings of a file that was opened."""
     _publish(ls, params.text_document.uri)
 
 
 @server.feature(lsp.TEXT_DOCUMENT_DID_CHANGE)
 def did_change(ls: SkillLanguageServer, params: lsp.DidChangeTextDocumentParams) -> None:
-    """Tell what is wrong with a file that was changed."""
+    """Publish the findings of a file that was changed."""
     _publish(ls, params.text_document.uri)
 
 
 @server.feature(lsp.TEXT_DOCUMENT_DID_CLOSE)
 def did_close(ls: SkillLanguageServer, params: lsp.DidCloseTextDocumentParams) -> None:
-    """Take back what was told about a file."""
+    """Withdraw the findings of a file."""
     ls.text_document_publish_diagnostics(lsp.PublishDiagnosticsParams(uri=params.text_document.uri, diagnostics=[]))
 
 
 @server.feature(lsp.TEXT_DOCUMENT_DID_SAVE)
 @server.thread()
 def did_save(ls: SkillLanguageServer, params: lsp.DidSaveTextDocumentParams) -> None:
-    """Prove a file that was saved; tell what was found if it has not changed meanwhile."""
+    """Prove a file that was saved; publish the findings unless it has changed meanwhile."""
     # The solvers are loaded only for a proof.
     from alula.prove.skillset.prover import prove
 
@@ -360,7 +360,7 @@ _DECLARE = re.compile(r"declare it with `(type \w+)`")
 
 @server.feature(lsp.TEXT_DOCUMENT_CODE_ACTION, lsp.CodeActionOptions(code_action_kinds=[lsp.CodeActionKind.QuickFix]))
 def code_actions(ls: SkillLanguageServer, params: lsp.CodeActionParams) -> list[lsp.CodeAction]:
-    """Return the hints of the findings in a range that say what to write."""
+    """Return code actions for the findings in a range whose hints have text to insert."""
     uri = params.text_document.uri
     file = ls.file(uri)
     if file is None:

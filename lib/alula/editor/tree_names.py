@@ -64,12 +64,12 @@ class TreeFolder:
 
     @classmethod
     def around(cls, path: Path) -> TreeFolder:
-        """Return that of a file, without anything read."""
+        """Return the folder around a file, without reading it."""
         packages = [folder for folder in path.parents if (folder / MANIFEST).is_file()]
         return cls(packages[0] if packages else path.parent)
 
     def refresh(self, opened: Mapping[Path, tuple[object, str]]) -> None:
-        """Read what has changed; ``opened`` are the texts that the editor has, by their paths, each with its version."""
+        """Read the files that have changed; ``opened`` are the texts in the editor, by path, each with its version."""
         there: dict[Path, object] = {path: version for path, (version, _) in opened.items() if self.place in path.parents}
         for path in self.place.rglob("*.xml"):
             if path not in there and not any(part.startswith(".") for part in path.relative_to(self.place).parts):
