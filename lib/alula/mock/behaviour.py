@@ -41,7 +41,7 @@ NEVER = Ending()
 
 @dataclass(frozen=True)
 class MockChange:
-    """Extern transitions after a while, in seconds: what the functional layer finds out."""
+    """Extern transitions after a delay in seconds: changes that the functional layer reports."""
 
     after_s: Value
     states: Mapping[Place, str]

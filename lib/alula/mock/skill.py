@@ -22,7 +22,7 @@ if TYPE_CHECKING:
 
 
 class MockCrashError(Exception):
-    """What a mocked function that crashes raises."""
+    """Raised by a mocked function that is scripted to crash."""
 
 
 class MockInputs(SimpleNamespace):

@@ -31,7 +31,7 @@ class MockState:
         """What faults hold resources at, whatever else is said of them."""
 
     def take(self, states: Mapping[Place, str], reason: str = "") -> None:
-        """Put resources into these states by extern transitions; ``reason`` is told with them."""
+        """Put resources into these states by extern transitions, each with this ``reason``."""
         for (skillset, resource), wanted in states.items():
             state = self._held.get((skillset, resource), wanted)
             if self.host.state(skillset, resource) == state:
