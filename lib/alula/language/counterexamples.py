@@ -18,7 +18,7 @@ Values = Mapping[Path, Value]
 
 
 class StepKind(Enum):
-    """What happens; the value is what the JSON form calls it."""
+    """What a step does; the value is its name in JSON."""
 
     INITIALLY = "initially"
     EXTERN = "extern"
@@ -107,7 +107,7 @@ class CounterexampleStep:
 
     @staticmethod
     def from_json(plain: Mapping[str, Any]) -> CounterexampleStep:
-        """Return the step that ``as_json`` was made of; its values are believed."""
+        """Return the step of the JSON that ``as_json`` made; its values are not checked."""
         return CounterexampleStep(
             StepKind(plain["kind"]),
             plain["text"],

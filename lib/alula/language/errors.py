@@ -98,7 +98,7 @@ def render(diagnostics: Iterable[Diagnostic]) -> str:
 
 
 def has_errors(diagnostics: Iterable[Diagnostic]) -> bool:
-    """Return whether a finding is more than a warning."""
+    """Return whether any finding is an error."""
     return any(diagnostic.severity is Severity.ERROR for diagnostic in diagnostics)
 
 

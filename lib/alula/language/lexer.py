@@ -69,7 +69,7 @@ class Source:
 
     @property
     def full(self) -> bool:
-        """More is wrong than a reader wants to know."""
+        """Whether no more findings are wanted: there are more than ``MAX_ERRORS``."""
         return len(self.diagnostics) > MAX_ERRORS
 
     def span(self, token: Token) -> Span:

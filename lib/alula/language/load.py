@@ -1,4 +1,4 @@
-"""From files to models: one skillset, or a robot's folder with its types and bindings. All trouble is a LanguageError."""
+"""From files to models: one skillset, or a robot's folder with its types and bindings. All errors are raised as LanguageError."""
 
 from __future__ import annotations
 

@@ -29,7 +29,7 @@ class FieldError(Exception):
 
 
 class Messages:
-    """Of a robot: ``types`` of its models, and the folders that hold ``PACKAGE/msg/NAME.msg``. What is in none of them is not known."""
+    """The messages that the models of a robot can use."""
 
     def __init__(self, types: Mapping[str, RosType], folders: Iterable[Path] = ()) -> None:
         self._types = {**{name: RosType("", name) for name in PRIMITIVES}, **types}
@@ -37,7 +37,7 @@ class Messages:
         self._read: dict[RosType, Fields | None] = {}
 
     def field(self, type_name: str, path: Sequence[str]) -> RosType | None:
-        """Return the type of a field of a field, from a type of the models on; None where that is not known. Raises FieldError."""
+        """Return the type at the end of a path of fields that begins at a type of the models; None where a message on it is not known."""
         type_ = self._types.get(type_name)
         for name in path:
             if type_ is None:
@@ -53,7 +53,7 @@ class Messages:
         return type_
 
     def inside(self, type_name: str, path: Sequence[str]) -> Fields:
-        """Return the fields of a field; none where it has none, or they are not known."""
+        """Return the fields of the message at the end of a path of fields; empty where it has none, or is not known."""
         try:
             type_ = self.field(type_name, path)
         except FieldError:
@@ -80,7 +80,7 @@ NO_MESSAGES = Messages({})
 
 
 def fields_of(definition: str, package: str) -> Fields:
-    """Return the fields of a message by its text; ``package`` is where it stands."""
+    """Return the fields of a message from the text of its definition; ``package`` is the package of the definition."""
     fields: dict[str, RosType | None] = {}
     for line in definition.splitlines():
         match = _FIELD.fullmatch(line.partition("#")[0].strip())

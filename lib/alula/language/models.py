@@ -65,7 +65,7 @@ class ModelFile:
 
 
 def check_files(paths: Sequence[str | Path], standard_input: BinaryIO | None = None) -> list[ModelFile]:
-    """Read and check files together; all trouble is in their findings, in the order of the source.
+    """Read and check files together; all errors are findings, in the order of the source.
 
     ``-`` stands for the standard input where that is given.
     """

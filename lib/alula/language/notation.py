@@ -38,7 +38,7 @@ def notation_of(file: str, text: str) -> Notation:
 
 
 def sniff(tokens: list[Token]) -> Notation:
-    """Return the notation that more of the words speak for; the paper's when none does."""
+    """Return the notation that has more of its keywords among the tokens; the paper's where they are equal."""
     paper = rl = 0
     for token, following in pairwise(tokens):
         if token.kind is not Kind.NAME:

@@ -11,6 +11,6 @@ import yaml
 
 @cache
 def standard_messages() -> Mapping[str, frozenset[str]]:
-    """Return them by package, of ROS 1 and ROS 2."""
+    """Return the names of the standard messages of ROS 1 and ROS 2, by package."""
     text = Path(__file__).with_suffix(".yaml").read_text(encoding="utf-8")
     return {package: frozenset(names.split()) for package, names in yaml.safe_load(text).items()}

@@ -1,4 +1,4 @@
-"""What a skillset asks of the fields of its data, held against the messages that these are."""
+"""Check the fields that a skillset's conditions ask of its data against the definitions of the ROS messages."""
 
 from __future__ import annotations
 
@@ -17,7 +17,7 @@ from alula.model.ros_types import PRIMITIVES
 
 
 def check_fields(file: ModelFile) -> None:
-    """Add what is wrong with the fields in a robot's model; of a file that lies in no robot's folder of models nothing is known."""
+    """Add findings about fields of messages to a robot's model; a file outside of a robot's folder of models is not checked."""
     folder = Path(file.path).parent
     try:
         robot = find_robot(folder)

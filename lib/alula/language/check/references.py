@@ -32,7 +32,7 @@ class Named(Protocol):
 def condition_findings(
     skillset: Skillset, condition: Expression, where: str, *, data_allowed: bool, executions_allowed: bool = False
 ) -> Iterator[Diagnostic]:
-    """Yield what is wrong with the resources, states, data and skills that a condition asks; ``where`` names the condition."""
+    """Yield what is wrong with the resources, states, data and skills in a condition; ``where`` names the condition in messages."""
     resources = skillset.resource_index
     for atom in atoms(condition):
         if isinstance(atom, ResourceIs):
@@ -187,7 +187,7 @@ def ros_name(what: str, element: Named) -> Iterator[Diagnostic]:
 
 
 def error(code: str, message: str, span: Span, *, hint: str = "") -> Diagnostic:
-    """Return a finding with which the model can't be used."""
+    """Return a finding of severity ERROR: the model can't be used."""
     return Diagnostic(code, message, span, hint=hint)
 
 
@@ -197,5 +197,5 @@ def for_generator(code: str, message: str, span: Span, *, hint: str = "") -> Dia
 
 
 def warning(code: str, message: str, span: Span, *, hint: str = "") -> Diagnostic:
-    """Return a finding with which the model can still be used."""
+    """Return a finding of severity WARNING: the model can still be used."""
     return Diagnostic(code, message, span, Severity.WARNING, hint)

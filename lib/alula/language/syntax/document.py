@@ -56,7 +56,7 @@ class Document:
 
 
 def read_document(source: Source, dialect: Dialect) -> Document:
-    """Return what could be read of a source; what could not is told in its diagnostics."""
+    """Return what could be read of a source; its diagnostics have what could not."""
     cursor = Cursor(source)
     reader = _FileReader(cursor, dialect)
     if not (cursor.at_end and source.diagnostics):

@@ -16,7 +16,7 @@ SECONDS: Mapping[str, float] = {"ms": 0.001, "s": 1.0, "sec": 1.0, "min": 60.0, 
 def quantity(cursor: Cursor, *, enclosed: bool) -> tuple[float, str]:
     """Read a number and its unit, if it has one.
 
-    Within parentheses (``enclosed``) every name that follows is taken for a unit, so that an unknown one can be told of. Without,
+    Within parentheses (``enclosed``) every name that follows is taken for a unit, so that an unknown one can be reported. Without,
     the next entry's name or the next word of the language may follow: only a known unit on the number's own line is one.
     """
     value = number(cursor.source, cursor.kind(Kind.NUMBER))

@@ -55,7 +55,7 @@ class SkillReader:
         one_or_block(self.cursor, lambda: roles.append(read_role(self.cursor)), self.outside)
 
     def named_effects(self, read_all: Callable[[Callable[[], None]], None]) -> None:
-        """Read the entries of an `effect` block by ``read_all``; know if one of them could not be read."""
+        """Read the entries of an `effect` block by ``read_all``; note whether one of them could not be read."""
         before = len(self.cursor.source.diagnostics)
         read_all(self._named_effect)
         self.parts.effects_complete &= len(self.cursor.source.diagnostics) == before
