@@ -1,4 +1,4 @@
-"""The bridge's configuration: what the skillsets and the hooks of their skills need of the other world, and nothing else."""
+"""The bridge's configuration: what the skillsets and the hooks of their skills need from the other version of ROS, and nothing else."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""The package `<skillset>_interfaces`: one action a skill (paper, section 4.2), built in both ROS worlds from the same files."""
+"""The package `<skillset>_interfaces`: one action a skill (paper, section 4.2), built for ROS 1 and ROS 2 from the same files."""
 
 from __future__ import annotations
 
