@@ -1,4 +1,4 @@
-"""What this room complains of."""
+"""The error of this room."""
 
 from __future__ import annotations
 
@@ -6,4 +6,4 @@ from alula.common.errors import AlulaError
 
 
 class OddsError(AlulaError):
-    """The odds can't be had; the message says why, where, and what would be right."""
+    """The odds can't be computed; the message has the reason, the place, and the remedy."""

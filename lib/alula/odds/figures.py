@@ -1,4 +1,4 @@
-"""How often, how long, how likely: exact numbers, or ranges where a figure is not known better."""
+"""Figures: rates, durations and probabilities as exact numbers, or as ranges where a figure is not known better."""
 
 from __future__ import annotations
 
@@ -23,11 +23,11 @@ class Range:
         return tuple(dict.fromkeys(end for end in (self.low, self.high) if end is not None))
 
     def times(self, factor: Fraction | int) -> Range:
-        """Return the range of the numbers multiplied by a positive one."""
+        """Return the range of the numbers multiplied by a positive factor."""
         return Range(self.low * factor, None if self.high is None else self.high * factor)
 
     def inverse(self) -> Range:
-        """Return the range of the reciprocals: of times the rates, and the other way round."""
+        """Return the range of the reciprocals: of mean times the rates, and of rates the mean times."""
         low = Fraction(0) if self.high is None else 1 / self.high if self.high else None
         if low is None:
             raise ValueError("0 has no reciprocal")
@@ -39,7 +39,7 @@ class Range:
 
 
 def point(value: Fraction | int | str) -> Range:
-    """Return the range of one number."""
+    """Return the range that holds one number only."""
     return Range(Fraction(value), Fraction(value))
 
 
@@ -73,7 +73,7 @@ def clock(rate: Range, stages: int = 1, units: int = 1) -> Clock:
 
 @dataclass(frozen=True)
 class FaultFigures:
-    """Of one fault.
+    """The figures of one fault.
 
     Attributes:
         rate: how often it comes, per second; ANY_RATE: nobody knows.
@@ -93,18 +93,18 @@ class FaultFigures:
 
     @property
     def clock(self) -> Clock:
-        """How it comes with time."""
+        """The clock of its occurrence."""
         return clock(self.rate, self.stages, self.units)
 
     @property
     def recovery(self) -> Clock:
-        """How it goes with time."""
+        """The clock of its end."""
         return Clock(NEVER) if self.lasts is None else clock(self.lasts.inverse(), self.lasts_stages)
 
 
 @dataclass(frozen=True)
 class SkillFigures:
-    """Of one skill.
+    """The figures of one skill.
 
     Attributes:
         results: how likely it ends with which result, where it ends by itself; a result that is missing may have all that is left.
@@ -123,29 +123,29 @@ class SkillFigures:
 
     @property
     def clock(self) -> Clock:
-        """How it ends by itself with time."""
+        """The clock of an end of its own accord."""
         return clock(self.lasts.inverse(), self.stages)
 
     def likelihoods(self, ends: Sequence[str]) -> list[tuple[Fraction, ...]]:
-        """Return the corners of what the chances of these ends can be; they add up to 1."""
+        """Return the corners of the possible distributions over these ends; the probabilities in each add up to 1."""
         return corners([self.results.get(end, ANY_CHANCE) for end in ends])
 
 
 @dataclass(frozen=True)
 class Figures:
-    """All that is known of a robot, by the names of faults and skills."""
+    """The figures of a robot, by the names of faults and skills."""
 
     faults: Mapping[str, FaultFigures] = field(default_factory=dict)
     skills: Mapping[str, SkillFigures] = field(default_factory=dict)
 
     def fault(self, name: str) -> FaultFigures:
-        """Return those of a fault, or of an end ``skillset.skill END``; one without figures may come at any time."""
+        """Return the figures of a fault, or of an end ``skillset.skill END``; one without figures may come at any time."""
         skill, _, end = name.partition(" ")
         fails = self.skill(skill).fails
         return self.faults.get(name) or (FaultFigures(rate=fails[end], lasts=None) if end in fails else FaultFigures())
 
     def skill(self, name: str) -> SkillFigures:
-        """Return those of a skill; one without figures may end at any time, in any way."""
+        """Return the figures of a skill; one without figures may end at any time, in any way."""
         return self.skills.get(name, SkillFigures())
 
     @property
@@ -154,7 +154,7 @@ class Figures:
         return frozenset(name for name, fault in self.faults.items() if fault.chances)
 
     def named(self, name: Callable[[str], str]) -> Figures:
-        """Return them for skillsets and faults that are called otherwise: ``name`` makes what begins with such a name of what is here."""
+        """Return the figures under other names: ``name`` maps each name of a fault or skill here to the new one."""
         faults = {
             name(what): replace(one, chances={use if use == DEPARTURE else name(use): chance for use, chance in one.chances.items()})
             for what, one in self.faults.items()

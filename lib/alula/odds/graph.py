@@ -20,7 +20,7 @@ MOST_SITUATIONS = 1_000_000
 
 @dataclass(frozen=True)
 class Graph:
-    """A system that was looked at.
+    """The explored part of a system, its situations numbered.
 
     Attributes:
         initial: where it can begin.
@@ -45,7 +45,7 @@ def explore(
     unlikely: float = 0.0,
     tell: Tell | None = None,
 ) -> Graph:
-    """Look at the situations that a system can come into, the likeliest first.
+    """Explore the situations that a system can come into, the likeliest first.
 
     Ctrl-C ends it as ``most`` does.
 

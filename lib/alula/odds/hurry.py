@@ -1,7 +1,7 @@
-"""Circles of events that no figure times: while they go round, time passes all the same.
+"""Cycles of events that have no rate: while the system goes round one, time passes all the same.
 
 A resource that flips at any time, as one of a broken sensor may, could flip without end in no time; then nothing else would ever happen.
-No robot does that, so where clocks run on such a circle, it is left some time. A circle on which no clock runs is the software's own.
+No robot does that, so where clocks run on such a cycle, it is left some time. A cycle on which no clock runs is the software's own.
 """
 
 from __future__ import annotations
@@ -14,7 +14,7 @@ from alula.odds.process import Choice, Process
 
 
 def unhurried(process: Process) -> Process:
-    """Return the process with the states of each such circle as one; the others lead to it."""
+    """Return the process with the states of each such cycle merged into one, from which the steps out of the cycle remain."""
     at_once = [[to for choice in choices if (to := _instant(choice)) is not None] for choices in process.choices]
     choices = list(process.choices)
     for circle in _circles(at_once):

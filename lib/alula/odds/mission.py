@@ -93,12 +93,12 @@ class MissionSteps:
         return [Place(self._system.initial())]
 
     def outcome(self, state: Place) -> Outcome | None:
-        """Return how the mission has ended in order."""
+        """Return the outcome of a mission that has ended in order; None otherwise."""
         ended = self._system.outcome(state.state)
         return None if ended is None else OUTCOMES.get(ended)
 
     def resource(self, state: Place, name: str) -> str | None:
-        """Return the state of ``skillset.resource``; None: the mission has nothing to do with it."""
+        """Return the state of ``skillset.resource``; None where no skillset of the mission has it."""
         known = any(one.name == name.partition(".")[0] for one in self._system.skillsets)
         return self._system.resource(state.state, name) if known else None
 
@@ -117,28 +117,28 @@ class MissionSteps:
         return any(_any(self._faults[name].ends, end) for name in state.faults)
 
     def taken_away(self, before: Place, after: Place) -> frozenset[str]:
-        """Return the resources that a step takes out of a state which a fault that is there shows: ``skillset.resource``."""
+        """Return the resources that a step moves out of a state by which a present fault shows: ``skillset.resource``."""
         there = [self._faults[name].states for name in before.faults]
         moved = ((at, state) for at, state in self.resources(before).items() if there and state != self.resource(after, at))
         return frozenset(at for at, state in moved if any(_any(states, f"{at} {state}") for states in there))
 
     def comes_later(self, state: Place, shown: str) -> bool:
-        """Return whether a state, ``skillset.resource STATE``, comes only of what is done about the faults that are there."""
+        """Return whether a state, ``skillset.resource STATE``, is reached only by the reaction to the present faults."""
         several = [self._faults[name] for name in state.faults]
         return any(_any(one.later, shown) for one in several) and not any(_any(one.states, shown) for one in several)
 
     def chosen(self, before: Place, after: Place) -> tuple[str, ...]:
-        """Return, in words, what a tick that leads from one situation to another took a value for that nobody knows."""
+        """Return, in words, the unknown values that a tick from one situation to the other assumed."""
         steps = self._moves(before.state)
         event = next((event for event, there in steps if event.kind is Happens.TICK and there == after.state), None)
         return () if event is None else tuple(words for one in _waited(event.choices)[1] if (words := choice(one)))
 
     def only_ends(self, fault: str) -> bool:
-        """Return whether a fault is no more than bad ends of skills."""
+        """Return whether a fault only ends skills badly, and shows in no state of a resource."""
         return not self._faults[fault].states
 
     def steps(self, state: Place) -> Iterator[Step[Place]]:
-        """Yield what can happen; nothing where the mission was aborted. Before it begins nothing fails, and it waits for all it needs."""
+        """Yield the steps out of a situation; none after an abort. Before the mission begins nothing fails, and it waits for its needs."""
         if self._system.outcome(state.state) is not None:
             return
         begun = self._system.started(state.state)

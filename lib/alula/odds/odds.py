@@ -23,7 +23,7 @@ _UNITS = re.compile(r"(?P<name>\S+?)=(?P<units>\d+|never)")
 
 @dataclass(frozen=True)
 class Between:
-    """The least and the greatest, over what no model and no figure decides."""
+    """The least and the greatest value, over all choices that no model and no figure decides."""
 
     least: Number
     most: Number
@@ -68,7 +68,7 @@ class Odds:
 
 
 def odds_of(graph: Graph, figures: Figures, *, costs: bool = True) -> Odds:
-    """Return the odds of a graph with figures; raises OddsError where there is no Storm."""
+    """Return the odds of a graph with figures; raises OddsError where Storm is not installed."""
     process = _process(graph, figures)
     storm = Storm(process)
     found = {one.value: _between(storm, [one]) for one in Outcome}

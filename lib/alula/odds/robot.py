@@ -28,7 +28,7 @@ COUNTED = 100  # attempts, rounds and what scripts count, exactly: each has its 
 
 
 def ignore(_line: str) -> None:
-    """Take no notice."""
+    """Ignore a warning."""
 
 
 def mission_of(

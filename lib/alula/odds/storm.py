@@ -22,23 +22,23 @@ ONE = Fraction(1)
 
 @dataclass(frozen=True)
 class Number:
-    """A number, and how surely it is known: the true one is from ``low`` to ``high``, which are the same where it is exact."""
+    """A number with its bounds: the true value is from ``low`` to ``high``, which are the same where it is exact."""
 
     low: Fraction
     high: Fraction
 
     @property
     def exact(self) -> bool:
-        """Return whether there is no error."""
+        """Return whether the bounds are the same."""
         return self.low == self.high
 
     @property
     def value(self) -> float:
-        """The middle."""
+        """The middle of the bounds."""
         return float((self.low + self.high) / 2)
 
     def complement(self) -> Number:
-        """Return the chance of the opposite."""
+        """Return the bounds of the complementary probability."""
         return Number(1 - self.high, 1 - self.low)
 
 
@@ -52,14 +52,14 @@ class Extreme:
 
 
 class Storm:
-    """A decision process, in Storm.
+    """A decision process, loaded into the model checker Storm.
 
     Args:
         process: with the state 0 as its first.
         exact: with fractions; None: as the number of states allows.
 
     Raises:
-        OddsError: there is no Storm.
+        OddsError: Storm is not installed.
     """
 
     def __init__(self, process: Process, *, exact: bool | None = None) -> None:

@@ -66,10 +66,10 @@ class LabelledSystem(Protocol[State]):
     """A mission with its models, as a labelled transition system."""
 
     def initial(self) -> Iterable[State]:
-        """Return where it can begin."""
+        """Return the situations in which the system can begin."""
 
     def steps(self, state: State) -> Iterable[Step[State]]:
-        """Return what can happen there: none where the mission has ended, or waits for ever."""
+        """Return the steps out of a situation: none where the mission has ended, or waits for ever."""
 
     def outcome(self, state: State) -> Outcome | None:
         """Return how the mission has ended; None: it has not, or in none of these ways."""

@@ -15,7 +15,7 @@ FONT = "font-family='DejaVu Sans, Helvetica, sans-serif'"
 
 
 def as_text(title: str, odds: Odds, changes: dict[str, Odds]) -> str:
-    """Return lines for a terminal."""
+    """Return the odds, and those after each change, as lines for a terminal."""
     lines = [title, *(f"  {WORDS[name]:<18} {_chance(one)}" for name, one in odds.outcomes.items())]
     lines += [f"  {'mean time to end':<18} {_seconds(odds)}"]
     if odds.lacking:
@@ -51,7 +51,7 @@ def as_dict(odds: Odds, changes: dict[str, Odds]) -> dict[str, object]:
 
 
 def as_svg(title: str, odds: Odds) -> str:
-    """Return a picture: a bar an outcome, full up to its least chance, pale up to its greatest."""
+    """Return the odds as SVG: one bar for each outcome, in full colour up to its least chance, pale up to its greatest."""
     rows = [_row(number, name, one) for number, (name, one) in enumerate(odds.outcomes.items())]
     height = TOP_PX + ROW_PX * len(rows) + 12
     head = f"<svg xmlns='http://www.w3.org/2000/svg' width='{WIDTH_PX}' height='{height}' {FONT} font-size='13'>"
