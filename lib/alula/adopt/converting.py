@@ -90,7 +90,7 @@ def _give_ports(element: Element, skill: SkillOf) -> None:
 
 
 def complete(tree: Element, vocabulary: Vocabulary, zeros: Mapping[tuple[str, str], str]) -> None:
-    """Give the inputs that a use leaves out: ``zeros`` by skill and input, for a skill has all of its inputs."""
+    """Add the inputs that a use leaves out, as a skill needs all of its inputs; ``zeros`` has their values by skill and input."""
     skills = {f"{vocabulary.robot}.{one.name}": one for one in vocabulary.skills.values()}
     for node in tree.iterate():
         skill = skills.get(type_name(node))

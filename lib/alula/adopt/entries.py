@@ -29,7 +29,7 @@ ZEROS: Mapping[str, object] = {"bool": False, "string": "", "float64": 0.0}
 
 
 def model_type(kind: PortType) -> str:
-    """Return the type of the models for one of ports: a text for all that BehaviorTree.CPP reads from text in a program's own way."""
+    """Return the model's type for a port's: a text for each type that BehaviorTree.CPP converts from text by the program's own code."""
     return MODEL_TYPES.get(kind, "string")
 
 
@@ -69,13 +69,13 @@ class _MainTree:
         return {name: access for (board, name), access in first.items() if board is self.board and not access.write}
 
     def told(self) -> dict[str, str | None]:
-        """Return the inputs that its model tells of, with their defaults."""
+        """Return the inputs that its model declares, with their defaults."""
         model = self.files.models.get(self.files.main)
         ports = model.ports.values() if model is not None else ()
         return {port.name: port.default for port in ports if port.direction is not Direction.OUTPUT}
 
     def unwritten(self) -> set[str]:
-        """Return the entries that nodes do without, and that nothing writes."""
+        """Return the entries that nodes read only if present, and that nothing writes."""
         return set(self.optional) - {access.key[1] for _, access in self.accesses if access.write and access.key[0] is self.board}
 
 
@@ -89,7 +89,7 @@ def _optional(root: Wiring) -> Iterator[str]:
 
 
 class Entries:
-    """What main trees, whose nodes are a robot's already, say about entries."""
+    """The types and uses of entries in main trees, whose nodes already have the robot's names."""
 
     def __init__(self, mains: Sequence[TreeFiles], vocabulary: Vocabulary, known: Palette) -> None:
         self._skills = {f"{vocabulary.robot}.{one.name}": one for one in vocabulary.skills.values()}
@@ -104,7 +104,7 @@ class Entries:
         return model_type(self._types[skill, name])
 
     def zeros(self) -> Mapping[Slot, str]:
-        """Return what stands for inputs that a use leaves out, as text."""
+        """Return the values, as text, of inputs that a use leaves out."""
         return {slot: "" if kind == "string" else json.dumps(ZEROS.get(kind, 0)) for slot in self._types for kind in [self.type(*slot)]}
 
     def given(self, files: TreeFiles) -> list[GivenEntry]:

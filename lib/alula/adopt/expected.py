@@ -13,7 +13,7 @@ INVERTER = "Inverter"
 
 
 def expected_states(trees: Iterable[Element], vocabulary: Vocabulary) -> dict[str, str]:
-    """Return the state of each resource with which its first use lets the tree go on.
+    """Return for each resource the state with which its first use lets the tree go on.
 
     A condition holds; below an Inverter it does not; and one before the last child of a Fallback does not, so that what is to be done about
     it is done.

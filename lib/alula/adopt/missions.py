@@ -27,7 +27,7 @@ COMMENTS = re.compile(r"<!--.*?-->", re.DOTALL)
 
 @dataclass(frozen=True)
 class MissionOf:
-    """A main tree as a mission; ``source`` is its file from the folder on, ``trees`` are those that it needs, by their IDs."""
+    """A main tree as a mission; ``source`` is its file relative to the folder, ``trees`` are the trees that it needs, by ID."""
 
     name: str
     source: str

@@ -1,4 +1,4 @@
-"""What a person is told of a robot from trees: the names that nodes have got, and what trees don't tell."""
+"""Report on a robot from trees: the names that nodes have got, and the decisions that trees leave to a person."""
 
 from __future__ import annotations
 
@@ -13,7 +13,7 @@ SHOWN = 3
 
 
 def names_of_nodes(vocabulary: Vocabulary) -> Iterator[str]:
-    """Yield the rows of a table: what trees call a node, what it is here, and which names and uses there are."""
+    """Yield the rows of a table: the name in the trees, the name in the robot, and renamed ports and remarks."""
     for one in vocabulary.skills.values():
         renamed = [f"`{port}` is `{name}`" for table in (one.inputs, one.outputs) for port, name in table.items() if port != name]
         yield _row(one.type.name, f"skill `{one.name}`", [*renamed, one.type.doc])
@@ -24,7 +24,7 @@ def names_of_nodes(vocabulary: Vocabulary) -> Iterator[str]:
 
 
 def decisions(vocabulary: Vocabulary, missions: Missions, *, missing: Iterable[str], unused: Iterable[str]) -> Iterator[str]:
-    """Yield a sentence for each thing that trees don't tell, and that a person knows.
+    """Yield a sentence for each decision that trees leave to a person.
 
     ``missing`` are trees that are used and in no file, ``unused`` those that no main tree uses.
     """

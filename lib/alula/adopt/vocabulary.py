@@ -45,7 +45,7 @@ class ResourceOf:
 
     @property
     def asks_entries(self) -> bool:
-        """Return whether an argument is an entry, so that its answer hangs on what that holds."""
+        """Return whether an argument is an entry of the blackboard, whose value the answer depends on."""
         return any("{" in value for _, value in self.arguments)
 
 
@@ -96,7 +96,7 @@ class Vocabulary:
 
 
 def arguments(node: Element) -> Arguments:
-    """Return what a use gives to the ports of a node."""
+    """Return the arguments of a node, by port."""
     return tuple(sorted((name, one.value) for name, one in node.attributes.items() if is_port(name)))
 
 
