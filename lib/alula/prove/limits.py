@@ -1,4 +1,4 @@
-"""Bounded time: what works for long asks now and then whether it may go on."""
+"""Bounded time: long computations check now and then whether they may go on."""
 
 from __future__ import annotations
 
@@ -44,7 +44,7 @@ class Deadline:
         return cls(_now_s() + given_s, given_s, tell)
 
     def half(self, doing: str) -> Deadline:
-        """Return the moment in the middle of what is left, for something else that is being done."""
+        """Return the deadline in the middle of the time left, for a computation called ``doing``."""
         return replace(self, at_s=self.at_s - self.left_s() / 2, doing=doing)
 
     def left_s(self) -> float:
@@ -52,7 +52,7 @@ class Deadline:
         return max(0.0, self.at_s - _now_s())
 
     def a_second(self, count: int) -> float:
-        """Return how many that are in each second since the beginning."""
+        """Return the rate of ``count`` items, per second since the beginning."""
         return count / max(_now_s() - self._begun_s, 1e-3)
 
     def check(self) -> None:

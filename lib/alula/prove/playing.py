@@ -1,4 +1,4 @@
-"""What the plays of counterexamples share, a skillset's and a mission's: what managers are made of, functions, and how states differ."""
+"""What the plays of a skillset's and of a mission's counterexamples share: functions, models without parameters, and differences."""
 
 from __future__ import annotations
 
@@ -18,17 +18,17 @@ class PlayedFunction(SkillHooks):
         self.running = running
 
     def on_dispatch(self, execution: Execution) -> None:
-        """Run."""
+        """Store the execution as running."""
         self.running[execution.id] = execution
 
 
 def without_parameters(skillset: Skillset) -> Skillset:
-    """Return the model as a counterexample knows it: inputs and outputs are the hooks' own affair."""
+    """Return the model without inputs and outputs, which belong to the hooks: counterexamples do not have them."""
     return replace(skillset, skills=tuple(replace(skill, inputs=(), outputs=()) for skill in skillset.skills))
 
 
 def differences(statuses: Mapping[str, ResourceStatus], expected: Iterable[tuple[str, str]], skillset: str = "") -> Iterator[str]:
-    """Yield each resource that the managers have in another state than the counterexample; ``skillset`` stands before its name."""
+    """Yield each resource whose state in the managers differs from the counterexample; ``skillset`` stands before its name."""
     for name, state in expected:
         found = statuses[name].state
         if found != state:

@@ -32,7 +32,7 @@ class Acceptance:
     reason: str
 
     def of(self, finding: Diagnostic) -> bool:
-        """Return whether it is about a finding."""
+        """Return whether a finding is accepted."""
         span = finding.span
         here = (span.file, span.line, span.column) == (self.place.path, self.place.line, self.place.column)
         return here and finding.code == self.code and self.words in finding.message and bool(self.reason)

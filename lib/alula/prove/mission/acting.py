@@ -11,7 +11,7 @@ from alula.runtime.middleware import GoalListener
 
 
 class Function(PlayedFunction):
-    """A function that ends when the run says so, also when it was interrupted; ``validated`` says why inputs are refused.
+    """A function that ends when the run of the counterexample ends it, also after an interruption; ``validated`` gives reasons of refusals.
 
     ``stays`` has the execution that holds in a pause, and does not go on.
     """
@@ -23,23 +23,23 @@ class Function(PlayedFunction):
         self._stays = stays
 
     def validate(self, _: object) -> str:
-        """Say why they are refused."""
+        """Return why the inputs are refused, empty where they are not."""
         return self._validated()
 
     def progress(self, execution: Execution) -> float:
-        """Tell what the run says."""
+        """Return the progress in the run of the counterexample."""
         return self._told.get(execution.id, execution.progress)
 
     def on_pause(self, execution: Execution) -> str | None:
-        """Hold, if it is the one that does."""
+        """Pause, unless the execution stays in its pause in the run of the counterexample."""
         return None if execution.id in self._stays else super().on_pause(execution)
 
     def on_resume(self, execution: Execution) -> str | None:
-        """Refuse."""
+        """Refuse to resume."""
         return f"{execution.skill} does not go on, as in the counterexample"
 
     def on_interrupt(self, execution: Execution) -> bool | None:
-        """Wait until the run ends it."""
+        """Return whether the execution has ended: the run ends it."""
         return execution.done
 
 
@@ -49,7 +49,7 @@ class HeldLink(VirtualLink):
     held: dict[str, Callable[[], None]]
 
     def send(self, goal_id: str, goal: object, on_answer: Callable[[bool], None]) -> None:
-        """Keep it."""
+        """Hold a goal back until the run sends it on."""
         self.held[goal_id] = lambda: super(HeldLink, self).send(goal_id, goal, on_answer)
 
 
@@ -61,7 +61,7 @@ class HeldMiddleware(VirtualMiddleware):
         self._held = held
 
     def action(self, skill: str, listener: GoalListener) -> VirtualLink:
-        """Return a link that keeps goals."""
+        """Return a link that holds goals back."""
         link = HeldLink(self, skill, listener)
         link.held = self._held
         return link

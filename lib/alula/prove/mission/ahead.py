@@ -40,7 +40,7 @@ class Ahead:
 
 
 class Looking:
-    """Tells what is ahead of a mission that is somewhere in its trees."""
+    """Computes what is ahead of a mission from the state of its trees."""
 
     def __init__(self, trees: Sequence[Tree], read: Read) -> None:
         self.read = read
@@ -65,11 +65,11 @@ class Looking:
         return SKIPPED in self._reach.ends(self._nodes[number].wiring) or number in self._opaque
 
     def may_be_skipped(self, number: int) -> bool:
-        """Return whether a node, or one below it, may be skipped, or asks for what is not known."""
+        """Return whether a node, or one below it, may be skipped, or depends on an unknown value."""
         return number in self._skips
 
     def ahead(self, phase: str, *, stops: bool, values: Sequence[Mapping[str, Hashable]]) -> Ahead:
-        """Return it for a director's phase; ``values`` are the statuses and attributes of the nodes.
+        """Return what is ahead in a director's phase; ``values`` are the statuses and attributes of the nodes.
 
         ``stops``: the second tree brings the robot to rest. Until then it may have to.
         """

@@ -1,4 +1,4 @@
-"""What a mission does about each failure: the coverage of its failures, from all its runs.
+"""The response of a mission to each failure: the coverage of its failures, from all its runs.
 
 A row is a skill that fails in some way, at a moment: the other leaves that run then, their skills asked for. Its answer is what the tree
 asks for next; its outcomes are all ways in which the mission can end from there, whatever else happens, unless somebody aborts it.
@@ -24,7 +24,7 @@ Way = tuple[Outcome, Sets]
 
 @dataclass
 class Row:
-    """A failure at a moment, and what comes of it.
+    """A failure at a moment, and its consequences.
 
     ``node`` is the name of the leaf that failed, ``ways`` are the regions where it is seen, each with how the tick goes that sees it.
 
@@ -46,16 +46,16 @@ class Row:
 
     @property
     def region(self) -> int:
-        """Where it was first seen."""
+        """The first region in which it was seen."""
         return self.ways[0][0]
 
     @property
     def way(self) -> Way:
-        """How the tick goes that first sees it."""
+        """The way of the first tick that sees it."""
         return self.ways[0][1]
 
     def as_dict(self) -> dict[str, object]:
-        """Return the row as JSON has it."""
+        """Return the row as plain values for JSON."""
         return {
             "skill": self.skill,
             "end": self.end,

@@ -1,4 +1,4 @@
-"""The resources that a mission can hang on: those that its trees name, and those that the models' skills, events or properties do.
+"""The resources that a mission can depend on: those that its trees name, and those that the models' skills, events or properties do.
 
 Any other may change at any time and nothing is different then; with twenty of them a search would see a million situations for each.
 """

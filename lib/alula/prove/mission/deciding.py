@@ -1,4 +1,4 @@
-"""Conditions that never decide anything, and ends of skills that are asked for and never come, once all runs are known."""
+"""Conditions that never decide anything, and ends of skills that are tested for and never come, once all runs are known."""
 
 from __future__ import annotations
 
@@ -17,7 +17,7 @@ Answers = Mapping[int, frozenset[str]]
 
 
 def answers_of(regions: Regions) -> Answers:
-    """Return what the nodes answer, nothing of those that are never ticked."""
+    """Return the answers of the nodes; a node that is never ticked has none."""
     nodes = regions.system.nodes
     found: dict[int, set[str]] = {}
     for region in regions.regions:
@@ -44,7 +44,7 @@ def never_deciding(system: System, answers: Answers) -> Iterator[tuple[Node, boo
 
 
 def never_coming(regions: Regions) -> Iterator[tuple[Node, str, str]]:
-    """Yield nodes that ask for an end that comes in no run: the node, what it asks, and of which skills' ends (empty: of any)."""
+    """Yield nodes that test for an end that comes in no run: the node, the end, and the skills that it is to be of (empty: any)."""
     system = regions.system
     ends = _ends(regions)
     told: set[tuple[int, str]] = set()

@@ -1,4 +1,4 @@
-"""Which situations at rest surely lead to the mission's end, many at once: one by one there are millions of a mission of two robots.
+"""Situations at rest that surely lead to the mission's end, computed in groups: a mission of two robots has millions of single ones.
 
 A group is a memory with one set of managers at rest a skillset, and stands for each choice of them (``Regions``). The mission surely ends
 after a group when, whatever its situations answer, a tick can come from each of them to the end or into a group after which it surely
@@ -57,7 +57,7 @@ class _Way(NamedTuple):
 
 
 class Ending:
-    """Finds the groups of which it is in doubt whether the mission ends after them."""
+    """Finds the groups after which the mission may not end."""
 
     def __init__(self, regions: Regions, groups: Iterable[Group], come: Come) -> None:
         self._regions = regions
@@ -86,7 +86,7 @@ class Ending:
                 self._sets.append(sets)
 
     def doubtful(self, values: Values, deadline: Deadline) -> list[Group]:
-        """Return those in doubt while data have these values, in their order; raises OutOfTimeError."""
+        """Return the groups in doubt while data have these values, in their order; raises OutOfTimeError."""
         self._look_ahead(deadline)
         self._sure = defaultdict(list)
         self._tried = {}

@@ -60,7 +60,7 @@ class _Refused:
         self._known: dict[int, list[tuple[int, Event, int, int, str]]] = {}
 
     def of(self, place: int, closure: Closure) -> list[tuple[int, Event, int, int, str]]:
-        """Return managers, the refusal, the managers after it, the leaf that holds what it needs, and the resource; the soonest first."""
+        """Return managers, the refusal, the managers after it, the leaf that holds what it needs, and the resource; the nearest first."""
         if id(closure) not in self._known:
             self._known[id(closure)] = [
                 (one, event, after, *held)

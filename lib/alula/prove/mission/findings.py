@@ -1,4 +1,4 @@
-"""What is looked at in all runs of a mission without being asked."""
+"""The findings about all runs of a mission that need no property."""
 
 from __future__ import annotations
 
@@ -27,14 +27,14 @@ ANSWER = "put a Fallback around it with what is to be done then, or `<AlwaysFail
 
 
 def findings(regions: Regions, answers: Answers) -> list[Diagnostic]:
-    """Return what is wrong, or can go wrong, each thing with a run that shows it."""
+    """Return what is wrong, or can go wrong, each finding with a run that shows it."""
     found = leaving_and_fighting(regions)
     # What never happens is known only when all runs were looked at.
     return [*found, *_unanswered(regions, answers), *_never(regions)] if regions.complete else found
 
 
 def leaving_and_fighting(regions: Regions) -> list[Diagnostic]:
-    """Return which skills a mission leaves so that they can't start any more (ALU701), and what fights for a resource (ALU708)."""
+    """Return the skills that a mission leaves unable to start (ALU701), and the branches that fight for a resource (ALU708)."""
     return [*_left_taken(regions), *_fighting(regions)]
 
 
@@ -146,7 +146,7 @@ def _never_ticked(regions: Regions) -> Iterator[Diagnostic]:
 
 
 def waits(looked: Waits, system: System, deadline: Deadline) -> Iterator[Diagnostic]:
-    """Yield ALU704 for situations after which the mission never ends, with a run to each; raises OutOfTimeError."""
+    """Yield ALU704 for situations after which the mission never ends, each with a run to it; raises OutOfTimeError."""
     for node, events, state, stays, data in looked.found(deadline):
         how = f"waits in '{node.name}' for ever" if stays else f"goes round '{node.name}' without end"
         message = f"the mission {how}, though nothing fails any more: {situation(system, state)}{f', {data}' if data else ''}"

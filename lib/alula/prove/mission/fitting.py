@@ -26,7 +26,7 @@ Values = Mapping[str, object]
 
 
 def fits(values: Values, question: Question, answer: Answer) -> bool:
-    """Return whether values give an answer about data."""
+    """Return whether values give this answer to a question about data."""
     _, name, symbol, other = question
     key = f"{name} {FRESH}" if symbol == FRESH else str(name)
     if symbol == FRESH or key not in values:
@@ -44,14 +44,14 @@ def agree(values: Values, choices: Iterable[Asked]) -> bool:
 
 
 def answers(values: Values, questions: Iterable[Question]) -> list[Asked]:
-    """Return what values answer to questions about data; of what is not fresh, or no number, that alone."""
+    """Return the answers that values give to questions about data; of data that is not fresh, or no number, that answer alone."""
     fresh = [one for one in questions if one[2] == FRESH or values.get(f"{data_in(str(one[1]))} {FRESH}", True)]
     known = [one for one in fresh if one[2] in {FRESH, NUMBER} or values.get(str(one[1])) is not None]
     return [Asked(one, (), fits(values, one, answer=True)) for one in known]
 
 
 def all_values(questions: Iterable[Question]) -> Iterator[Values]:
-    """Yield values that answer questions about data in all the ways that there are."""
+    """Yield values for each combination of answers that questions about data can have."""
     asked: dict[str, list[Question]] = {}
     for question in questions:
         asked.setdefault(f"{question[1]} {FRESH}" if question[2] == FRESH else str(question[1]), []).append(question)

@@ -34,14 +34,14 @@ Awaiting = tuple[State, int]
 
 @dataclass(frozen=True)
 class Held:
-    """What is known of a property: a run against it, None where there is none in what was looked at; ``complete``: that is all."""
+    """The result for a property: a run against it, None where none was found; ``complete``: all runs were looked at."""
 
     finding: MissionFinding | None
     complete: bool
 
 
 def held(regions: Regions, one: Property, faults: Faults, deadline: Deadline, *, always_ends: bool = False) -> Held:
-    """Look whether a property holds; ``always_ends``: calm steps lead to an end of the mission from everywhere (``Waits``)."""
+    """Decide whether a property holds; ``always_ends``: calm steps lead to an end of the mission from everywhere (``Waits``)."""
     system = regions.system
     if always_ends and one.fair and not one.within and _somewhere(regions, Not(_goal(one)), at_ends=True) is None:
         return Held(None, complete=True)
@@ -169,7 +169,7 @@ class _Search:
         return (self._one.within or 1) if begins else 0
 
     def against(self) -> tuple[list[Event], State] | None:
-        """Return a run after which it never comes, or comes too late."""
+        """Return a run after which the condition becomes true too late, or never."""
         if self._one.within:
             return self._late
         several = all_values(self._system.ticker.about_data)

@@ -28,7 +28,7 @@ class Left:
 
 
 def left_taken(regions: Regions) -> Iterator[Left]:
-    """Yield such ends, one for each end of a skill that has left it so; whether there are more is known when all runs are."""
+    """Yield ends of the mission that leave skills unable to start, one for each end of a skill that causes it."""
     found: set[tuple[int, tuple[str, ...], str]] = set()
     for number, region in enumerate(regions.regions):
         for place in range(len(region.closures)):

@@ -47,7 +47,7 @@ class Ends(NamedTuple):
 
 @dataclass(frozen=True)
 class Live:
-    """The entries that still decide something.
+    """The entries of the blackboards that still decide something.
 
     ``texts``: what is asked of one is only whether it is among each of these texts; None where its value counts.
     """
@@ -75,7 +75,7 @@ class Live:
 
 
 class Liveness:
-    """Tells what is live of a mission that is somewhere in its trees."""
+    """Computes the live entries of a mission from the state of its trees."""
 
     def __init__(self, trees: Sequence[Tree], looking: Looking) -> None:
         self._looking = looking
@@ -331,7 +331,7 @@ def _at_least_once(count: str) -> bool:
 
 
 def leaf_place(leaf: int) -> Place:
-    """Return the place of what scripts may ask of a leaf's execution."""
+    """Return the place that stands for the state of a leaf's execution in scripts."""
     return leaf, ""
 
 

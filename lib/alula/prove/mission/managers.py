@@ -48,7 +48,7 @@ def searched(skillset: Skillset) -> OverApproximation:
 
 
 class ManagersSteps:
-    """The steps of one skillset.
+    """The steps of one skillset's managers.
 
     ``skills`` are the leaves' skills by the leaves' numbers, of this skillset only; ``told`` says of an execution's end what the tree can
     tell of it.
@@ -71,11 +71,11 @@ class ManagersSteps:
         }
 
     def initial(self) -> Managers:
-        """Return them at power-up."""
+        """Return the managers at power-up."""
         return self._managers(semantics.initial(self._skillset), ())
 
     def moves(self, managers: Managers) -> Iterator[tuple[Event, Managers]]:
-        """Yield each thing that can happen in them or to them."""
+        """Yield each event that is possible in the managers, with the managers after it."""
         if managers.states is None:
             if self._failures.deaths:
                 yield Event(Kind.RESTART, self.model.name), Managers(self.initial().states, managers.executions)

@@ -33,7 +33,7 @@ LOGIC = frozenset({"&&", "||"})
 
 
 class Kind(Enum):
-    """What the value of a name is to the conditions; one that is asked alone is true or false."""
+    """How the conditions use the value of a name; one that stands alone is true or false."""
 
     NUMBER = "number"
     FLAG = "flag"
@@ -49,7 +49,7 @@ class Conditions:
 
     @classmethod
     def of(cls, roots: Iterable[Wiring], skillsets: Iterable[Skillset]) -> Conditions:
-        """Read those of the trees of a mission; raises UndecidedError for what computes with data, or copies them."""
+        """Collect the conditions of a mission's trees; raises UndecidedError for scripts that compute with data, or copy them."""
         types = {f"{one.name}.{data.name}": data.type for one in skillsets for data in one.data}
         asking = _Asking(types)
         for wiring in (wiring for root in roots for wiring in root.walk()):
@@ -129,7 +129,7 @@ class _Asking:
 
 
 class Measurements:
-    """The data as one tick sees them."""
+    """The data as one tick reads them."""
 
     def __init__(self, oracle: Oracle, conditions: Conditions) -> None:
         self._oracle = oracle
@@ -137,22 +137,22 @@ class Measurements:
         self._known: dict[str, object] = {}
 
     def begin(self) -> None:
-        """Begin another tick: anything may have come."""
+        """Begin another tick: each value may have changed."""
         self._known = {}
 
     @property
     def any(self) -> bool:
-        """Return whether any were asked in this tick."""
+        """Return whether this tick has read any."""
         return bool(self._known)
 
     def value(self, data: str) -> object | None:
-        """Return a value of ``skillset.data``, or what has its fields; None where there is no fresh one."""
+        """Return a value of ``skillset.data``, or an object that has its fields; None where there is no fresh one."""
         if data not in self._known:
             self._known[data] = self._oracle.choose((DATA, data, FRESH, ""))
         return self.part(data) if self._known[data] else None
 
     def part(self, name: str) -> object:
-        """Return the value of a field, or what has fields; NaN where no number was measured."""
+        """Return the value of a field, or an object that has its fields; NaN where no number was measured."""
         if name not in self._conditions.kinds:
             return _Fields(self, name)
         key = f"{name} "  # a data without fields has its freshness by its name
@@ -186,7 +186,7 @@ class _Fields:
 
 
 class MeasuredNumber(UnknownNumber):
-    """A number that was measured; what a tick has asked of it bounds it for the rest of the tick."""
+    """A number that was measured; each answer about it bounds it for the rest of the tick."""
 
     __slots__ = ()
 
@@ -198,7 +198,7 @@ class MeasuredNumber(UnknownNumber):
 
     @property
     def keeps_answers(self) -> bool:
-        """Always: what is NaN is asked apart."""
+        """Return True: a test for NaN is a question of its own."""
         return True
 
     def _asked(self, symbol: str, other: float) -> bool:
@@ -239,7 +239,7 @@ class MeasuredNumber(UnknownNumber):
 
 
 class MeasuredText(UnknownText):
-    """A text from outside; what a tick has found of it holds for the rest of the tick."""
+    """A text from outside; each answer about it holds for the rest of the tick."""
 
     __slots__ = ()
 

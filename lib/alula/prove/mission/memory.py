@@ -67,7 +67,7 @@ class _Remembered(NamedTuple):
 
 
 class TreeMemory(NamedTuple):
-    """All that the next tick hangs on besides the managers. ``held`` are the leaves whose executions it hangs on."""
+    """All that the next tick depends on besides the managers. ``held`` are the leaves whose executions it depends on."""
 
     phase: str
     end: Outcome | None
@@ -82,12 +82,12 @@ class TreeMemory(NamedTuple):
 
     @property
     def held(self) -> frozenset[int]:
-        """The leaves whose executions the tree still hangs on."""
+        """The leaves whose executions the tree still depends on."""
         return frozenset(leaf for leaf, _ in self.leaves)
 
 
 class Looked(NamedTuple):
-    """What can still matter of a mission that is somewhere in its trees: the values of its nodes, what is ahead, and what is live.
+    """What can still matter of a mission: the values of its nodes, what is ahead, and what is live.
 
     ``entries``: what is kept of entries that are as before.
     """
@@ -117,7 +117,7 @@ class Body:
 
 
 class Keeper:
-    """Takes the memory out of a mission, and puts it back."""
+    """Takes the memory out of a mission's nodes, and puts it back."""
 
     def __init__(self, body: Body) -> None:
         self._body = body
@@ -145,7 +145,7 @@ class Keeper:
     # --- out ---------------------------------------------------------------------------------------------------------
 
     def take(self) -> TreeMemory:
-        """Return the memory: the end of a mission that is over, else whatever a node that can still be ticked distinguishes."""
+        """Return the memory: the end of a mission that is over, else all values that a node that can still be ticked distinguishes."""
         director, board = self._body.director.memory, self._body.board
         started = director.start_s is not None
         self._left, moments = self._values()
@@ -171,12 +171,12 @@ class Keeper:
         )
 
     def leave(self) -> None:
-        """Leave the nodes as a memory has them that was put back, and was not ticked."""
+        """Record the nodes' values as those of a memory that was put back, where no tick followed."""
         self._left = self._values()[0]
         self.touched.end()
 
     def kept(self, number: int, entry: Frozen, looked: Looked) -> Frozen:
-        """Return what is kept of an entry of a blackboard that a tick has left as it was, with what is ahead after the tick."""
+        """Return what the memory keeps of an entry that a tick has not changed, with what is ahead after the tick."""
         key = (number, *exact(entry))
         if key not in looked.entries:
             name, kind, value = entry
@@ -272,7 +272,7 @@ class Keeper:
 
     @property
     def unknown(self) -> bool:
-        """Return whether there is a value on the mission's blackboard that the search does not know."""
+        """Return whether the mission's blackboard has a value that the search does not know."""
         return any(
             entry.value == ANOTHER if type(entry.value) is str else is_unknown(entry.value)
             for board in self._boards
@@ -280,7 +280,7 @@ class Keeper:
         )
 
     def inside(self) -> Hashable:
-        """Return, in the middle of a tick, all that the rest of it hangs on, and keep no more of what is counted than between two ticks."""
+        """Return, in the middle of a tick, all that the rest of it depends on; reduce counted values to what is kept between two ticks."""
         for node, _, _, counts, _ in self._nodes:
             for name, count in counts.items():
                 setattr(node, name, self._thawed(self._kept(node, name, count)))
@@ -371,7 +371,7 @@ class Keeper:
 
 
 def exact(entry: Frozen) -> tuple[Hashable, ...]:
-    """Return what an entry is compared by: numbers and truth values that are equal are not the same."""
+    """Return the key by which entries are compared: numbers and truth values that are equal are not the same."""
     name, kind, value = entry
     return name, kind, value, repr(value) if isinstance(value, tuple) else type(value)
 

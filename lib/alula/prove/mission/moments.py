@@ -31,9 +31,9 @@ class Moment:
         self._not_passed = 0.0 if now else math.inf
 
     def reached(self, duration: float | str) -> bool:
-        """Return whether so much time has passed since; the same answer for a whole tick, and for ever once it is yes.
+        """Return whether a duration has passed since; the same answer for a whole tick, and for ever once it is yes.
 
-        Of a duration that is not known its name is given: it may be over in any tick.
+        A duration that is not known is given by its name: it may be over in any tick.
         """
         if isinstance(duration, str):
             return not self.oracle.choose((COMPARE, duration, ">", PASSED))
@@ -51,7 +51,7 @@ class Moment:
 
     @property
     def frozen(self) -> Hashable:
-        """What is known of it."""
+        """What is known of it, as a value that can be compared."""
         return ("since", self.passed)
 
     def __add__(self, duration: float) -> Later:
@@ -87,12 +87,12 @@ class Later:
 
     @property
     def over(self) -> bool:
-        """Return whether it has come."""
+        """Return whether the moment has come."""
         return self.since.reached(self.duration)
 
     @property
     def frozen(self) -> Hashable:
-        """What is known of it."""
+        """What is known of it, as a value that can be compared."""
         over = not isinstance(self.duration, str) and self.since.passed >= self.duration
         return OVER if over else ("until", self.duration)
 

@@ -27,7 +27,7 @@ class Asked:
 
 
 def sees_nothing(question: Question) -> Answer:
-    """Answer nothing: outside of a tick there is nobody to ask."""
+    """Answer no question: outside of a tick there is no observation."""
     raise UndecidedError(f"{question} is asked outside of a tick")
 
 
@@ -57,7 +57,7 @@ class Oracle:
         return answer
 
     def choose(self, question: Question, options: tuple[Answer, ...] = (False, True)) -> Answer:
-        """Return one of the options; whoever replays the tick gets the others, too."""
+        """Return one of the options; replays of the tick get the others."""
         number = len(self.asked)
         answer = self._before[number] if number < len(self._before) else options[0]
         self.asked.append(Asked(question, options, answer))

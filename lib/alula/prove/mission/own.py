@@ -54,17 +54,17 @@ class OwnNodes:
 
     @property
     def any_run(self) -> bool:
-        """Return whether a class with children is run."""
+        """Return whether the search runs a class with children."""
         return any(not one.why_not for one in self.taken)
 
     @property
     def names_of_any_order(self) -> frozenset[str]:
-        """Types of node that may do anything with their children."""
+        """The types of node that may do anything with their children."""
         return frozenset(one.name for one in self.taken if one.why_not and one.children)
 
 
 def own_nodes(robot: Robot, part: MissionPart, declared: Sequence[NodeType], why: str = "", *, known: bool = False) -> OwnNodes:
-    """Return them for a search.
+    """Return the nodes of a robot's own for a search.
 
     ``declared`` are types that the file declares and nothing makes. ``why``: nodes with children may do anything for this reason, though
     their code could be run. With inputs that are ``known`` leaves do what they do as long as they read what is known.
@@ -184,20 +184,20 @@ def actions(nodes: Iterable[Node]) -> frozenset[str]:
 
 
 def failing_among(choices: Iterable[Asked], names: Collection[str]) -> str:
-    """Return which of these leaves is taken to fail in a tick, though nobody knows what it does; empty: none."""
+    """Return the leaf among these that is assumed to fail in a tick, as its action is unknown; empty: none."""
     failed = (str(one.question[1]) for one in choices if one.question[0] == ANSWER and one.answer == FAILURE.value)
     return next((name for name in failed if name in names), "")
 
 
 def write(robot: Robot, node: Node) -> None:
-    """Write values of which nothing is known to all outputs."""
+    """Write unknown values to all outputs."""
     entries = written_entries(node)
     for port in outputs(node):
         node.put(port.name, any_value(robot.oracle, f"`{entries[port.name]}`", robot.uses.type_of(node, port)))
 
 
 def outputs(node: Node) -> list[Port]:
-    """Return the ports that a node may write, and its file gives an entry for."""
+    """Return the ports that a node may write, and that are connected to an entry."""
     written = written_entries(node)
     return [port for port in node.wiring.type.ports.values() if port.name in written]
 
@@ -213,7 +213,7 @@ DOES, WRITES = "does", "writes"
 
 
 class AnyOrder(Own, Control):
-    """Ticks and halts its children in any order, any number of times, and answers anything: what a class of which no more is known may do.
+    """Ticks and halts its children in any order, any number of times, and answers anything: the behaviour of a class that is not known.
 
     It goes on as long as something comes of it that was not so before in this tick.
     """
@@ -223,7 +223,7 @@ class AnyOrder(Own, Control):
     """A halt halts all that runs, as that of all controls; False where its class has one of its own."""
 
     def update(self) -> Answer:
-        """Do anything, and answer."""
+        """Tick and halt children as the oracle chooses, and return any answer."""
         end = self._do_anything(ENDS)
         if end == SKIPPED_RUNNING:
             self.become(RUNNING)
@@ -234,7 +234,7 @@ class AnyOrder(Own, Control):
         return answer
 
     def halt(self) -> None:
-        """Halt what runs; where its class has a halt of its own, do anything, and be idle."""
+        """Halt the children that run; where the class has a halt of its own, do anything with them first, and be idle."""
         if self.halts_all:
             self.reset_children()
         else:

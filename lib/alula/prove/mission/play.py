@@ -47,12 +47,12 @@ MORE_S = 1e-6
 
 
 class LeftError(Exception):
-    """The mission does something else than the run; the message says what."""
+    """The mission departs from the run; the message has the difference."""
 
 
 @dataclass(frozen=True)
 class Played:
-    """How a run was played: the mission's end, where it left the run (empty: nowhere), and the outputs that the mission's account tells."""
+    """The result of a play: the mission's end, where it left the run (empty: nowhere), and the outputs in the mission's account."""
 
     end: End
     left: str
@@ -61,7 +61,7 @@ class Played:
 
 
 def play(mission: MissionFile, run: MissionRun, out: Path | None = None) -> Played:
-    """Fly a run of a mission; with ``out`` the mission is recorded there, as one over mocks."""
+    """Play a run of a mission; with ``out`` the mission is recorded there, as one over mocks."""
     player = _Player(mission, run, out)
     left = ""
     try:
@@ -107,13 +107,13 @@ class _Told(MissionClient):
     on_start: Callable[[SkillHandle], None]
 
     def start(self, skill: str, **inputs: object) -> SkillHandle:
-        """Start it, and say so: a tree may leave in the same tick what it has started, and start it again."""
+        """Start a skill, and report it at once: a tree may halt in the same tick what it has started, and start it again."""
         handle = super().start(skill, **inputs)
         self.on_start(handle)
         return handle
 
     def follow(self, data: Collection[str]) -> None:
-        """Follow nothing: the managers of a play have no data."""
+        """Ignore it: the managers of a play have no data."""
 
     def value(self, data: str) -> object | None:
         return self.said.get(f"{self.skillset}.{data}")
@@ -178,7 +178,7 @@ class _Player:
         return "as in the counterexample" if event is not None and event.state == ExecutionState.NOT_VALIDATED.value else ""
 
     def take(self, event: Event) -> None:
-        """Have it happen; raise LeftError where it does not."""
+        """Make an event happen; raise LeftError where it does not."""
         match event.kind:
             case Kind.TICK:
                 self._tick(event, self._driver.tick)
@@ -363,7 +363,7 @@ class _Player:
             self._compare(skillset, {resource: state}, "at the end ")
 
     def finish(self, left: str) -> Played:
-        """End the record."""
+        """Close the record, and return the result; ``left`` is where the mission left the run."""
         end = self._driver.end or End(Outcome.ABORTED, f"it left the counterexample {left}" if left else "the counterexample ends here")
         self._driver.finish(end)
         return Played(end, left, self.world.now_s, self._facts())

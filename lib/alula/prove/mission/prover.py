@@ -98,7 +98,7 @@ class _Seen:
     bounds: tuple[Diagnostic, ...] = ()
 
     def proved(self) -> Proved:
-        """Return it without what the file accepts."""
+        """Return the result without the findings that the file accepts."""
         if self.system is None:
             return Proved([*self.found, *self.bounds], [], complete=False)
         known = acceptances(self.system.nodes)

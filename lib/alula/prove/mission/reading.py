@@ -57,7 +57,7 @@ class Reading:
     """By entry those that what it has may come of."""
 
     def add(self, other: Reading) -> None:
-        """Read what another one reads, too."""
+        """Add what another node reads."""
         self.names |= other.names
         self.counted |= other.counted
         self.whole |= other.whole
@@ -72,7 +72,7 @@ class Reading:
             self.flows.setdefault(key, set()).update(sources)
 
     def sources(self, names: Iterable[Key]) -> frozenset[Key]:
-        """Return entries, and all that what they have may come of."""
+        """Return the entries of these names, and all entries that their values may come from."""
         return frozenset(reachable_from(names, lambda name: self.flows.get(name, ())))
 
 
@@ -124,7 +124,7 @@ class Read(Reading):
         )
 
     def value(self, name: Key, value: object) -> object:
-        """Return what is kept of an entry's value."""
+        """Return what the memory keeps of an entry's value."""
         if isinstance(value, UnknownText) and value.known is not None:
             value = value.known
         if value is None:
@@ -142,7 +142,7 @@ class Read(Reading):
         return value
 
     def kind(self, name: Key, value: object) -> object:
-        """Return something of the kind of a value, so that scripts can go on to compute with it."""
+        """Return a stand-in of the same kind as a value, with which scripts can go on to compute."""
         if isinstance(value, str):
             return ANOTHER
         unknown = UnknownNumber if isinstance(value, int | float) else Unknown

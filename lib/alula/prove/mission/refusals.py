@@ -1,4 +1,4 @@
-"""Requests that can be refused, where the tree has no answer to it, and what changed after the tree had asked."""
+"""Requests that can be refused without a response of the tree, and what changed between the request and its arrival."""
 
 from __future__ import annotations
 
@@ -44,7 +44,7 @@ def refusal_of(regions: Regions, row: Row) -> Refusal | None:
 
 
 def failing(regions: Regions, row: Row) -> tuple[int, Way] | None:
-    """Return where and how a row fails otherwise than by a refusal, None where it does not."""
+    """Return where and how a row fails other than by a refusal, None where it does not."""
     place = regions.system.place_of(("execution", row.leaf))
     for region, way in row.ways:
         outcome, sets = way

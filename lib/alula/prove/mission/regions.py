@@ -29,23 +29,23 @@ KINDS = {TICK: Kind.TICK, ABORT: Kind.ABORT}
 
 @dataclass(frozen=True)
 class Closure:
-    """Managers that can come of others; ``before`` has for each the one before it and what happened, None for where it began."""
+    """The managers that are reachable from others; ``before`` has for each its predecessor and the event, None for where it began."""
 
     before: Mapping[int, tuple[int, Event] | None]
     depth: Mapping[int, int]
 
     @cached_property
     def all(self) -> frozenset[int]:
-        """All of them."""
+        """All managers, by their numbers."""
         return frozenset(self.before)
 
     @cached_property
     def roots(self) -> frozenset[int]:
-        """Where they begin."""
+        """The managers where it begins."""
         return frozenset(number for number, step in self.before.items() if step is None)
 
     def way(self, number: int) -> tuple[int, list[Event]]:
-        """Return where a shortest way to managers begins, and what happens on it."""
+        """Return the start of a shortest way to managers, and its events."""
         events: list[Event] = []
         while (step := self.before[number]) is not None:
             number, event = step
@@ -66,11 +66,11 @@ class Ticked:
 
     @property
     def outcome(self) -> Outcome:
-        """What it comes to, but for the choices and the answers of nodes."""
+        """The outcome, the same for all ways but for the choices and the answers of nodes."""
         return self.ways[0][0]
 
     def way(self, managers: Sequence[int]) -> Outcome:
-        """Return how it goes with these managers."""
+        """Return the outcome of the way that these managers take."""
         return next(one for one, sets in self.ways if all(number in known for number, known in zip(managers, sets, strict=True)))
 
 
@@ -85,7 +85,7 @@ class Fork:
 
 @dataclass
 class Region:
-    """A memory and what the managers can be.
+    """A memory with all managers that are possible with it.
 
     ``origins``: the managers that ticks led to, one set a skillset, each with the region before and the tick; None for the first.
     """
@@ -105,7 +105,7 @@ class Region:
         return self.origins[0][1]
 
     def origin_of(self, roots: Sequence[int]) -> tuple[int, Ticked] | None:
-        """Return the first that led to these managers."""
+        """Return the first origin that led to these managers."""
         return next(origin for sets, origin in self.origins if all(one in known for one, known in zip(roots, sets, strict=True)))
 
 
@@ -114,7 +114,7 @@ LOOK_AT_CLOCK = 512
 
 
 class Regions:
-    """The regions that can be reached; ``complete`` when there are no more."""
+    """The reachable regions; ``complete`` when all were found."""
 
     def __init__(self, system: System, deadline: Deadline) -> None:
         self.system = system
@@ -133,7 +133,7 @@ class Regions:
         self._same: dict[frozenset[int], frozenset[int]] = {}
 
     def explore(self, begin: State | None = None, until: Callable[[Region], bool] = lambda _: False) -> None:
-        """Find them all from a situation on (default: power-up), or up to one region; raises OutOfTimeError.
+        """Find all regions from a situation on (default: power-up), or up to one region; raises OutOfTimeError.
 
         Those that few ticks lead to come first; the last is the one that was looked for.
         """
@@ -185,7 +185,7 @@ class Regions:
     # --- ticks -------------------------------------------------------------------------------------------------------
 
     def ticks(self, memory: int, act: str, sets: Sets) -> Iterator[Ticked]:
-        """Yield what a tick can come to; ways that differ in what they have observed of one skillset alone are one."""
+        """Yield the results of a tick; ways that differ only in their observations of one skillset are one."""
         found: dict[tuple[int, tuple[int, ...], tuple[int, ...]], list[Ticked]] = {}
         for outcome, left in self.split(memory, act, sets):
             same = found.setdefault((outcome.memory, outcome.started, outcome.interrupted), [])
@@ -199,11 +199,11 @@ class Regions:
             yield from same
 
     def same(self, numbers: frozenset[int]) -> frozenset[int]:
-        """Return the one set of these numbers that all have: there are few that differ, and they are held many times."""
+        """Return the one shared instance of this set of numbers: few differ, and they are held many times."""
         return self._same.setdefault(numbers, numbers)
 
     def split(self, memory: int, act: str, sets: Sets) -> Iterator[tuple[Outcome, Sets]]:
-        """Yield each way in which a tick can go, with the managers that it can go so with."""
+        """Yield each way in which a tick can go, with the managers with which it can."""
         todo: deque[tuple[tuple[Answer, ...], Sets]] = deque([((), sets)])
         while todo:
             answers, left = todo.pop()
@@ -238,7 +238,7 @@ class Regions:
         return _Any(self.system, sets)
 
     def after(self, place: int, number: int, outcome: Outcome) -> int:
-        """Return managers after what a tick has asked for."""
+        """Return the managers after the requests of a tick."""
         key = (place, number, outcome.memory, outcome.started, outcome.interrupted)
         if key not in self._commanded:
             self._commanded[key] = self.system.commanded(place, number, outcome)
@@ -309,7 +309,7 @@ class Regions:
         self._by_memory.clear()
 
     def closure(self, place: int, roots: frozenset[int], memory: int) -> Closure:
-        """Return what can come of managers before the next tick of a mission with this memory."""
+        """Return the managers that are reachable before the next tick of a mission with this memory."""
         key = (place, roots, self.system.bars(memory))
         if key not in self._closures:
             before: dict[int, tuple[int, Event] | None] = dict.fromkeys(sorted(roots))
@@ -350,7 +350,7 @@ class Regions:
             events.insert(0, tick)
 
     def soonest(self, number: int, sets: Sets) -> tuple[int, ...]:
-        """Return managers of these sets that a run to a region comes to by the fewest steps."""
+        """Return the managers of these sets that a run to a region reaches in the fewest steps."""
         closures = self.regions[number].closures
         return tuple(min(known, key=one.depth.__getitem__) for known, one in zip(sets, closures, strict=True))
 

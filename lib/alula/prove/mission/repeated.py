@@ -1,4 +1,4 @@
-"""Ticks that repeat: one that reads the same of a mission's memory, and gets the same answers, does the same.
+"""Ticks that repeat: one that reads the same from a mission's memory, and gets the same answers, has the same effect.
 
 Memories of a mission differ mostly in entries of the blackboards that a tick does not look at. So a tick is kept by what it read, entries
 and answers one after another, and holds for each memory that is the same there; what it has not looked at stays as it is.
@@ -21,7 +21,7 @@ Kind = tuple[TreeMemory, tuple[type, ...], str]
 
 @dataclass(frozen=True)
 class Effect:
-    """What a tick asks for, what it was seen to do to nodes, and the memory after it, with only what it touched on the blackboards."""
+    """The requests of a tick, its observed effects on nodes, and the memory after it, with only those entries that it touched."""
 
     after: TreeMemory
     looked: Looked | None
@@ -42,7 +42,7 @@ class _Step:
 
 
 class Repeated:
-    """The ticks that were done, by what they read."""
+    """The ticks done so far, by what they read."""
 
     def __init__(self, keeper: Keeper) -> None:
         self._keeper = keeper
@@ -52,7 +52,7 @@ class Repeated:
         self._entries: Mapping[Place, Hashable] = {}
 
     def find(self, memory: TreeMemory, act: str, view: View, answers: Sequence[Answer]) -> tuple[list[Asked], Effect] | None:
-        """Return what a tick asks and does whose first answers are these; None: none is known that reads the same."""
+        """Return the questions and the effect of a known tick that reads the same and begins with these answers; None: there is none."""
         found = self._known.get(self._kind_of(memory, act))
         asked: list[Asked] = []
         while isinstance(found, _Step):
@@ -65,7 +65,7 @@ class Repeated:
         return None if found is None else (asked, found)
 
     def after(self, memory: TreeMemory, effect: Effect) -> TreeMemory:
-        """Return the memory after a tick from one that is the same in all that the tick has read."""
+        """Return the memory after a tick that has this effect, from a memory that agrees in all that the tick reads."""
         if effect.looked is None:
             return effect.after
         boards = []
@@ -75,7 +75,7 @@ class Repeated:
         return effect.after._replace(boards=tuple(boards))
 
     def keep(self, memory: TreeMemory, act: str, asked: Sequence[Asked], effect: Effect, touched: Touched) -> None:
-        """Keep a tick that was done from a memory."""
+        """Store a tick that was done from a memory."""
         if touched.everything:
             return
         kind = self._kind_of(memory, act)

@@ -1,4 +1,4 @@
-"""What stands in the place of a robot when a mission's tree is ticked in the search: its clients, and the executions of its skills."""
+"""Stand-ins for a robot when a mission's tree is ticked in the search: its clients, and the executions of its skills."""
 
 from __future__ import annotations
 
@@ -27,7 +27,7 @@ Position = int
 
 @dataclass
 class Robot:
-    """What all of it shares: the oracle of the tick, and what the tree asks for in it."""
+    """What all stand-ins share: the oracle of the tick, and the requests of the tree in it."""
 
     oracle: Oracle
     conditions: Conditions = Conditions()  # noqa: RUF009 - a value
@@ -50,7 +50,7 @@ class Robot:
         self.measurements = Measurements(self.oracle, self.conditions)
 
     def clock_ns(self) -> int:
-        """Return now, which is no number but computes with times as one."""
+        """Return now: no number, but an object that computes with times as one."""
         return self.now  # type: ignore[return-value]
 
     def begin(self) -> None:
@@ -61,7 +61,7 @@ class Robot:
 
 
 class Handle:
-    """An execution as the tree's leaf sees it; ``fresh``: it was asked for in this very tick."""
+    """An execution as the tree's leaf sees it; ``fresh``: it was requested in this very tick."""
 
     message = ""
 
@@ -80,7 +80,7 @@ class Handle:
 
     @property
     def state(self) -> ExecutionState:
-        """Where it is, as far as the client has heard."""
+        """The state that the client has received last."""
         phase, *end = self._seen
         if phase == "ended":
             return ExecutionState(end[0])
@@ -93,21 +93,21 @@ class Handle:
 
     @property
     def result(self) -> str:
-        """As a client's handle has it."""
+        """The result; empty before the end."""
         return self._seen[2] if self.done else ""
 
     @property
     def outputs(self) -> Mapping[str, object]:
-        """Nothing is known of what a function returns."""
+        """Unknown values: nothing is known of what a function returns."""
         return {one.name: unknown(self._robot.oracle, f"{self.skill}'s {one.name}", type_of(one.type)) for one in self._outputs}
 
     @property
     def progress(self) -> float:
-        """Any number that is not negative."""
+        """An unknown number, not negative."""
         return UnknownNumber(self._robot.oracle, progress_of(self.skillset, self.skill), 0.0)
 
     def interrupt(self) -> None:
-        """Ask for its end."""
+        """Request the interruption."""
         if not self.done:
             self._robot.interrupted.append(self.leaf)
 
@@ -153,14 +153,14 @@ class Client:
         return bool(self._robot.oracle.look(("alive", self.skillset)))
 
     def follow(self, data: Collection[str]) -> None:
-        """No data come to a search."""
+        """Ignore it: the search has no data to follow."""
 
     def value(self, data: str) -> object | None:
-        """Return a value of which no more is known than what this tick has asked of it."""
+        """Return a value bounded only by the answers of this tick."""
         return self._robot.measurements.value(f"{self.skillset}.{data}")
 
     def start(self, skill: str, **_inputs: object) -> Handle:
-        """Ask for an execution; one that nobody can be asked for has FAILED."""
+        """Request an execution; it has FAILED where the managers are not there."""
         leaf = self._robot.starting
         if not self.ready:
             return Handle(self._robot, leaf, self._model, skill, failed=True)
@@ -169,7 +169,7 @@ class Client:
 
 
 def progress_of(skillset: str, skill: str) -> str:
-    """Return what counterexamples call the progress of a skill."""
+    """Return the name of a skill's progress in counterexamples."""
     return f"the progress of {skillset}.{skill}"
 
 
@@ -186,11 +186,11 @@ class Waits(PendingInterrupts):
         self._leaves = leaves
 
     def interrupt(self, skillset: str, skill: str, handle: SkillHandle, *, holds_all: bool = False) -> None:  # noqa: ARG002
-        """Ask for the end of an execution; the managers remember it."""
+        """Request the interruption of an execution; the managers remember it."""
         handle.interrupt()
 
     def names(self, skillset: str | None = None) -> list[str]:
-        """Return the skillsets whose executions a start waits for, the first of them."""
+        """Return the first of the skillsets whose executions a start waits for, in a list; empty: none."""
         for one in self._skillsets:
             if skillset in {None, one}:
                 if self._any(one, holds_all=False):
@@ -205,10 +205,10 @@ class Waits(PendingInterrupts):
 
 
 class Memory(Blackboard):
-    """A mission's memory: of the failures, what scripts ask for."""
+    """A mission's blackboard that remembers of the failures what scripts ask for."""
 
     def recall_failures(self, first: str, ends: frozenset[str]) -> None:
-        """Have had these: the skill that failed first, and all ends that there were."""
+        """Set the failures: the skill that failed first, and the ends of all that failed."""
         known = [Failure("", first, ExecutionState.FAILED, "", "")] if first else []
         self.failures = known + [Failure("", "", ExecutionState.FAILED, end, "") for end in sorted(ends)]
         self.reason = ""

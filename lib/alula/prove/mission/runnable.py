@@ -1,4 +1,4 @@
-"""Whether the search can run the class of a node with children, and what of it one tick leaves for the next.
+"""Whether the search can run the class of a node with children, and which attributes one tick of it leaves for the next.
 
 It can where the code hangs on nothing but the node's ports, the mission's clock, its children and its own attributes, and changes nothing
 else: then a tick that is done again does the same again. What is not surely so, by its source, is refused.
@@ -181,7 +181,7 @@ class _Code:
         self._local = {node.id for node in named} | {node.arg for node in ast.walk(self._source) if isinstance(node, ast.arg)}
 
     def look(self) -> None:
-        """Look at it; raises _RefusedError."""
+        """Check the code; raises _RefusedError."""
         defaults = (*(self._function.__defaults__ or ()), *(self._function.__kwdefaults__ or {}).values())
         if not all(map(_is_constant, defaults)):
             self._refuse(self._source, "has a default that may change")

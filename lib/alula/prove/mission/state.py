@@ -9,7 +9,7 @@ from alula.prove.mission.oracle import Asked
 
 
 class Kind(Enum):
-    """What happens; the value is what JSON calls it."""
+    """The kind of an event; the value is its name in JSON."""
 
     TICK = "tick"
     """The tree is ticked."""
@@ -67,7 +67,7 @@ class Managers(NamedTuple):
 
 
 class State(NamedTuple):
-    """A situation, by numbers that ``System`` has the meaning of."""
+    """A situation, by the numbers that ``System`` gives to memories and managers."""
 
     memory: int
     managers: tuple[int, ...]
@@ -83,7 +83,7 @@ class Ending(NamedTuple):
 
 
 class Event(NamedTuple):
-    """What happens in a step.
+    """One step from a situation to the next.
 
     Attributes:
         kind: what it is.

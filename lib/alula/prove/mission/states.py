@@ -61,7 +61,7 @@ def _compared(node: Comparison, states: Mapping[str, frozenset[str]]) -> Iterato
 
 
 class SeenState(float):
-    """The number of a state, of which a tick asks no more than a script compares it with; also where managers are not there: it is none."""
+    """The number of a state of which a tick asks only whether it is one that a script compares it with; none without managers."""
 
     __slots__ = ("compared", "oracle", "resource")
     oracle: Oracle

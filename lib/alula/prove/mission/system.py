@@ -171,17 +171,17 @@ class System:
         return memory.started and not memory.stops and memory.end is None
 
     def leaves_out(self, event: Event, memory: int) -> bool:
-        """Return whether something can't happen to managers with this memory: when the mission is over, only what still runs goes on."""
+        """Return whether managers can't take an event with this memory: when the mission is over, only running executions go on."""
         if event.kind is Kind.PAUSE:
             return not self.ticker.may_pause(memory)
         return event.leaf < 0 and self.ticker.memories[memory].end is not None
 
     def bars(self, memory: int) -> tuple[bool, bool]:
-        """Return what these hang on."""
+        """Return what the answers of ``leaves_out`` depend on."""
         return self.ticker.memories[memory].end is not None, self.failures.pauses and self.ticker.may_pause(memory)
 
     def moves_of(self, place: int, number: int) -> tuple[tuple[Event, int], ...]:
-        """Return what can happen in the managers of one skillset, by its place in ``skillsets``: no other skillset has a part in it."""
+        """Return the events possible in one skillset's managers, by its place in ``skillsets``, independent of all other skillsets."""
         key = (place, number)
         if key not in self._moves:
             found = self._steps[place].moves(self._managers[number])
@@ -205,7 +205,7 @@ class System:
         return dict(zip(names, self._managers[number].states or (), strict=True))
 
     def commanded(self, place: int, number: int, ticked: Ticked) -> int:
-        """Return managers with what a tick has asked for under way, without ends that the tree hangs on no more."""
+        """Return the managers with the requests of a tick under way, without ends that the tree depends on no more."""
         held = self.ticker.memories[ticked.memory].held
         managers = self._managers[number]
         skills = self._steps[place].skills
@@ -223,7 +223,7 @@ class System:
     # --- observers ---------------------------------------------------------------------------------------------------
 
     def memory(self, state: State) -> TreeMemory:
-        """Return what the tree remembers."""
+        """Return the memory of the mission."""
         return self.ticker.memories[state.memory]
 
     def managers_of(self, number: int) -> Managers:
@@ -255,7 +255,7 @@ class System:
         return any(one.phase == RUNNING and skills[one.leaf] == name for one in self.managers(state, skillset).executions)
 
     def open(self, state: State) -> list[tuple[int, Execution]]:
-        """Return what is under way or runs: each with its leaf."""
+        """Return the executions that are requested or run, each with its leaf."""
         return [(one.leaf, one) for number in state.managers for one in self._managers[number].executions if one.phase != ENDED]
 
     def active(self, state: State) -> list[Node]:
@@ -268,12 +268,12 @@ class System:
         return found
 
     def place_of(self, question: Question) -> int:
-        """Return the place of the skillset that a tick's observation is of."""
+        """Return the place in ``skillsets`` of the skillset that an observation is of."""
         leaf = question[1]
         return self._place[self.leaves[leaf].skillset if isinstance(leaf, int) else str(leaf)]
 
     def answer(self, number: int, question: Question) -> Answer:
-        """Answer an observation by the managers that it is of."""
+        """Answer an observation by the managers with this number."""
         managers = self._managers[number]
         match question:
             case ("resource", str(skillset), str(name)):

@@ -31,7 +31,7 @@ CHOSEN_ANEW = frozenset({DOES, ANSWER, COMPARE})
 
 
 class Outcome(NamedTuple):
-    """What a tick comes to: the number of the memory after it, what it asks for, and what was seen of the nodes."""
+    """The result of a tick: the number of the memory after it, its requests, and what was observed of the nodes."""
 
     memory: int
     started: tuple[int, ...]
@@ -42,7 +42,7 @@ class Outcome(NamedTuple):
 
 @dataclass
 class Decision:
-    """A question, and what follows from each answer; ``options`` are empty for an observation."""
+    """A question, and the next question or outcome for each answer; ``options`` are empty for an observation."""
 
     question: Question
     options: tuple[Answer, ...]
@@ -50,12 +50,12 @@ class Decision:
 
     @property
     def in_breadth(self) -> bool:
-        """Return whether few such choices come before many: what a node does one after another leads to most things in many ways."""
+        """Return whether few such choices come before many: a node that does one after another reaches most results in many ways."""
         return self.question[0] == DOES
 
 
 class OneStop:
-    """The mission, with one tree that brings the robot to rest: a mission is aborted once."""
+    """The mission with a single tree that brings the robot to rest: a mission is aborted once."""
 
     def __init__(self, mission: MissionTrees, stop: Tree | None) -> None:
         self._mission = mission
@@ -65,16 +65,16 @@ class OneStop:
 
     @property
     def degraded(self) -> bool:
-        """As the mission."""
+        """Return whether the mission is degraded."""
         return self._mission.degraded
 
     @property
     def stopping(self) -> bool:
-        """As the mission."""
+        """Return whether the mission is stopping."""
         return self._mission.stopping
 
     def stop_here(self) -> Behaviour:
-        """Return the tree that there is; where the file has none, there is nothing to add to the halt."""
+        """Return the single tree that stops the robot; where the file has none, the halt is all."""
         return self._mission.stop_here() if self._stop is None else self._stop.root
 
 

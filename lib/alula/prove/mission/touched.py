@@ -15,7 +15,7 @@ Place = tuple[int, str]
 
 
 class Touched:
-    """What a tick has looked at: ``places``, each with how many questions had been asked by then; ``everything``: perhaps all."""
+    """The entries that a tick has accessed: ``places``, each with the number of questions before; ``everything``: perhaps all entries."""
 
     def __init__(self, asked: Callable[[], int]) -> None:
         self.places: dict[Place, int] = {}
@@ -28,22 +28,22 @@ class Touched:
         self.places, self.everything, self._ticking = {}, False, True
 
     def end(self) -> None:
-        """End it: what is looked at from now on is no part of it."""
+        """End the tick: later accesses are not recorded."""
         self._ticking = False
 
     def one(self, place: Place) -> None:
-        """Note an entry that is looked at, whether it is there or not."""
+        """Record an access to an entry, whether it exists or not."""
         if self._ticking and place not in self.places:
             self.places[place] = self._asked()
 
     def all(self) -> None:
-        """Note that what is done may hang on anything."""
+        """Record that the tick may depend on any entry."""
         if self._ticking:
             self.everything = True
 
 
 class TouchedEntries(dict[str, Entry]):
-    """The entries of one blackboard, which tell what is looked at."""
+    """The entries of one blackboard; each access is recorded."""
 
     def __init__(self, number: int, touched: Touched) -> None:
         super().__init__()
@@ -76,7 +76,7 @@ class TouchedEntries(dict[str, Entry]):
         return super().setdefault(key, default)
 
     def pop(self, key: str, *default: Any) -> Any:
-        """Take an entry away."""
+        """Remove an entry, and return it."""
         self._touched.one((self._number, key))
         return super().pop(key, *default)
 

@@ -27,7 +27,7 @@ ORDERS: dict[str, Callable[[str, str], bool]] = {"==": operator.eq, "<": operato
 
 @dataclass(frozen=True)
 class Distance:
-    """How far a number that is not known is from another: scripts only ask whether that is next to nothing, and this asks for it then."""
+    """The distance of an unknown number from another: scripts only compare it with nearly zero, and that comparison is a choice."""
 
     is_none: Callable[[], bool]
 
@@ -39,7 +39,7 @@ class Distance:
 
 
 class MisfitError(ValueError):
-    """An unknown value is taken for one that a port can't read: what its node makes of that comes of such values."""
+    """An unknown value is assumed to be one that a port can't read."""
 
 
 def fit(oracle: Oracle, what: str, type_: PortType) -> None:
@@ -68,7 +68,7 @@ class Unknown(StandIn):
         return ("any", self.what, self.fits)
 
     def read_as(self, type_: PortType) -> object:
-        """Return what a port reads of it; raises UndecidedError where that has to be a number, and nothing says that it is one."""
+        """Return the value that a port reads; raises UndecidedError where that has to be a number, and nothing says that it is one."""
         if type_ is ANY:
             return self
         if self.fits:
@@ -106,7 +106,7 @@ class UnknownItems(list[object], StandIn):
         return ("items", self.what, self.item)
 
     def read_as(self, type_: PortType) -> object:
-        """Return itself where a port reads a list or anything; raises MisfitError else."""
+        """Return itself where a port reads a list or anything; raises MisfitError otherwise."""
         if type_ is not ANY and type_.item is None:
             raise MisfitError(f"{self.what} is no {type_.name}")
         return self
@@ -129,7 +129,7 @@ class UnknownItems(list[object], StandIn):
 
 
 class UnknownText(str, StandIn):
-    """A text of which no more is known than what was asked: whether it is another one is a choice.
+    """A text known only by answers: whether it equals another one is a choice.
 
     What needs its letters raises UndecidedError.
     """
@@ -152,7 +152,7 @@ class UnknownText(str, StandIn):
         return ("text", self.what, self.others) if self.known is None else self.known
 
     def read_as(self, type_: PortType) -> object:
-        """Return what a port reads of it; raises MisfitError where it is taken for a text that says no value of the port's type."""
+        """Return the value that a port reads; raises MisfitError where the text is assumed to have no value of the port's type."""
         if self.known is not None:
             return type_.parse(self.known)
         if type_ in {STRING, ANY}:
@@ -162,7 +162,7 @@ class UnknownText(str, StandIn):
         return unknown(self.oracle, self.what, type_)
 
     def says(self, number: float) -> bool:
-        """Return whether it is a text for a number."""
+        """Return whether the text stands for a number."""
         return self._asked("a text for", f"{number:g}")
 
     def _asked(self, symbol: str, other: str) -> bool:
@@ -282,7 +282,7 @@ class UnknownNumber(float, StandIn):
         return (self.what, self.low, self.high, self.whole, self.others)
 
     def read_as(self, type_: PortType) -> object:
-        """Return what a port reads of it; raises MisfitError where it is taken for a number that the port's type does not have."""
+        """Return the value that a port reads; raises MisfitError where the number is assumed not to be one of the port's type."""
         if type_ is BOOL:
             return self != 0
         if type_ is STRING:
@@ -299,7 +299,7 @@ class UnknownNumber(float, StandIn):
 
     @property
     def keeps_answers(self) -> bool:
-        """Whether what was answered of it holds from then on."""
+        """Whether an answer about it holds from then on."""
         return self.whole
 
     # --- comparisons -------------------------------------------------------------------------------------------------
@@ -437,7 +437,7 @@ def unknown(oracle: Oracle, what: str, type_: PortType) -> object:
 
 
 def any_value(oracle: Oracle, what: str, type_: PortType | None) -> object:
-    """Return a value of a type of which nothing is known; of no type one that fits wherever it is read."""
+    """Return an unknown value of a type; without a type, one that fits wherever it is read."""
     return Unknown(oracle, what, fits=True) if type_ is None else unknown(oracle, what, type_)
 
 

@@ -1,4 +1,4 @@
-"""Of which type values are that nodes without a class write, and inputs of a mission: of what their readers need, as nothing else says it.
+"""The types of unknown values: of what nodes without a class write, and of a mission's inputs, as far as their readers need one.
 
     <Look where="{found}"/>  <ScriptCondition code="found == 'door'"/>     # `found` is a text
 
@@ -33,7 +33,7 @@ class Uses:
 
     @classmethod
     def of(cls, roots: Iterable[Wiring], declared: Collection[str], unread: Collection[str], numbers: Collection[str]) -> Uses:
-        """Read them of the trees of a mission, which stand on one blackboard.
+        """Collect the types from the trees of a mission, which share one blackboard.
 
         ``declared`` are types of node that have no class, ``unread`` those that decide by nothing that is known, ``numbers`` are names that
         scripts have for numbers.
@@ -48,7 +48,7 @@ class Uses:
         return cls({name: type_ for (board, name), type_ in types.items() if board.above is None}, ports)
 
     def type_of(self, node: TreeNode, port: Port) -> PortType | None:
-        """Return the type of what a node writes to a port, None where nothing says any and each reader can read it."""
+        """Return the type of what a node writes to a port, None where no reader needs a type."""
         return port.type if port.type is not ANY else self.ports.get((node.uid, port.name), ANY)
 
     def type_of_input(self, port: Port) -> PortType | None:
@@ -67,7 +67,7 @@ class _Seen:
         self._pairs: set[tuple[Key, Key]] = set()
 
     def at(self, wiring: Wiring, unread: Collection[str]) -> None:
-        """Look at what a node asks for; ``unread`` are types of node that decide by nothing that is known."""
+        """Collect the types that a node needs; ``unread`` are types of node that decide by no known value."""
         for attribute in scripts_of(wiring.element, wiring.type):
             for statement in statements_of(attribute.value):
                 _InScript(self, wiring).condition(statement)
@@ -75,11 +75,11 @@ class _Seen:
             self._ports(wiring)
 
     def same(self, one: Key, other: Key) -> None:
-        """Note two entries of one value, or one that is copied."""
+        """Record that two entries have one value, or that one is copied."""
         self._pairs |= {(one, other), (other, one)}
 
     def need(self, entry: Key, type_: PortType) -> None:
-        """Note of which type an entry has to be."""
+        """Record a type that an entry has to have."""
         self._needed.setdefault(entry, set()).add(type_)
 
     def is_entry(self, name: str) -> bool:
@@ -101,7 +101,7 @@ class _Seen:
                 self.need(key, type_)
 
     def types(self) -> Iterator[tuple[Key, PortType]]:
-        """Yield entries with their types, where all that is seen of one agrees."""
+        """Yield entries with their types, where all readers of one agree."""
         alike: dict[Key, set[Key]] = {}
         for one, other in self._pairs:
             alike.setdefault(one, set()).add(other)
@@ -122,7 +122,7 @@ class _InScript:
         self._board = wiring.blackboard
 
     def condition(self, node: Node) -> None:
-        """Look at a part of a script of which it is asked whether it is true."""
+        """Collect from a part of a script that is read as a truth value."""
         if isinstance(node, Name):
             self._need(node, BOOL)
         self._value(node)

@@ -66,7 +66,7 @@ class Waits:
         """Whether all were looked at, and the mission can come to an end from each: known once ``found`` is through."""
 
     def found(self, deadline: Deadline) -> Iterator[tuple[Node, list[Event], State, bool, str]]:
-        """Yield each node that it stays in for ever, a run to there, the situation, whether all stays as it is, and what data say.
+        """Yield each node that the mission waits in for ever, a run to there, the situation, whether all stays as it is, and the data.
 
         When the time is over, it yields those of what was looked at by then, and raises OutOfTimeError.
         """

@@ -1,4 +1,4 @@
-"""What an author wants to hold in all runs of a mission, where Groot2 shows and keeps what a node is about.
+"""The properties that an author states in the descriptions of nodes, where Groot2 shows and keeps them.
 
     <Fallback name="mapping mission" _description="property seen: always navigation.goto running => perception.lidar_depthmap running;">
 
@@ -39,7 +39,7 @@ class WantedError(Exception):
 
 
 def wanted(nodes: Sequence[Node], skillsets: Sequence[Skillset], faults: Collection[str]) -> tuple[list[Property], list[Diagnostic]]:
-    """Return the properties that the nodes' descriptions have, and what is wrong with others."""
+    """Return the properties in the nodes' descriptions, and a finding for each that can't be read."""
     found: dict[Span, Property] = {}
     wrong: dict[Span, Diagnostic] = {}
     names = {node.name for node in nodes}

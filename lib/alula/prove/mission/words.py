@@ -1,4 +1,4 @@
-"""A run of a mission in words: a line for each thing that happens, the tree's ticks by what they ask for."""
+"""A run of a mission in words: a line for each event, and for each tick its requests."""
 
 from __future__ import annotations
 
@@ -10,13 +10,13 @@ from alula.prove.mission.system import System
 
 
 def told(system: System, events: Sequence[Event]) -> tuple[str, ...]:
-    """Return numbered lines; ticks that only look are left out."""
+    """Return the run as numbered lines, without ticks that request nothing."""
     lines = [line for event in events for line in _lines(system, event)]
     return tuple(f"{number}. {line}" for number, line in enumerate(lines, 1))
 
 
 def situation(system: System, state: State) -> str:
-    """Return a situation in words: what is not as at power-up, what runs, and where the tree is."""
+    """Return a situation in words: states that differ from power-up, running executions, and the outcome or the innermost active node."""
     first = system.initial()
     names = [f"{one.name}.{resource.name}" for one in system.skillsets for resource in one.resources]
     words = [f"{name} == {system.resource(state, name)}" for name in names if system.resource(state, name) != system.resource(first, name)]
@@ -75,7 +75,7 @@ def _leaf(system: System, leaf: int) -> str:
 
 
 def choice(one: Asked) -> str:
-    """Return what a tick has observed, or what its nodes return; empty where neither explains anything."""
+    """Return the observation or the node's answer of a tick in words; empty where it explains nothing."""
     match one.question:
         case ("time", str(duration)):
             return f"{float(duration) / 1e9:g} s are over" if one.answer and float(duration) >= 1e6 else ""

@@ -63,7 +63,7 @@ def _asked(skill: Skill, possibly: _Possibly) -> tuple[Precondition, ...]:
 
 
 def conjunction(conditions: Iterator[Expression]) -> Expression:
-    """Return that all conditions are true."""
+    """Return the conjunction of conditions."""
     several = tuple(conditions)
     if len(several) == 1:
         return several[0]

@@ -33,7 +33,7 @@ class Group:
 
 @dataclass(frozen=True)
 class Step:
-    """An update with what may follow; ``about`` are the variables that decide what it does, ``sets`` those that it may change."""
+    """An update with its violations; ``about`` are the variables that decide its effect, ``sets`` those that it may change."""
 
     update: Update
     groups: tuple[Group, ...]
@@ -44,7 +44,7 @@ class Step:
 
 
 class Aftermath:
-    """Finds what may follow an update."""
+    """Finds the violations that may follow an update."""
 
     def __init__(self, model: Encoded, bound: Bound) -> None:
         self.model = model
@@ -55,7 +55,7 @@ class Aftermath:
         self._following: dict[str, tuple[str, ...]] = {}
 
     def step(self, update: Update) -> Step:
-        """Return an update with what may follow."""
+        """Return an update with the violations that may follow it."""
         direct = [skill for skill in self._watching(update) if self._breaks(update, skill)]
         whole = reachable_from(direct, self.following)
         groups = tuple(self._group(skills, direct) for skills in self._entangled([s for s in self._concerns if s in whole]))
@@ -82,7 +82,7 @@ class Aftermath:
         return [skill for skill in self._watching(update) if skill in self.following(self.owner(name))]
 
     def owner(self, name: str) -> str:
-        """Return the skill that a variable ``broken`` is of."""
+        """Return the skill that a variable ``broken`` belongs to."""
         return name.split(" ")[1]
 
     def _watching(self, update: Update) -> list[str]:

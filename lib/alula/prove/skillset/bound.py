@@ -1,4 +1,4 @@
-"""Situations that can't be: what holds of every reachable one, found for one resource at a time.
+"""Over-approximate the reachable situations, one resource at a time.
 
 A resource is looked at with the skills that change it, and with nothing else: whatever a step asks of others may be true.
 So a block's steps are more than what can happen, and its situations include all that can be reached. With them goes what is
@@ -23,7 +23,7 @@ MOST_NODES = 100
 
 @dataclass(frozen=True)
 class Block:
-    """What one resource and the executions that change it can be: after a step, and within one, while violations take effect."""
+    """The possible values of one resource and the executions that change it: after a step, and within one, while violations take effect."""
 
     settled: Any
     within: Any
@@ -32,7 +32,7 @@ class Block:
 
 
 class Bound:
-    """The blocks of a skillset."""
+    """The over-approximation of a skillset's reachable situations, by its blocks."""
 
     def __init__(self, model: Encoded, deadline: Deadline) -> None:
         self.model = model
@@ -64,19 +64,19 @@ class Bound:
         return self.model.any_of(first_false for _, first_false in self.model.marks.get(skill, []))
 
     def narrowed(self, situations: Any) -> Any:
-        """Return a set without what is known not to be, of the resources and skills that it is about."""
+        """Return a set without situations that the blocks of its resources and skills exclude."""
         return self.within_limits(situations, self._known(self.bdd.support(situations)))
 
     def around(self, *several: Any) -> Any:
-        """Return what is known of the resources and skills that these sets are about: all that can be reached, and more."""
+        """Return the over-approximation of what is reachable, for the resources and skills of these sets."""
         return self.within_limits(self.bdd.true, self._known(set().union(*map(self.bdd.support, several))))
 
     def skills(self, situations: Any) -> set[str]:
-        """Return the skills that a set is about."""
+        """Return the skills that a set depends on."""
         return self._parts(self.bdd.support(situations))[1]
 
     def within_limits(self, situations: Any, parts: Iterable[Any]) -> Any:
-        """Return what is in a set and in all parts, without parts that would make its diagram too large: it has more then."""
+        """Return the intersection of a set and all parts; parts that make its diagram too large are left out, so that it is a superset."""
         most = max(MOST_NODES * len(self.bdd.vars), len(situations))
         for part in parts:
             self.deadline.check()
@@ -86,11 +86,11 @@ class Bound:
         return situations
 
     def within(self, resources: Iterable[str]) -> Any:
-        """Return what these resources can be within a step."""
+        """Return the possible values of these resources within a step."""
         return self.model.all_of(self.blocks[name].within for name in sorted(set(resources)))
 
     def unmarked(self, resources: Iterable[str]) -> Any:
-        """Return what these resources can be within a step, whatever is found broken."""
+        """Return the possible values of these resources within a step, whichever invariants are marked as broken."""
         return self.model.all_of(self.blocks[name].unmarked for name in sorted(set(resources)))
 
     def _known(self, variables: Iterable[str]) -> list[Any]:

@@ -1,4 +1,4 @@
-"""Tells a way through the situations: each step is taken again with data and time, by the semantics, and put into words.
+"""Put a way through the situations into words: each step is taken again with data and time, by the semantics.
 
 The search leaves data and time out: what they decide may go either way. A counterexample names values that show the way.
 Where none are found (two invariants may want different values at once), the rest of the way is told as the search took it.

@@ -24,7 +24,7 @@ ENDED = "ended"
 
 @dataclass(frozen=True)
 class Update:
-    """What fulfils ``guard`` gets these values; ``changed`` are the resources among them, ``ends`` the skill that it ends."""
+    """Situations that fulfil ``guard`` get these values; ``changed`` are the resources among them, ``ends`` the skill that it ends."""
 
     guard: Any
     values: Mapping[str, bool]
@@ -77,7 +77,7 @@ class Encoded:
         return self.bdd.cube(self.values_of(resource, state))
 
     def runs(self, skill: str, count: int = 1) -> Any:
-        """Return the situations in which at least so many executions of a skill run."""
+        """Return the situations in which at least ``count`` executions of a skill run."""
         return self.bdd.var(runs_name(skill, count)) if count <= self.copies[skill] else self.bdd.false
 
     def term(self, condition: Expression) -> Any:
@@ -102,14 +102,14 @@ class Encoded:
                 raise ValueError(f"no set of situations can ask data: {condition}")
 
     def all_of(self, terms: Iterable[Any]) -> Any:
-        """Return what is in all sets."""
+        """Return the intersection of sets."""
         result = self.bdd.true
         for term in terms:
             result &= term
         return result
 
     def any_of(self, terms: Iterable[Any]) -> Any:
-        """Return what is in some set."""
+        """Return the union of sets."""
         result = self.bdd.false
         for term in terms:
             result |= term
@@ -123,7 +123,7 @@ class Encoded:
         )
 
     def changes(self, effect: Effect) -> dict[str, bool]:
-        """Return what an effect sets."""
+        """Return the values that an effect sets, by variable."""
         values: dict[str, bool] = {}
         for change in effect.assignments:
             if change.target in self.skillset.resource(change.resource).states:

@@ -1,4 +1,4 @@
-"""The search one situation at a time."""
+"""Search the reachable situations one by one."""
 
 from __future__ import annotations
 

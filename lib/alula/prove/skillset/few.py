@@ -24,7 +24,7 @@ MOST = 3000
 
 
 def refuted(abstraction: Abstraction, properties: Iterable[Property], deadline: Deadline, *, copies: int) -> dict[str, Diagnostic]:
-    """Return the properties, by name, that a run of a few skills is against; others may hold or not."""
+    """Return a finding for each property, by name, that some run of a few skills violates; the others remain undecided."""
     whole = TransitionSystem(abstraction, copies=copies)
     found: dict[str, Diagnostic] = {}
     for wanted in properties:

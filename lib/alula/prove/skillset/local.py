@@ -204,7 +204,7 @@ _KIND = {ResultKind.PLAIN: "result", ResultKind.SUCCESS: "success", ResultKind.F
 
 
 def end_key(skill: str, result: str) -> tuple[str, ...]:
-    """Return what suspects and the search call the end of a skill with a result, or (``""``) by its interruption."""
+    """Return the key, for suspects and the search, of a skill's end with a result, or (``""``) by its interruption."""
     return ("result", skill, result) if result else ("interrupt", skill)
 
 
@@ -223,7 +223,7 @@ def _span(condition: Expression, otherwise: Span) -> Span:
 
 
 def keys(skillset: Skillset) -> Iterator[tuple[str, ...]]:
-    """Yield the key of every effect that is not empty, as suspects and the search have it."""
+    """Yield the key of every effect that is not empty, as in suspects and the search."""
     for event in skillset.events:
         if event.effect.assignments:
             yield ("effect", "event", event.name)

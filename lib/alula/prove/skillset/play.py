@@ -31,7 +31,7 @@ TICK_S = 0.5
 
 @dataclass(frozen=True)
 class PlayedStep:
-    """A step of the counterexample, and how the managers differ from it: a line for each difference, none where they agree."""
+    """A step of the counterexample, and its differences from the managers, one line each; none where they agree."""
 
     step: CounterexampleStep
     differences: tuple[str, ...] = ()
@@ -52,7 +52,7 @@ class _Function(PlayedFunction):
         super().on_dispatch(execution)
 
     def progress(self, execution: Running) -> float:
-        """Return another number each time, so that no deadline of progress passes."""
+        """Return another value each time, so that no deadline of progress passes."""
         self.asked_ns[execution.id] = self.now_ns()
         self._reports += 1
         return (self._reports % 100) / 100

@@ -18,11 +18,11 @@ class PlayManagers(Protocol):
 
     @property
     def engine(self) -> SkillsetEngine:
-        """Where their states are read."""
+        """The engine that has their states."""
         ...
 
     def update_data(self, name: str, value: object | None) -> None:
-        """Take a value of a data, or None: there is no fresh one."""
+        """Set the value of a data, or None: there is no fresh one."""
         ...
 
 
@@ -31,12 +31,12 @@ class PlayWorld(Protocol):
 
     @property
     def managers(self) -> PlayManagers:
-        """Managers of the one skillset, with the hooks that were given."""
+        """The managers of the skillset, with the given hooks."""
         ...
 
     @property
     def client(self) -> Client:
-        """Their client, perhaps not ready yet."""
+        """A client of the managers, perhaps not ready yet."""
         ...
 
     @property
@@ -45,11 +45,11 @@ class PlayWorld(Protocol):
         ...
 
     def pass_time(self, seconds: float) -> None:
-        """Have so much mission time pass; return when managers and client know the new time."""
+        """Advance the mission clock by ``seconds``; return when managers and client have the new time."""
         ...
 
     def settle(self, condition: Callable[[], bool]) -> None:
-        """Let what was asked for happen: until the condition holds, or so long that it will not hold any more."""
+        """Let pending messages and jobs take effect: until the condition holds, or until it can't any more."""
         ...
 
 
@@ -75,7 +75,7 @@ class VirtualWorld:
         self._world.run_for(seconds)
 
     def settle(self, condition: Callable[[], bool]) -> None:  # noqa: ARG002 - nothing more happens at this moment, whatever holds
-        """Do all that is due now."""
+        """Do all jobs that are due now."""
         self._world.run_for(0.0)
 
 

@@ -63,7 +63,7 @@ class _Search:
     copies: int
 
     def findings(self, outside: frozenset[NamedTransition] = frozenset()) -> list[Diagnostic]:
-        """Return all global findings, where these transitions are made from outside as well."""
+        """Return all global findings, with these transitions made from outside as well."""
         skillset = opened(self.skillset, outside) if outside else self.skillset
         abstraction = without_data(skillset, self.deadline, outside)
         self.deadline.doing = "situations one by one"

@@ -21,7 +21,7 @@ NEVER_SEEN = "no reachable situation shows it"
 
 
 def decide(skillset: Skillset, graph: Graph, suspects: Iterable[Suspect]) -> list[Diagnostic]:
-    """Return the suspects with what the search says of them: an error with its counterexample, or a warning: it is out of reach."""
+    """Return the decided suspects: an error with its counterexample, or a warning that it is out of reach."""
     counterexamples = {fault: counterexample.to(graph, number, move, fault) for fault, (number, move) in graph.faults.items()}
     return judged(skillset, suspects, counterexamples)
 
@@ -113,7 +113,7 @@ def crowded(skillset: Skillset, names: set[str], copies: int) -> list[Diagnostic
 
 
 def takes(skill: Skill) -> dict[str, str]:
-    """Return what a skill takes: the states that its start effect puts resources in."""
+    """Return the states that a skill's start effect puts resources in."""
     return {change.resource: change.target for change in skill.start.assignments}
 
 
@@ -168,7 +168,7 @@ def _lost_skills(skillset: Skillset, graph: Graph) -> list[Diagnostic]:
 
 
 def named(fault: Key) -> str:
-    """Return a fault's place in words."""
+    """Return the name of a fault's place for messages."""
     kind, *names = fault[1:]
     match kind:
         case "event":

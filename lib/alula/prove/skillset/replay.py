@@ -35,7 +35,7 @@ class _NoValuesError(Exception):
 
 
 class Replay:
-    """Walks a way from the first state and keeps the steps of its counterexample.
+    """Takes the steps of a way from the first state, and keeps the steps of its counterexample.
 
     The search's executions have their place in its state for a name; here they are numbered by the starts of their skill.
     Steps are taken with data as long as values are found that take them as the search did, and as the search did from then on.
@@ -57,7 +57,7 @@ class Replay:
         self._add(StepKind.INITIALLY, f"initially {told or 'nothing runs'}")
 
     def take(self, move: Move, fault: Key = (), *, loop: bool = False) -> None:
-        """Take a step; ``fault`` is what the last one is to show, if anything."""
+        """Take a step; ``fault`` is the fault that the last step shows, if any."""
         begun, situation, values = len(self.steps), self._situation, self._values
         if move.kind is StepKind.START and move.step is not None:
             self._numbers[move.subject[0]] += 1

@@ -49,11 +49,11 @@ class Sets:
         return sorted(steps, key=lambda step: max(level[name] for name in step.about))
 
     def until(self, deadline: Deadline) -> None:
-        """Have another deadline from now on."""
+        """Set another deadline."""
         self.deadline = self.bound.deadline = deadline
 
     def complete(self) -> None:
-        """Have ``reached`` be exactly what can be reached, however large that is."""
+        """Compute exactly the reachable situations in ``reached``, however large the diagram is."""
         self.exact = True
         self.reached = self._reach(None)
 
@@ -111,7 +111,7 @@ class Sets:
         ]
 
     def after(self, situations: Any, step: Step) -> Any:
-        """Return what a step makes of situations."""
+        """Return the situations after a step from these."""
         changed = self._updated(situations, step.update)
         for group in step.groups if changed != self.bdd.false else ():
             changed = self._settled(group, changed)
@@ -171,7 +171,7 @@ class Sets:
         return result
 
     def staying(self, situations: Any) -> Any:
-        """Return those of these situations that have a step to one of these."""
+        """Return the situations of a set that have a step back into it."""
         left = situations
         for step in sorted(self.steps, key=lambda one: not one.update.ends):
             if left == self.bdd.false:
@@ -181,7 +181,7 @@ class Sets:
         return situations & ~left
 
     def nearer(self, situations: Any) -> Iterator[Any]:
-        """Yield, a step after another, ``before`` without situations that are left as they are in what these are about."""
+        """Yield, step by step, ``before`` without situations that the step leaves unchanged in all variables of these."""
         about = set(self.bdd.support(situations))
         for step in self.steps:
             if not about.isdisjoint(step.sets):
@@ -189,7 +189,7 @@ class Sets:
                 yield self.narrowed(self._one_before(step, situations))
 
     def narrowed(self, situations: Any) -> Any:
-        """Return a set without what can't be reached, as far as that is known."""
+        """Return a set without situations that are known to be unreachable."""
         return situations & self.reached if self.exact else self.bound.narrowed(situations)
 
     def _one_before(self, step: Step, situations: Any, within: Within | None = None, ending: str = "") -> Any:
@@ -233,7 +233,7 @@ class Sets:
         return situations
 
     def can_come_to(self, goal: Any, *, inside: Any = None) -> Any:
-        """Return the situations from which some run comes to the goal, all of them being reachable, or ``inside`` where that is given."""
+        """Return the situations with a run to the goal; all are reachable, or in ``inside`` where that is given."""
         allowed = self.reached if inside is None else inside
         found, before = goal & allowed, self.bdd.false
         # What ends executions leads back: steps of this kind may be all that is needed.
@@ -255,7 +255,7 @@ class Sets:
         return bool(self.bdd.let(self._values(state), situations) == self.bdd.true)
 
     def only(self, states: Iterable[State]) -> Any:
-        """Return the set of these situations."""
+        """Return the set that holds only these situations."""
         # Of a situation after a step alone: variables that only some searches use would leave the rest of a set behind.
         about = self.bdd.support(self.initial)
         values = ({name: value for name, value in self._values(state).items() if name in about} for state in states)

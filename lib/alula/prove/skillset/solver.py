@@ -20,7 +20,7 @@ Assignment = Mapping[str, str]
 
 
 class Solver:
-    """Asks z3 about one skillset. States after an effect are constants put into the condition, so no second set of variables is needed."""
+    """Translates the conditions of one skillset to z3, and decides them. States after an effect are constants in the condition."""
 
     def __init__(self, skillset: Skillset, deadline: Deadline) -> None:
         self.skillset = skillset
@@ -76,7 +76,7 @@ class Solver:
     # --- terms ----------------------------------------------------------------------------------------------------
 
     def term(self, condition: Expression, after: Assignment | None = None) -> Any:
-        """Return a condition as z3's; ``after`` gives resources the state that an effect has put them in."""
+        """Return a condition as a term of z3; ``after`` gives resources the states after an effect."""
         match condition:
             case ResourceIs(resource=name, state=state, negated=negated):
                 if after and name in after:
@@ -99,20 +99,20 @@ class Solver:
                 return z3.Implies(self.term(premise, after), self.term(conclusion, after))
 
     def constant(self, *, value: bool) -> Any:
-        """Return the solver's term of a truth value."""
+        """Return the term of a truth value."""
         return z3.BoolVal(value, ctx=self._context)
 
     def state_is(self, resource: str, state: str) -> Any:
-        """Return that a resource is in a state."""
+        """Return the term that a resource is in a state."""
         value = self._values[resource].get(state)
         return self.constant(value=False) if value is None else self._variables[resource] == value
 
     def negation(self, term: Any) -> Any:
-        """Return the opposite of a term."""
+        """Return the negation of a term."""
         return z3.Not(term, ctx=self._context)
 
     def applies(self, effect: Effect, *, by_event: bool = False) -> Any:
-        """Return that every change of an effect is possible now."""
+        """Return the term that every change of an effect is possible now."""
         possible = [
             z3.Or(
                 self.constant(value=False), *(self.state_is(name, source) for source in origins(resource, targets, any_transition=by_event))
@@ -150,7 +150,7 @@ class Solver:
     # --- answers --------------------------------------------------------------------------------------------------
 
     def told(self, model: Any, resources: Sequence[str], data: Collection[str]) -> tuple[str, ...]:
-        """Return which state each of these resources is in, and what value each of these data has, in a model; a line each."""
+        """Return the states of these resources and the values of these data in a model, one line each."""
         lines = [f"{name} == {self._state(model, name)}" for name in resources]
         return (*lines, *self._told_data(model, data))
 

@@ -24,7 +24,7 @@ class Walker:
         self.sets = sets
 
     def reaches(self, goal: Any) -> bool:
-        """Return whether some run comes to the goal."""
+        """Return whether some run reaches the goal."""
         return bool(self.sets.narrowed(goal) != self.sets.bdd.false and (self.sets.exact or self._rings(goal)))
 
     def to(self, goal: Any) -> list[Move] | None:
@@ -49,7 +49,7 @@ class Walker:
         return None if last is None else [*moves, last]
 
     def end(self, moves: list[Move]) -> State:
-        """Return where a run gets to."""
+        """Return the last state of a run."""
         return moves[-1].target if moves else self.system.initial()
 
     def _real_moves(self, state: State) -> Iterator[Move]:

@@ -43,7 +43,7 @@ class Witness:
 
 
 def data_atoms(conditions: Iterable[Expression]) -> list[DataIs]:
-    """Return the atoms over data of conditions."""
+    """Return the atoms of conditions that are about data."""
     return [atom for condition in conditions for atom in atoms(condition) if isinstance(atom, DataIs)]
 
 

@@ -24,7 +24,7 @@ def told(move: Move, step: Step | None, name: Name, acting: str) -> str:
 
 
 def own_changes(step: Step) -> list[Change]:
-    """Return what the request itself changed: all before the first violation."""
+    """Return the changes by the request itself: all before the first violation."""
     changes: list[Change] = []
     pending: list[Change] = []
     for happening in step.happenings:
@@ -61,7 +61,7 @@ def data_text(values: Mapping[Path, Value]) -> str:
 
 
 def broken(move: Move, step: Step, name: Name) -> str:
-    """Return in words that data or time break an invariant, where no values show how."""
+    """Return in words that data or time break an invariant, where no values are shown."""
     first = next(one for one in step.happenings if isinstance(one, Entered))
     own = [one for one in step.happenings if isinstance(one, Change) and _is_by(one, first.execution)]
     rest = Step(step.situation, step.happenings[step.happenings.index(first) + 1 :])
