@@ -1,1 +1,1 @@
-"""Writes the fallback branch that a mission lacks, and has it proved."""
+"""Repair: write the fallback branch that a mission lacks, or a whole mission for a goal, and prove it."""

@@ -1,4 +1,4 @@
-"""A branch that may be added to a mission: what it is made of, where it goes, and the file's text with it."""
+"""A branch that may be added to a mission: its nodes, its place, and the text of the file with it."""
 
 from __future__ import annotations
 
@@ -22,7 +22,7 @@ FALLBACKS = frozenset({"Fallback", "ReactiveFallback"})
 
 
 class Rank(IntEnum):
-    """What a branch leads to; those that lead to better are tried first."""
+    """The end that a branch leads to; branches with better ends are tried first."""
 
     GOES_ON = 0
     LEAVES_OUT = 1
@@ -32,7 +32,7 @@ class Rank(IntEnum):
 
 @dataclass(frozen=True)
 class Branch:
-    """A branch.
+    """A branch that may be added to a mission.
 
     Attributes:
         use: the node that is put into the mission: a use of a subtree, or what the node that it answers for is put into.
@@ -54,14 +54,14 @@ class Branch:
 
     @property
     def size(self) -> int:
-        """How many nodes it has."""
+        """The number of its nodes."""
         use = sum(one.tag != HOLE for one in self.use.iterate()) if self.around or self.tree is None else 0
         return use + (0 if self.tree is None else sum(1 for _ in self.tree.iterate()))
 
     def within(self, most_nodes: int, *, shortest: bool = False) -> Branch | None:
-        """Return it with no more nodes than these, if that is possible: then its condition notes what a script notes otherwise.
+        """Return the branch if it has at most ``most_nodes`` nodes, else with its script inside its condition; None: it is still too large.
 
-        ``shortest``: it does so in any case, as others share these nodes.
+        ``shortest``: with the script inside the condition in any case, as others share these nodes.
         """
         fits = self.size <= most_nodes
         if fits and not shortest:
@@ -77,12 +77,12 @@ class Branch:
 
     @property
     def order(self) -> tuple[int, int]:
-        """By what branches are sorted: what they lead to, then how many nodes they add."""
+        """The key of the order: the end that it leads to, then the number of its nodes."""
         return self.rank, self.size + self.wraps
 
     @property
     def key(self) -> tuple[str, ...]:
-        """What it is, whatever it is for."""
+        """The key of its content: branches for different failures can be the same."""
         tree = "" if self.tree is None else "".join(self.tree.pieces())
         return "".join(self.use.pieces()), tree, str(self.at)
 
@@ -93,17 +93,17 @@ class Branch:
 
     @property
     def name(self) -> str:
-        """What it is called."""
+        """The name of its node."""
         return node_name(self.use)
 
     def as_xml(self) -> str:
-        """Return what is put into the file: its subtree, else the node that is put in."""
+        """Return the XML to put into the file: its subtree, else the node that is put in."""
         use = list(_lines(self.use, 0)) if self.around or self.tree is None else []
         use[:0] = self._comment(WIDTH)
         return "\n".join([*use, *(_lines_of_tree(self) if self.tree is not None else [])])
 
     def comment_at(self, lead: str) -> list[str]:
-        """Return the same behind a line break and an indentation."""
+        """Return the lines of the comment that it puts into the file, each behind ``lead``, a line break and an indentation."""
         return [f"{lead}{line}" for line in self._comment(WIDTH - len(lead) + 1)]
 
     def _comment(self, width: int) -> list[str]:
@@ -113,7 +113,7 @@ class Branch:
         return comment_lines(" ".join(self.why), width)
 
     def written(self, subject: Subject, leave_out: tuple[str, ...] = (), more: str = "") -> tuple[str, list[str]]:
-        """Return the mission's file with it, and the properties that ask for nodes of these names, which are left out.
+        """Return the text of the mission's file with it, and the properties that name these nodes and so are left out.
 
         ``more`` is a property that is asked besides.
         """
@@ -134,7 +134,7 @@ def node(tag: str, *children: Element, **attributes: str) -> Element:
 
 
 def clone(element: Element) -> Element:
-    """Return a copy that may be changed, of nodes alone: what stands between them is laid out anew."""
+    """Return a copy that may be changed, of elements alone, without the text between them."""
     made = copy.deepcopy(element)
     for one in made.iterate():
         one.content = list(one.children)
@@ -142,12 +142,12 @@ def clone(element: Element) -> Element:
 
 
 def parent_of(root: Element, child: Element) -> Element:
-    """Return the element that has another in it."""
+    """Return the parent of an element."""
     return next(one for one in root.iterate() if any(part is child for part in one.content))
 
 
 def at_place(document: Document, place: Place) -> Element:
-    """Return the element of a file that begins at a place."""
+    """Return the element that begins at a place in the file."""
     return next(one for one in document.root.iterate() if (one.place.line, one.place.column) == (place.line, place.column))
 
 
@@ -227,7 +227,7 @@ def _lead(parent: Element, element: Element) -> str:
 
 
 def tree_lines(name: str, top: Element) -> list[str]:
-    """Return the lines of a tree as they stand in a file, without its indentation."""
+    """Return the lines of a tree as in a file, without its indentation."""
     return [f'<BehaviorTree ID="{name}">', *(STEP + one for one in _lines(top, 2)), "</BehaviorTree>"]
 
 

@@ -1,4 +1,4 @@
-"""Trees of skills: a skill with what its inputs come from, with the roles that it needs filled beside it, and one skill after another."""
+"""Compose trees of skills: a skill with its inputs, the skills that fill the roles it needs beside it, and one skill after another."""
 
 from __future__ import annotations
 
@@ -43,7 +43,7 @@ class Sources:
     asks: bool = False
 
     def leaf(self, purpose: Purpose, known: Mapping[str, str], within: Element | None = None) -> Element | None:
-        """Return a leaf with ``known`` values of inputs and others found for it; None where an input comes from nowhere."""
+        """Return a leaf with the ``known`` values of inputs, and sources found for the others; None where an input has no source."""
         values = {one.name: known.get(one.name) or self._binding(within, purpose, one) for one in purpose.skill.inputs}
         if any(value is None and not one.default for one, value in zip(purpose.skill.inputs, values.values(), strict=True)):
             return None
@@ -54,7 +54,7 @@ class Sources:
         return made
 
     def lacking(self, purpose: Purpose) -> list[str]:
-        """Return the inputs of a skill that come from nowhere."""
+        """Return the inputs of a skill that have no source."""
         return [one.name for one in purpose.skill.inputs if not one.default and self._binding(None, purpose, one) is None]
 
     @property
@@ -99,13 +99,13 @@ class Sources:
 
 
 def opening(condition: str, name: str, code: str) -> list[Element]:
-    """Return what a branch begins with: a script, behind a condition, if there is one."""
+    """Return the first nodes of a branch: a script, behind a condition where there is one."""
     script = node("Script", name="degraded", code=code)
     return [node("ScriptCondition", name=name, code=condition), script] if condition else [script]
 
 
 def first_skills(element: Element, skills: Collection[str]) -> set[str]:
-    """Return which skills of a part of a tree may start in its first tick."""
+    """Return the skills of a part of a tree that may start in its first tick."""
     return _first_of(element, skills)[0]
 
 
@@ -128,7 +128,7 @@ def _first_of(element: Element, skills: Collection[str]) -> tuple[set[str], bool
 
 @dataclass(frozen=True)
 class Composer:
-    """Makes trees of courses.
+    """Composes trees from courses.
 
     Attributes:
         sources: of inputs.
@@ -145,9 +145,9 @@ class Composer:
         known: Sequence[Mapping[str, str]] = (),
         reused: Mapping[str, Element] | None = None,
     ) -> list[Element]:
-        """Return the nodes of a course in their order, none where an input comes from nowhere.
+        """Return the nodes of a course in their order, none where an input has no source.
 
-        Steps that need the same beside them share it. What the functional layer tells of a step is waited for before the next one.
+        Steps that need the same beside them share it. States that the functional layer reports after a step are awaited before the next.
 
         Args:
             course: the skills.
@@ -172,7 +172,7 @@ class Composer:
         return self._sharing(found)
 
     def step(self, purpose: Purpose, here: Here, known: Mapping[str, str]) -> Element | None:
-        """Return a skill with what it needs beside it; None where an input comes from nowhere."""
+        """Return a skill with what it needs beside it; None where an input has no source."""
         leaf, watching = self.sources.leaf(purpose, known), self._watching(purpose, here)
         return None if leaf is None or watching is None else self._watched([leaf], watching, _filled(purpose))
 

@@ -32,18 +32,18 @@ Wanted = tuple[str, Expression]
 
 @dataclass(frozen=True)
 class Here:
-    """What is so between two skills of a course."""
+    """The states and facts between two skills of a course."""
 
     states: States
     facts: frozenset[Fact] = frozenset()
 
     @property
     def key(self) -> tuple[frozenset[tuple[str, str]], frozenset[Fact]]:
-        """What tells it from others."""
+        """The key by which situations are compared."""
         return frozenset(self.states.items()), self.facts
 
     def fulfils(self, wanted: Wanted) -> bool:
-        """Return whether a condition is true; of data it is where a fact says so."""
+        """Return whether a condition is true; one over data is true only where a fact implies it."""
         skillset, condition = wanted
         match condition:
             case ResourceIs(resource=name, state=state, negated=negated):
@@ -66,13 +66,13 @@ class Here:
 
 @dataclass(frozen=True)
 class Course:
-    """Skills, one after another, and what is so before each of them and behind the last one."""
+    """Skills, one after another, with the situation before each of them and after the last one."""
 
     steps: tuple[Purpose, ...]
     heres: tuple[Here, ...]
 
     def told_between(self, number: int, wanted: Wanted | None = None) -> list[tuple[str, str]]:
-        """Return what the functional layer has still to tell behind a step: what the next step, or a condition, asks of it and was not so.
+        """Return the states that the functional layer has to report after a step, before the next step or a condition can be true.
 
         Each is ``skillset.resource`` and its state.
         """
@@ -89,7 +89,7 @@ class Course:
 
 
 class Courses:
-    """Looks for courses over all skills of a robot that come to an end with a success."""
+    """Searches courses over all skills of a robot that can end with a success."""
 
     def __init__(self, purposes: Purposes, using: Collection[str] = ()) -> None:
         self._purposes = purposes
@@ -97,7 +97,7 @@ class Courses:
         self._acting = [one for one in purposes.known.values() if one.achieves and (not using or one.name in using)]
 
     def to(self, first: Here, reaches: Callable[[Course], bool]) -> Iterator[Course]:
-        """Yield courses that reach what is wanted, the shortest first."""
+        """Yield courses for which ``reaches`` is true, the shortest first."""
         todo = deque([Course((), (first,))])
         seen = {first.key}
         while todo and len(seen) < MOST_SITUATIONS:
@@ -114,7 +114,7 @@ class Courses:
                     todo.append(longer)
 
     def after(self, here: Here, purpose: Purpose) -> Here | None:
-        """Return what is so after a success of a skill; None: it can't start, or what it needs can't run."""
+        """Return the situation after a success of a skill; None: it can't start, or a role that it needs can't be filled."""
         started = self._started(here, purpose)
         if started is None or any(not self.providers(here, role.name, purpose) for role in purpose.skill.needs):
             return None
@@ -131,11 +131,11 @@ class Courses:
         return Here(states, here.facts | facts)
 
     def may_use(self, purpose: Purpose) -> bool:
-        """Return whether a skill is one of those that courses are made of."""
+        """Return whether courses may use a skill."""
         return purpose in self._acting
 
     def providers(self, here: Here, role: str, needed: Purpose) -> list[Purpose]:
-        """Return the skills that can fill a role while one runs that needs it."""
+        """Return the skills that can fill a role for a running skill that needs it."""
         return [one for one in self._purposes.watching(role, needed) if self._started(here, one) is not None]
 
     def _started(self, here: Here, purpose: Purpose) -> Situation | None:

@@ -1,4 +1,4 @@
-"""What keeps a repair from being asked for."""
+"""The error of this room."""
 
 from __future__ import annotations
 
@@ -6,4 +6,4 @@ from alula.common.errors import AlulaError
 
 
 class RepairError(AlulaError):
-    """A repair can't be asked for so; the message says what is wrong and what to write."""
+    """A repair can't be requested so; the message has the error and the remedy."""

@@ -1,4 +1,4 @@
-"""What fails in a mission by a fault, and has to be answered."""
+"""The leaves of a mission that fail by a fault, and need a response."""
 
 from __future__ import annotations
 
@@ -18,7 +18,7 @@ _DEGRADED = re.compile(r"\bdegraded\s*:=")
 
 @dataclass(frozen=True)
 class Failing:
-    """What is to be answered: a leaf, and the states with which its skill can't run (``skillset.resource``, state).
+    """A leaf that needs a response, and the states with which its skill can't run (``skillset.resource``, state).
 
     ``results`` are those by which the fault ends it, and the conditions by which it has it refused or ended. ``shown`` is the fault in
     words of the models, with which a comment begins.
@@ -33,12 +33,12 @@ class Failing:
 
     @property
     def degrades(self) -> bool:
-        """Return whether the author says that the mission is degraded once it has failed: another end than giving up may be good then."""
+        """Return whether the author marks the mission as degraded once it has failed: an end other than giving up may be good then."""
         return _DEGRADED.search(self.leaf.wiring.element.get("_onFailure")) is not None
 
     @property
     def situation(self) -> str:
-        """Return it as a comment in the mission says it."""
+        """Return the failure as a comment in the mission."""
         return sentence(self.reason)
 
     @property
@@ -48,7 +48,7 @@ class Failing:
 
     @property
     def words(self) -> str:
-        """Return it as answers say it."""
+        """Return the failure as in the answers of a search."""
         by = f" by the fault {self.fault}" if self.fault else ""
         return f"{self.skill} ('{self.leaf.name}') fails{by}"
 

@@ -1,4 +1,4 @@
-"""What becomes of a mission when chosen faults come and nothing else fails: is it accomplished, degraded or not, in every run?
+"""The outcomes of a mission when chosen faults come and nothing else fails: is it accomplished, degraded or not, in every run?
 
 The world's moves are those that the odds are computed from (`MissionSteps`): what a mission's skills bring about, what the functional layer
 does in time, the chosen faults in their order, each at any moment, and whatever a fault that is there may bring about. A fault that has
@@ -72,7 +72,7 @@ class _Ends:
 
 @dataclass(frozen=True)
 class Fate:
-    """What becomes of a mission with these faults.
+    """The outcomes of a mission with these faults.
 
     Attributes:
         faults: those that come, in their order.
@@ -107,7 +107,7 @@ class Fate:
         return self.survives or bool(self.assuming)
 
     def as_dict(self) -> dict[str, object]:
-        """Return it as JSON has it."""
+        """Return the fate as plain values for JSON."""
         return {
             "faults": list(self.faults),
             "survives": self.survives,
@@ -130,7 +130,7 @@ def fate_of(
     reached: Expression | None = None,
     known: Known | None = None,
 ) -> Fate | None:
-    """Return it; None: there are more situations than ``most``. ``rest`` are states of resources, in one of which each robot is safe.
+    """Return the fate; None: more than ``most`` situations. ``rest`` are states of resources, in one of which each robot is safe.
 
     With a ``goal``, a mission survives, too, when it comes to be true after the faults; what has to be ``reached`` is true at a good end.
     Faults strike ``strikes`` times. What can happen in a situation is kept in ``known``, for other faults of the same mission.
@@ -213,7 +213,7 @@ class _Graph:
         return sorted({step.name for _, step, _ in self._later})
 
     def explore(self, is_put_off: Callable[[Here, Step[Place]], bool], most: int | None) -> bool:
-        """Go on with what was put off, then with all but what is put off now; False: there are more situations than ``most``."""
+        """Explore the steps put off before, except those put off now; return False where there are more situations than ``most``."""
         several, self._later, self._is_put_off = self._later, [], is_put_off
         for here, step, there in several:
             self._leading.setdefault(there, []).append(here)
@@ -235,12 +235,12 @@ class _Graph:
                 yield step, there
 
     def first_without_way(self, is_good: Callable[[Here], bool]) -> Here | None:
-        """Return the first situation, of those that were found, from which none of these is reached; None: there is none."""
+        """Return the first situation found from which no good situation is reachable; None: there is none."""
         hopeful = reachable_from(filter(is_good, self.ways.found), lambda one: self._leading.get(one, ()))
         return next((one for one in self.ways.found if one not in hopeful), None)
 
     def run_to(self, here: Here) -> tuple[str, ...]:
-        """Return what happens until a situation."""
+        """Return the events of a run to a situation."""
         lines = [_told(step) for step in self.ways.to(here)]
         return tuple(line for line in lines if line)
 

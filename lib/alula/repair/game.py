@@ -1,4 +1,4 @@
-"""Whether any mission at all could have a skill run while a fault is there: a game over the managers of its skillset.
+"""A game over the managers of a skillset: can any mission at all run a skill while a fault is present?
 
 The mission may start and interrupt every skill at any time. The world helps it as well as it can, but the fault that has come stays: no
 state that it shows is left for one that it does not show. Where even so the skill never runs after the fault, no tree can have it run; the
@@ -28,7 +28,7 @@ Here = tuple[Managers, bool]
 
 @dataclass(frozen=True)
 class Game:
-    """What came of it.
+    """The result of a game.
 
     Attributes:
         won: the skill can run while the fault is there.
@@ -42,7 +42,7 @@ class Game:
 
 
 def played(skillset: Skillset, skill: str, states: Collection[tuple[str, str]], deadline: Deadline) -> Game:
-    """Play it for a skill; ``states`` are those that show the fault, each a resource of the skillset and its state.
+    """Play the game for a skill; ``states`` are those that show the fault, each a resource of the skillset and its state.
 
     Raises OutOfTimeError.
     """

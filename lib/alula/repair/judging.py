@@ -1,4 +1,4 @@
-"""What is to be said of a changed mission: what `check` finds and proves of it, what is new of that, and which faults it survives."""
+"""Judge a changed mission: the findings of `check`, the new ones among them, and the faults that it survives."""
 
 from __future__ import annotations
 
@@ -26,7 +26,7 @@ BOUND, UNREAD = "ALU710", "ALU713"
 
 @dataclass(frozen=True)
 class Judgement:
-    """What was found of a mission.
+    """The findings about a mission.
 
     Attributes:
         findings: what `check` tells, without what the file accepts.
@@ -42,7 +42,7 @@ class Judgement:
         return all(one.code == BOUND for one in self.findings)
 
     def new(self, before: Judgement) -> list[Diagnostic]:
-        """Return the findings that another mission has not: what says the same of another place counts as often as it is there."""
+        """Return the findings that ``before`` does not have; findings of one text at several places count once for each."""
         known = Counter(map(_what, before.findings))
         found = []
         for one in self.findings:
@@ -58,14 +58,14 @@ def _what(finding: Diagnostic) -> tuple[str, str]:
 
 @dataclass(frozen=True)
 class Refused:
-    """A branch, or a course of skills, that was tried, and why it is not what was looked for; ``nodes``: of a branch."""
+    """A branch, or a course of skills, that was tried and refused, and the reason; ``nodes``: of a branch."""
 
     name: str
     why: str
     nodes: int = 0
 
     def as_dict(self) -> dict[str, object]:
-        """Return it for JSON."""
+        """Return it as plain values for JSON."""
         return {"name": self.name, "why": self.why, **({"nodes": self.nodes} if self.nodes else {})}
 
 
@@ -73,7 +73,7 @@ NOT_JUDGED = "the search ended before it was judged"
 
 
 class Judge:
-    """Looks at a mission, and at what is made of it."""
+    """Judges a mission and changed texts of it."""
 
     def __init__(
         self,
@@ -90,15 +90,15 @@ class Judge:
         self._reached = reached
 
     def read(self, text: str) -> Judgement:
-        """Return what `check` tells of a text of the mission's file without looking at its runs."""
+        """Return the findings of `check` for a text of the mission's file, without its runs."""
         return Judgement(tuple(self._subject.findings(text)), complete=False)
 
     def check(self, text: str) -> Judgement:
-        """Return what `check` tells of a text, of what the models make go wrong; raises OutOfTimeError."""
+        """Return the findings of `check` for a text, with all that the models make go wrong; raises OutOfTimeError."""
         return next(self.parts(text))
 
     def parts(self, text: str) -> Iterator[Judgement]:
-        """Yield what `check` does, then that of runs in which hooks raise, processes die or people interfere, too; raises OutOfTimeError.
+        """Yield the judgement of `check`, then one with failing hooks, dying processes and interfering people; raises OutOfTimeError.
 
         The second part goes on with what the first one knows. Of a text with errors, both are these.
         """
@@ -129,17 +129,17 @@ class Judge:
         return [f"{one.skillset}.{one.model.name}" for one in leaves]
 
     def fate(self, text: str, faults: Sequence[str]) -> Fate:
-        """Return what becomes of a text of the mission's file with these faults; raises OutOfTimeError."""
+        """Return the fate of a text of the mission's file with these faults; raises OutOfTimeError."""
         found = self.fates(text)(faults, None)
         assert found is not None  # noqa: S101 - it has no bound
         return found
 
     def needs(self, text: str, skill: str) -> bool:
-        """Return whether a text of the mission's file is accomplished only where a skill starts; raises OutOfTimeError."""
+        """Return whether a skill has to start for a text of the mission to be accomplished; raises OutOfTimeError."""
         return needs(self._steps(text), self._subject.skillsets, skill, self._deadline)
 
     def fates(self, text: str) -> Callable[[Sequence[str], int | None], Fate | None]:
-        """Return what tells it of a text, of at most so many situations: of several faults that is quicker than one by one."""
+        """Return a function from faults and a limit of situations to the fate of a text; for several faults it is faster than ``fate``."""
         steps, known = self._steps(text), Known()
 
         def fate(faults: Sequence[str], most: int | None) -> Fate | None:

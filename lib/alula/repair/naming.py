@@ -1,4 +1,4 @@
-"""Names of what a branch is made of: what authors call it elsewhere, else words of the models, as an author would put them.
+"""Names for the parts of a branch: the author's names from elsewhere, else words of the models, in the style of an author.
 
 - A part with other skills has its author's names, with the words of one skill put in the place of another's.
 - A skill, and a node that waits for something, is called what the author calls it elsewhere in the mission, or in the robot's others.
@@ -26,7 +26,7 @@ _OFTEN = {1: "once", 2: "twice", 3: "three times"}
 
 
 class Renaming:
-    """Puts the words of a skill's name into the places of those of another one, spelled as the file's author spells them.
+    """Replaces the words of one skill's name by those of another one, in the spelling of the file's author.
 
     ``zed_depthmap`` to ``lidar_depthmap`` makes *LiDAR sees* of *ZED sees*, and ``lidar_navigation`` of ``zed_navigation``. Where more than
     one word is another one, as in ``follow_corridor`` and ``drive_to``, nobody knows which stands for which: names stay as they are.
@@ -40,20 +40,20 @@ class Renaming:
         self._spelled = {word: spelled(word, texts) for word in come}
 
     def name(self, text: str) -> str:
-        """Return a node's name with the other words."""
+        """Return a node's name with the words replaced."""
         for old, new in self._words.items():
             spelled = self._spelled.get(new, new)
             text = re.sub(rf"\b{old}\b", spelled, text, flags=re.IGNORECASE)
         return " ".join(text.split())
 
     def identifier(self, text: str) -> str:
-        """Return the ID of a tree with the other words."""
+        """Return the ID of a tree with the words replaced."""
         parts = text.split("_")
         return "_".join(word for word in (self._words.get(part, part) for part in parts) if word)
 
 
 def spelled(word: str, texts: Iterable[str]) -> str:
-    """Return how a word is written most often, but in names of code."""
+    """Return the most frequent spelling of a word in texts, apart from names of code."""
     found = Counter(match[0] for text in texts for match in re.finditer(rf"(?<![\w.'{{]){word}(?![\w.}}])", text, re.IGNORECASE))
     return max(found, key=lambda one: (found[one], one)) if found else word
 
@@ -65,7 +65,7 @@ def plain(skill: str) -> str:
 
 @dataclass(frozen=True)
 class Vocabulary:
-    """What authors call things, by the nodes of their trees; where several names are there, the first one counts.
+    """The author's names, by the nodes of the trees; of several names the first one counts.
 
     Attributes:
         nodes: those of the mission, then those of the robot's other missions.
@@ -74,17 +74,17 @@ class Vocabulary:
     nodes: Sequence[Element]
 
     def leaf(self, skill: str) -> str:
-        """Return what a skill is called where it runs, else its name as words."""
+        """Return the author's name of a leaf with this skill, else the skill's name as words."""
         return next((node_name(one) for one in self.nodes if type_name(one) == skill and one.get("name")), plain(skill))
 
     def wait(self, condition: str, otherwise: str) -> str:
-        """Return what a node is called that waits for a condition, or asks for it, else another name."""
+        """Return the author's name of a node that waits for a condition, or tests it, else another name."""
         asking = (one for one in self.nodes if condition in {one.get("if"), one.get("code")} and not one.children)
         return next((node_name(one) for one in asking if one.get("name")), otherwise)
 
 
 def told_state(resource: str, *states: str, texts: Sequence[str] = ()) -> str:
-    """Return a state as a person tells it: ``the pose is good`` for ``base.pose_status``, GOOD; of several, one of them.
+    """Return a state in plain words: ``the pose is good`` for ``base.pose_status``, GOOD; of several, one of them.
 
     ``texts`` say how the author spells the resource's words.
     """
@@ -104,17 +104,17 @@ def told_resource(resource: str) -> str:
 
 
 def told_failure(name: str, results: Sequence[str]) -> str:
-    """Return how a node fails that ends with one of these results: ``'drive' ends as BLOCKED``, or that it does, of many results."""
+    """Return the failure of a node with one of these results: ``'drive' ends as BLOCKED``; with many results, only that it fails."""
     return f"'{name}' ends as {listed(results, 'or')}" if 0 < len(results) <= MOST_NAMED else f"'{name}' fails"
 
 
 def told_states(several: Iterable[tuple[str, str]]) -> str:
-    """Return several states, each a resource and its state, of which each is true."""
+    """Return several states in plain words, each a resource and its state, as a conjunction."""
     return " and ".join(told_state(resource, state) for resource, state in several)
 
 
 def chances(attempts: int, skill: str = "") -> str:
-    """Return what a node is called that gives another one so many chances; ``skill``: what that is called, where it is a skill.
+    """Return the name of a node that retries another one; ``skill``: the name of that one, where it is a skill.
 
     One that is called by where it leads to, as ``to the valve``, gets there; ``go_to_dock`` is told in words.
     """
@@ -124,7 +124,7 @@ def chances(attempts: int, skill: str = "") -> str:
 
 
 def often_when(attempts: int, results: Iterable[str]) -> str:
-    """Return what a node is called that runs another one so often at most, as long as it ends with one of these results."""
+    """Return the name of a node that repeats another one at most so often, as long as it ends with one of these results."""
     ends = " or ".join(one.lower().replace("_", " ") for one in results)
     return f"{_OFTEN.get(attempts, f'{attempts} times')} when {ends}"
 
@@ -136,25 +136,25 @@ def listed(several: Iterable[str], word: str = "and") -> str:
 
 
 def sentence(text: str) -> str:
-    """Return words with a capital letter at their beginning."""
+    """Return a text with a capital first letter."""
     return text[:1].upper() + text[1:]
 
 
 def in_short(steps: Sequence[str]) -> str:
-    """Return what several steps are called together."""
+    """Return one short name for several steps."""
     first, *others = dict.fromkeys(steps)
     return f"{first}, ..., {others[-1]}" if len(others) > 1 else " and ".join([first, *others])
 
 
 def another(name: str, taken: Iterable[str]) -> str:
-    """Return a name that nothing has yet."""
+    """Return a name that is not taken."""
     used = set(taken)
     names = (name, *(f"{name}_{number}" for number in range(2, len(used) + 3)))
     return next(one for one in names if one not in used)
 
 
 def assigned(leaves: Sequence[tuple[str, str]], wanted: Iterable[str]) -> dict[int, str]:
-    """Return names that are asked for, by the leaves that they fit best: each leaf is its skill's name and what it would be called."""
+    """Return the requested names, by the leaves that they fit best: each leaf is its skill's name and its default name."""
     pairs = [(_alike(skill, name, one), number, one) for one in wanted for number, (skill, name) in enumerate(leaves)]
     found: dict[int, str] = {}
     for score, number, one in sorted(pairs, key=lambda pair: -pair[0]):

@@ -1,4 +1,4 @@
-"""Branches that a person might write for what failed: those with which the mission goes on first, then those that end it well, then others.
+"""Branches that a person might write for a failure: those with which the mission goes on first, then those that end it well, then others.
 
 - What failed once more, where a fault is no more than its bad end, or once what it needs was brought about.
 - A subtree of the files that nothing uses.
@@ -36,7 +36,7 @@ BEYOND = frozenset({READY, STOP_HERE})
 
 
 class Patterns:
-    """Makes branches for what failed."""
+    """Makes branches for failures."""
 
     def __init__(self, subject: Subject, using: Sequence[str] = (), most_faults: int = MOST_FAULTS, most: int = MOST_NODES) -> None:
         self._subject = subject
@@ -50,7 +50,7 @@ class Patterns:
         self._remedies = Remedies(subject, self._purposes, sources, Courses(self._purposes, self._using), most_faults + 1)
 
     def branches(self, failing: Failing, within: str = "", states: States | None = None) -> list[Branch]:
-        """Return them, by rank, then size; of those of one size, what is nearest to the leaf; all stand ``within`` a node of that name.
+        """Return the branches, by rank, then size; of one size, the nearest to the leaf first; all stand ``within`` a node of that name.
 
         ``states``: those of the resources when it has failed.
         """
@@ -64,24 +64,24 @@ class Patterns:
         return sorted(unique.values(), key=lambda one: one.order)
 
     def all_stand_ins(self, failing: Failing) -> list[Purpose]:
-        """Return the skills for the same purpose, that skill itself first, whether or not they can run."""
+        """Return the skills with the same purpose, that skill itself first, whether or not they can run."""
         found = [self._purposes.known[failing.skill], *self._purposes.alike(failing.skill)]
         return [one for one in found if one.name == failing.skill or not self._using or one.name in self._using]
 
     @property
     def lacking(self) -> list[str]:
-        """Tell which skills are left out of the branches made so far, as inputs of theirs come from nowhere."""
+        """Return the skills left out of the branches made so far, as some of their inputs have no source."""
         words = "{} would bring about what is needed, but nothing says what its input {} is; use it in a tree of the mission"
         return [words.format(skill, " and ".join(f"`{one}`" for one in names)) for skill, names in self._remedies.lacking.items()]
 
     def asked_in(self, element: Element) -> Iterator[tuple[str, str]]:
-        """Yield what the skills in a part need of the functional layer: ``skillset.resource`` and its state."""
+        """Yield the states that the skills in a part require from the functional layer: ``skillset.resource`` and its state."""
         for purpose in (self._purposes.known.get(type_name(one)) for one in element.iterate()):
             for resource, state in asked_of_others(purpose) if purpose is not None else ():
                 yield f"{purpose.skillset.name}.{resource.name}", state  # type: ignore[union-attr]  # it has one
 
     def may_leave_out(self, failing: Failing) -> bool:
-        """Return whether the mission may go on without what failed, as something else is for the same."""
+        """Return whether the mission may go on without the failed leaf, as something else has the same purpose."""
         return any(True for place in self.places(failing.leaf) for _ in self._remedies.without(place, failing))
 
     def places(self, leaf: Node) -> Iterator[Node]:

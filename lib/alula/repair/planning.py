@@ -47,7 +47,7 @@ EMPTY = '<root BTCPP_format="4" main_tree_to_execute="plan"><BehaviorTree ID="pl
 
 @dataclass(frozen=True)
 class Aim:
-    """What is asked for.
+    """A request for a plan.
 
     Attributes:
         goal: a condition, written as in properties of missions, or a role that a skill has to have filled; or several, with `then`
@@ -67,13 +67,13 @@ class Aim:
 
 @dataclass(frozen=True)
 class Stage:
-    """A part of a goal: a role, or what is wanted (``role`` is empty)."""
+    """A part of a goal: a role, or a condition (``role`` is empty)."""
 
     role: str = ""
     wanted: Wanted = ("", TRUE)
 
     def reached_by(self, course: Course) -> bool:
-        """Return whether a course leads there."""
+        """Return whether a course reaches it."""
         return self.role in course.steps[-1].roles if self.role else course.heres[-1].fulfils(self.wanted)
 
 
@@ -98,7 +98,7 @@ class Plan:
 
 @dataclass(frozen=True)
 class Answer:
-    """What came of it: a plan, or none; ``impossible``: no course of skills leads to the goal, though nothing fails.
+    """The result of a search: a plan, or none; ``impossible``: no course of skills leads to the goal, though nothing fails.
 
     ``refused``: the courses that were tried and are none.
     """
@@ -112,7 +112,7 @@ class Answer:
 
 
 class Planner:
-    """Looks for a mission that reaches a goal."""
+    """Searches a mission that reaches a goal."""
 
     def __init__(self, aim: Aim, deadline: Deadline, tell: Tell) -> None:
         self._aim = aim
@@ -144,14 +144,14 @@ class Planner:
         return Stage(wanted=("", wanted))
 
     def stop(self) -> None:
-        """Have the search end with the best that it has found; a signal's handler may call it."""
+        """End the search with the best result so far; a signal's handler may call it."""
         self._stopped = True
         self._deadline.at_s = 0.0
         if self._search is not None:
             self._search.stop()
 
     def run(self) -> Answer:
-        """Search; raises AlulaError where the robot can't be looked at."""
+        """Search; raises AlulaError where the robot can't be read."""
         states = initial_states(self._subject.skillsets, self._subject.at_first)
         first = self._stages[0]
         if not first.role and Here(states).fulfils(first.wanted):

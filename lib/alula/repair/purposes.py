@@ -1,4 +1,4 @@
-"""What skills are for: their roles, as models say them, and what follows from models and mocks without being said.
+"""The purposes of skills: their roles in the models, and what follows from models and mocks.
 
 - A skill that has a successful result achieves something; one that has none is there to run: it watches, or holds something.
 - What a skill takes when it starts, it holds while it runs.
@@ -21,7 +21,7 @@ from alula.model.model import Resource, Skill, Skillset
 
 @dataclass(frozen=True)
 class Purpose:
-    """A skill, and what it is for.
+    """A skill and its purpose.
 
     Attributes:
         skillset: the one that has it.
@@ -44,7 +44,7 @@ class Purpose:
 
     @property
     def roles(self) -> frozenset[str]:
-        """What its model calls it."""
+        """The roles that its model provides."""
         return frozenset(one.name for one in self.skill.provides)
 
     @property
@@ -54,7 +54,7 @@ class Purpose:
 
 
 class Purposes:
-    """What the skills of a robot are for, or of the ``robots`` of a fleet; ``brought``: what their mocks bring about.
+    """The purposes of the skills of a robot, or of the ``robots`` of a fleet; ``brought``: what their mocks bring about.
 
     In a fleet, no robot's skill stands for another one's, or fills a role that another one needs: it does so somewhere else.
     """
@@ -69,13 +69,13 @@ class Purposes:
         self.known = {f"{of.name}.{one.name}": _purpose(of, one, _robot_of(of, robots)) for of in skillsets for one in of.skills}
 
     def stand_ins(self, name: str) -> list[Purpose]:
-        """Return the skills that may stand for this one, those first that are most like it."""
+        """Return the skills that may stand in for this one, the most similar first."""
         mine = self.known[name]
         found = [one for one in self.known.values() if one.name != name and one.robot == mine.robot and _stands_for(one, mine)]
         return sorted(found, key=lambda one: (len(_words(one) ^ _words(mine)), one.name))
 
     def alike(self, name: str) -> list[Purpose]:
-        """Return the skills that may be for the same, also those that no branch is made of: their inputs and good results are the same."""
+        """Return the skills that share a role, or have the same inputs and successes, also those that no branch uses."""
         mine = self.known[name]
         same = {one.name for one in self._of(mine) if (one.inputs, one.achieves) == (mine.inputs, mine.achieves)}
         return [one for one in self.known.values() if one.name != name and (one.name in same or mine.roles & one.roles)]
@@ -97,7 +97,7 @@ class Purposes:
         return found
 
     def bringers(self, holder: Purpose) -> list[Purpose]:
-        """Return the skills that bring about what this one holds: they take the same, have its inputs, and come to an end."""
+        """Return the skills that bring about what this one holds: they take the same resources, have its inputs, and end by themselves."""
         same = (one for one in self._of(holder) if one.achieves and one.holds == holder.holds)
         return [one for one in same if holder.inputs.items() <= one.inputs.items()]
 
@@ -138,7 +138,7 @@ def broken_by(skill: Skill, resource: str, state: str) -> str | None:
 
 
 def asked_of_others(purpose: Purpose) -> list[tuple[Resource, str]]:
-    """Return what a skill needs that only the functional layer decides: each resource with the state, where it needs exactly one."""
+    """Return the resources that a skill requires and only the functional layer changes, each with its state, where it is exactly one."""
     found: dict[str, tuple[Resource, str]] = {}
     for precondition in purpose.skill.preconditions:
         condition = precondition.condition
@@ -150,7 +150,7 @@ def asked_of_others(purpose: Purpose) -> list[tuple[Resource, str]]:
 
 
 def shows_done(purpose: Purpose) -> tuple[str, str] | None:
-    """Return the resource and its state by which a success shows that keeps the skill from being started again, until others change it.
+    """Return the resource and its state that a success leaves and that bars another start of the skill, until others change it.
 
     None: after a success it can be started again, as far as its own effects go.
     """

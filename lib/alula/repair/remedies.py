@@ -1,4 +1,4 @@
-"""Branches made of courses of skills: what makes it possible that something runs again, and the way to where a mission says it is safe."""
+"""Branches made of courses of skills: to make it possible that a skill runs again, or to reach the place that a mission calls safe."""
 
 from __future__ import annotations
 
@@ -28,7 +28,7 @@ LOOP = "Until"
 
 
 class Remedies:
-    """Makes branches of courses from the situation in which something has failed."""
+    """Makes branches of courses from the situation of a failure."""
 
     def __init__(self, subject: Subject, purposes: Purposes, sources: Sources, courses: Courses, attempts: int) -> None:
         self._subject = subject
@@ -41,7 +41,7 @@ class Remedies:
         """The skills that would bring about what a failed one needs, each with its inputs that come from nowhere."""
 
     def around(self, place: Node, failing: Failing, states: States) -> Iterator[Branch]:
-        """Yield skills that make true what the failed one needs, before the next round of a loop, or before other chances of the node."""
+        """Yield skills that make true what the failed one needs, before the next round of a loop, or before a retry of the node."""
         purpose = self._purposes.known[failing.skill]
         skill = purpose.skill
         several = [*(one.condition for one in skill.preconditions), *(one.condition for one in skill.invariants)]
@@ -63,7 +63,7 @@ class Remedies:
                     self.lacking |= {one.name: lacking for one in course.steps if (lacking := self._sources.lacking(one))}
 
     def at_the_safe_place(self, place: Node, failing: Failing, states: States) -> Iterator[Branch]:
-        """Yield the way to the place that the mission calls safe, by each skill that may do what one of its own skills does."""
+        """Yield ways to the place that the mission calls safe, by each skill that can replace one of its own."""
         safe = next((one for one in self._sources.ports if SAFE in one.split("_")), None)
         if safe is None or not failing.states:
             return
@@ -87,7 +87,7 @@ class Remedies:
                     yield self._end(place, failing, purpose, step, name, code, Rank.ENDS_WELL)
 
     def other_ways(self, place: Node, failing: Failing, states: States) -> Iterator[Branch]:
-        """Yield what does the same as a skill of a part with another skill of its role, and what that one needs beside it."""
+        """Yield parts with a skill replaced by another of its role, with what that one needs beside it."""
         here = Here(self._at_rest(states))
         acting = [one for one in place.wiring.element.iterate() if type_name(one) in self._purposes.known]
         several = [one for one in acting if self._purposes.known[type_name(one)].achieves]
@@ -101,7 +101,7 @@ class Remedies:
                     yield self._end(place, failing, purpose, step, f"{plain(purpose.name)} instead", "@degraded := true", Rank.GOES_ON)
 
     def without(self, place: Node, failing: Failing) -> Iterator[Branch]:
-        """Yield that a part is left out, where a later step fills its role all the same, with skillsets that it does not use.
+        """Yield the mission without a part whose role a later step fills all the same, with skillsets that the part does not use.
 
         So one robot of two gives up its task, and the other one goes there.
         """

@@ -46,7 +46,7 @@ SHARE = 0.3
 
 @dataclass(frozen=True)
 class Question:
-    """What is asked for.
+    """A request for a repair.
 
     Attributes:
         fault: the fault that is to be answered; empty: a finding is.
@@ -74,13 +74,13 @@ class Question:
 
     @property
     def never_asked(self) -> str:
-        """The property that ``never`` is; empty where it is nothing."""
+        """The property for ``never``; empty where there is none."""
         return f"asked_never: never {self.never}" if self.never else ""
 
 
 @dataclass(frozen=True)
 class Repair:
-    """A branch that was proved.
+    """A proved branch.
 
     Attributes:
         branch: what is put into the mission.
@@ -106,7 +106,7 @@ class Repair:
 
 @dataclass(frozen=True)
 class Answer:
-    """What came of the search: a repair, or why there is none.
+    """The result of a search: a repair, or why there is none.
 
     ``impossible``: it can't be accomplished with the fault, as ``reasons`` show; a repair then brings it to a safe end. Else, without a
     repair, nobody knows; ``stopped``: not all branches were tried, as the time was over, or somebody ended the search. ``strikes``: how
@@ -126,18 +126,18 @@ class Answer:
 
     @property
     def survives_already(self) -> bool:
-        """Return whether there is nothing to repair."""
+        """Return whether the mission survives without a repair."""
         return self.fate is not None and self.fate.answered
 
     @property
     def assuming(self) -> tuple[str, ...]:
-        """The states that must not come later: else the fault is not survived, though the mission ends safely."""
+        """The states that must not come later: otherwise the fault is not survived, though the mission ends safely."""
         found = self.repair or self.fate
         return () if found is None else found.assuming
 
 
 class Search:
-    """Looks for a repair of one mission."""
+    """Searches a repair of one mission."""
 
     def __init__(self, subject: Subject, question: Question, deadline: Deadline, tell: Tell) -> None:
         if bool(question.fault) == bool(question.finding):
@@ -182,12 +182,12 @@ class Search:
         return [] if judgement.clean else judgement.new(self._whole_before if whole else self._before)
 
     def stop(self) -> None:
-        """Have the search end with the best that it has found; a signal's handler may call it."""
+        """End the search with the best result so far; a signal's handler may call it."""
         for one in self._deadlines:
             one.at_s = 0.0
 
     def run(self) -> Answer:
-        """Search; raises AlulaError where the mission can't be looked at."""
+        """Search; raises AlulaError where the mission can't be read."""
         text = self._text_before
         read = self._judge.read(text)
         errors = [one for one in read.findings if one.severity is Severity.ERROR and one.code < "ALU7"]
@@ -415,7 +415,7 @@ class Search:
 
 
 def condition_of(option: str, text: str) -> Expression:
-    """Read a condition, as those of a mission's properties; ``option`` is what gives it. Raises RepairError."""
+    """Read a condition, as in properties of missions; ``option`` is the option that has it. Raises RepairError."""
     one = property_of_mission(f"goal: eventually {text}", "the end of the condition")
     if isinstance(one, Property):
         return one.condition

@@ -1,4 +1,4 @@
-"""Branches that do what failed with other skills, which stand for those that can't run."""
+"""Branches with other skills, which stand in for those that can't run."""
 
 from __future__ import annotations
 
@@ -21,7 +21,7 @@ from alula.trees.node import Node
 
 
 class StandIns:
-    """Makes branches of other skills: their inputs are the same, what they need is asked before, and what the others held is held."""
+    """Makes branches with other skills of the same inputs: their needs are tested before, and the resources of the others are held."""
 
     def __init__(self, subject: Subject, purposes: Purposes, sources: Sources, using: Collection[str]) -> None:
         self._subject = subject
@@ -32,7 +32,7 @@ class StandIns:
         self._trees = subject.files.trees
 
     def beside(self, place: Node, failing: Failing) -> Iterator[Branch]:
-        """Yield branches that may stand beside a node in which something fails."""
+        """Yield branches that may stand beside a node that contains the failure."""
         element = place.wiring.element
         tree = self._trees.get(element.get("ID")) if element.tag == "SubTree" else None
         top = element if tree is None else tree.children[0]
@@ -150,7 +150,7 @@ class _Making:
         bringing: bool,
         once: bool,
     ) -> _Made | None:
-        """Return the copy; None: nothing holds what has to be held, or, of what is done ``once``, there is nothing of that kind."""
+        """Return the copy; None: nothing holds a resource that has to be held, or nothing of what is done ``once`` is in the part."""
         top = node("Top", clone(original))
         self._parallels = []
         leaves: list[Element] = []

@@ -1,4 +1,4 @@
-"""The mission that is to be repaired: its file, its robot, and copies of the file with changes, which can be looked at as it can."""
+"""The mission to repair: its file, its robot, and changed copies of the file, which can be judged in the same way."""
 
 from __future__ import annotations
 
@@ -66,7 +66,7 @@ class Subject:
 
     @classmethod
     def read(cls, path: Path, tell: Warn) -> Subject:
-        """Read it, of the robot of the current folder; raises AlulaError where a file can't be read."""
+        """Read a mission of the robot of the current folder; raises AlulaError where a file can't be read."""
         robot = find_robot()
         models = models_of(robot, tell)
         if not models:
@@ -104,11 +104,11 @@ class Subject:
 
     @property
     def at_rest(self) -> list[AtRest]:
-        """The states of resources in which each robot need not be brought anywhere, as its file has them."""
+        """The states of resources in which each robot may be left, as the file has them."""
         return _at_rest(self.robot, self.skillsets)
 
     def document(self) -> Document:
-        """Return the file as data that may be changed."""
+        """Return the file as a document that may be changed."""
         return parse_document(self.source, str(self.path))
 
     def findings(self, text: str) -> list[Diagnostic]:
@@ -117,7 +117,7 @@ class Subject:
 
     @contextmanager
     def copy(self, text: str) -> Iterator[Path]:
-        """Give the path of a file with this text, beside copies of what it includes, as long as the context lasts."""
+        """Yield the path of a file with this text, beside copies of what it includes, as long as the context lasts."""
         documents = [Path(one.path).resolve() for one in self.files.documents]
         top = Path(os.path.commonpath([one.parent for one in documents]))
         with tempfile.TemporaryDirectory(prefix="alula-repair-") as folder:
@@ -130,7 +130,7 @@ class Subject:
             yield changed
 
     def vocabulary(self) -> Vocabulary:
-        """Return what the author calls things: in this mission, then in the robot's others that can be read."""
+        """Return the author's names: of this mission, then of the robot's others that can be read."""
         own = {Path(one.path).resolve() for one in self.files.documents} | {self.flown_as.resolve()}
         nodes = list(_nodes(self.files))
         for path, scenario in by_mission().items():
@@ -141,7 +141,7 @@ class Subject:
     # --- properties --------------------------------------------------------------------------------------------------
 
     def names_asked(self) -> dict[str, None]:
-        """Return the names of nodes that the mission's properties ask for and no tree has, in the order of the file."""
+        """Return the names of nodes in the mission's properties that no tree has, in the order of the file."""
         elements = [one for tree in self.files.trees.values() for one in tree.iterate()]
         there = {node_name(one) for one in elements}
         asked = (match["node"] for one in elements for match in _ACTIVE.finditer(one.get(DESCRIPTION)))
@@ -178,7 +178,7 @@ def _main(root: Element) -> str:
 
 
 def without_properties_of(root: Element, missing: Collection[str]) -> list[str]:
-    """Take the properties that ask for nodes of these names out of a file's descriptions; return the properties' names."""
+    """Remove the properties that name these nodes from a file's descriptions; return the names of the properties."""
     taken: list[str] = []
     for element in root.iterate():
         text = element.get(DESCRIPTION)
@@ -196,7 +196,7 @@ def without_properties_of(root: Element, missing: Collection[str]) -> list[str]:
 
 
 def with_property(root: Element, main: str, text: str) -> None:
-    """Add a property to what the top of a tree says."""
+    """Add a property to the description of a tree's top node."""
     tree = next((one for one in root.children if one.get("ID") == main), None)
     if tree is not None and text:
         top = tree.children[0]
@@ -204,6 +204,6 @@ def with_property(root: Element, main: str, text: str) -> None:
 
 
 def texts_of(root: Element) -> Sequence[str]:
-    """Return all that a file says in names, comments and attributes: how its author spells words."""
+    """Return all texts of a file in names, comments and attributes: they show its author's spelling."""
     parts = [part for one in root.iterate() for part in one.content if isinstance(part, str)]
     return [*parts, *(one.value for element in root.iterate() for one in element.attributes.values())]

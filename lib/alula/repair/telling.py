@@ -17,7 +17,7 @@ Both = tuple[Odds, Odds]
 
 
 def as_text(answer: Answer, odds: Both | None) -> str:
-    """Return lines for a terminal."""
+    """Return an answer as lines for a terminal."""
     what = "; ".join(dict.fromkeys(one.words for one in answer.failing))
     if answer.survives_already:
         often = f", as often as it may come (`--most-faults {answer.strikes}`)" if answer.strikes else ""
@@ -52,7 +52,7 @@ def _of_repair(repair: Repair, what: str, odds: Both | None, reasons: Sequence[s
 
 
 def as_dict(answer: Answer, odds: Both | None) -> dict[str, object]:
-    """Return what `--json` prints."""
+    """Return an answer in the form of `--json`."""
     repair = answer.repair
     kind = "nothing to repair" if answer.survives_already else "repaired" if repair else "impossible" if answer.impossible else "unknown"
     found: dict[str, object] = {
@@ -85,7 +85,7 @@ def as_dict(answer: Answer, odds: Both | None) -> dict[str, object]:
 
 
 def added(view: NodeView, branch: Branch) -> frozenset[int]:
-    """Return the numbers of the nodes of a drawn mission that came with a branch."""
+    """Return the numbers of a branch's nodes in a drawn mission."""
     found: set[int] = set()
 
     def visit(one: NodeView, number: int, *, new: bool) -> int:
@@ -125,7 +125,7 @@ def _assuming(assuming: Sequence[str]) -> str:
 
 
 def plan_as_text(answer: planning.Answer) -> str:
-    """Return lines for a terminal."""
+    """Return a plan as lines for a terminal."""
     if answer.plan is None:
         when = " before the search was ended" if answer.stopped else ""
         head = "impossible" if answer.impossible else f"unknown: no course of skills was proved{when} ({answer.tried} tried)"
@@ -139,7 +139,7 @@ def plan_as_text(answer: planning.Answer) -> str:
 
 
 def plan_as_dict(answer: planning.Answer) -> dict[str, object]:
-    """Return what `--json` prints."""
+    """Return a plan in the form of `--json`."""
     kind = "planned" if answer.plan else "impossible" if answer.impossible else "unknown"
     found: dict[str, object] = {
         "answer": kind,
