@@ -1,6 +1,6 @@
 """``python -m skillset_ros1 SKILLSET --hooks MODULE:FACTORY``: serves a generated skillset as a node of ROS 1.
 
-Ends with 0 when it was told to end, 2 when there is no such skillset or no such hooks.
+Ends with 0 after a signal to end, 2 when there is no such skillset or no such hooks.
 """
 
 from __future__ import annotations

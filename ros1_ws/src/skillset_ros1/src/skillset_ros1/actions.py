@@ -110,7 +110,7 @@ class RospyServer:
         self.server.start()
 
     def unregister(self) -> None:
-        """Take no more goals, and take the topics away."""
+        """Accept no more goals, and unregister the topics."""
         self.server.stop()
 
 
@@ -147,25 +147,25 @@ class RospyLink:
         return fields_of(self._types.goal)
 
     def send(self, goal_id: str, goal: Any, on_answer: Callable[[bool], None]) -> None:  # noqa: ARG002 - events answer it
-        """Publish a goal; events of the managers tell whether it was taken."""
+        """Publish a goal; events of the managers show whether it was accepted."""
         message = self._types.action_goal(goal=goal, goal_id=GoalID(id=goal_id, stamp=rospy.get_rostime()))
         message.header.stamp = message.goal_id.stamp
         self._goals.publish(message)
 
     def cancel(self, goal_id: str) -> None:
-        """Ask for the interruption of one goal."""
+        """Request the interruption of one goal."""
         self._cancels.publish(GoalID(id=goal_id))
 
     def cancel_all(self, on_count: OnValue, on_error: OnError) -> None:  # noqa: ARG002 - nothing is answered
-        """Cancel all goals: that is what an id and a stamp of nothing mean. ROS 1 does not tell how many there were."""
+        """Cancel all goals: an empty id and stamp mean that. ROS 1 does not report how many there were."""
         self._cancels.publish(GoalID())
         self._base.submit(lambda: on_count(None))
 
     def request_result(self, goal_id: str) -> None:
-        """Ask nothing: results are sent to every subscriber, and arrive over their connections."""
+        """Do nothing: results are sent to every subscriber, and arrive over their connections."""
 
     def release(self, goal_id: str) -> None:
-        """Follow a goal no more."""
+        """Stop following a goal."""
 
     def unregister(self) -> None:
         """Unregister publishers and subscribers at the master."""

@@ -96,7 +96,7 @@ class RospyBase:
         return self._workers.close(timeout_s)
 
     def close(self) -> None:
-        """Take all topics and services away, and end the loop."""
+        """Unregister all topics and services, and end the loop."""
         self._over.set()
         self.loop.close()
         for unregister in self._parts:

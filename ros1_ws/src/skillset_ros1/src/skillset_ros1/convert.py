@@ -1,4 +1,4 @@
-"""Fields of ROS 1 messages; what fits into them is as in the ROS 2 world (``alula.runtime.field_types``)."""
+"""Fields of ROS 1 messages; what fits into them is as in ROS 2 (``alula.runtime.field_types``)."""
 
 from __future__ import annotations
 

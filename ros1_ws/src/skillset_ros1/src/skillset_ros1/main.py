@@ -1,4 +1,4 @@
-"""The main function of a skillset's process in the ROS 1 world."""
+"""The main function of a skillset's process in ROS 1."""
 
 from __future__ import annotations
 

@@ -73,7 +73,7 @@ class SkillsetManagers:
         self._managers.close(reason)
 
     def destroy(self) -> None:
-        """Take all topics and services away; to be called after ``close``, by a process that lives on."""
+        """Unregister all topics and services; to be called after ``close``, by a process that lives on."""
         self._middleware.close()
 
 
@@ -81,7 +81,7 @@ HooksFactory = Callable[[SkillsetManagers], Mapping[str, SkillHooks]]
 
 
 def check_alone(root: str) -> None:
-    """Raise SkillRuntimeError when the master knows managers of this name and they live; needs no node."""
+    """Raise SkillRuntimeError when live managers of this name are registered at the master; needs no node."""
     try:
         uri = rosgraph.Master("/skillset_ros1").lookupService(f"{root}/describe")
     except rosgraph.MasterException:

@@ -136,13 +136,13 @@ class RospyMiddleware(RospyBase):
     # --- actions -----------------------------------------------------------------------------------------------------
 
     def serve_action(self, skill: str, on_goal: Callable[[Goal], None], on_cancel: Callable[[str], None]) -> RospyServer:
-        """Have goals and cancellations of a skill given to the callbacks."""
+        """Pass goals and cancellations of a skill to the callbacks."""
         server = RospyServer(self, action_types(self._messages, skill), skill, on_goal, on_cancel)
         self._parts.append(server.unregister)
         return server
 
     def action(self, skill: str, listener: GoalListener) -> RospyLink:
-        """Return a link that sends goals of a skill and gives their news to the listener."""
+        """Return a link that sends goals of a skill and passes their events to the listener."""
         link = RospyLink(self, action_types(self._messages, skill), skill, listener)
         self._parts.append(link.unregister)
         return link
@@ -223,7 +223,7 @@ class RospyPublisher(rospy.SubscribeListener):  # type: ignore[misc]  # rospy ha
     def flush(self, timeout_s: float) -> None:
         """Wait (wall clock) until all was handed to the network.
 
-        rospy doesn't tell when its sending threads have done their work: nothing was left to send for a while.
+        rospy doesn't report when its sending threads have done their work: nothing was left to send for a while.
         """
         end = time.monotonic() + timeout_s
         quiet_since = time.monotonic()

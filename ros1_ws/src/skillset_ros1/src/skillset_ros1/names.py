@@ -1,4 +1,4 @@
-"""Names and times of the skillset interface in ROS 1, said once for managers and clients; the names are those of ROS 2."""
+"""Names and times of the skillset interface in ROS 1, defined once for managers and clients; the names are those of ROS 2."""
 
 from __future__ import annotations
 
@@ -49,7 +49,7 @@ def interfaces_of(skillset: str) -> ModuleType:
 
 
 def place(namespace: str, skillset: str) -> str:
-    """Return where a skillset's names are: ``/robot1/navigation``; without a namespace, that of the process's node."""
+    """Return the namespace of a skillset's names: ``/robot1/navigation``; without a namespace, below that of the process's node."""
     name: str = rospy.resolve_name(f"{namespace.rstrip('/')}/{skillset}" if namespace else skillset)
     return name
 
