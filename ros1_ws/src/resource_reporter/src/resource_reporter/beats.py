@@ -14,7 +14,7 @@ import rospy
 
 
 class PeriodOnEither:
-    """Tells when a period has passed on one of two clocks. Times are seconds; each clock may begin anew."""
+    """Detects that a period has passed on one of two clocks. Times are seconds; each clock may begin anew."""
 
     def __init__(self, period_s: float) -> None:
         self._period_s = period_s
@@ -39,7 +39,7 @@ class Beats:
         threading.Thread(target=self._run, name=name, daemon=True).start()
 
     def close(self) -> None:
-        """Have it end; a job under way ends first, and no other one begins."""
+        """Stop it; a job under way ends first, and no other one begins."""
         self._ended.set()
 
     def _run(self) -> None:

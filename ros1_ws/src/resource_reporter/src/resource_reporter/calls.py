@@ -1,4 +1,4 @@
-"""Calls of services as messages on ``/calls``: a bag then holds what the functional layer was told, and what it asked for.
+"""Calls of services as messages on ``/calls``: a bag then holds the calls to the functional layer, and its own.
 
 Each is a std_msgs/String of JSON: ``{service, request, response, error, begin_s, end_s}``, seconds of mission clock; ``response`` is null
 where there was none, and ``error`` says why.
@@ -21,7 +21,7 @@ DEPTH = 100
 
 
 def plain(value: Any) -> Any:
-    """Return what ``json`` can write; NaN and infinities become null."""
+    """Return a value in the form that ``json`` can write; NaN and infinities become null."""
     if isinstance(value, genpy.Message):
         return {name: plain(getattr(value, name)) for name in value.__slots__}
     if isinstance(value, genpy.TVal):
@@ -38,7 +38,7 @@ def tell_call(service: str, request: Any, response: Any, begin_s: float, error: 
 
 
 class ToldService:
-    """A service whose calls are told on ``/calls``; arguments as of ``rospy.Service``."""
+    """A service whose calls are published on ``/calls``; arguments as of ``rospy.Service``."""
 
     def __init__(self, name: str, kind: Any, handler: Callable[[Any], Any]) -> None:
         self._handler = handler
@@ -58,5 +58,5 @@ class ToldService:
 
 @functools.lru_cache(maxsize=None)
 def publisher() -> rospy.Publisher:
-    """Return the process's own; to be made before its first call: subscribers need a moment to connect."""
+    """Return the process's own publisher; make it before the first call, as subscribers need a moment to connect."""
     return rospy.Publisher(TOPIC, String, queue_size=DEPTH)

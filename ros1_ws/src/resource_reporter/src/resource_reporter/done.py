@@ -1,4 +1,4 @@
-"""Publish how far a node has come, so that a simulator can wait and a person can see how far behind the node is."""
+"""Publish how far a node has come, so that a simulator can wait and a person can see how far the node is behind."""
 
 from __future__ import annotations
 
@@ -14,10 +14,10 @@ QUEUE = 20  # ticks or measurements; a simulator that waits for them never has s
 
 
 class Settling(Protocol):
-    """Something that a node has told others: it is settled when they know it."""
+    """What a node sends to others; it is settled when they have received it."""
 
     def when_settled(self, job: Callable[[], None]) -> None:
-        """Do a job once others know all that was told so far."""
+        """Run a job once others have received all that was sent so far."""
 
 
 class DoneReporter:

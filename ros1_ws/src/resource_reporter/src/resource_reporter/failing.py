@@ -20,7 +20,7 @@ JobT = TypeVar("JobT", bound=Callable[..., Any])
 
 
 def ends_the_node(job: JobT) -> JobT:
-    """Have what a job of another thread raises end the process: the error in the log, exit code 1."""
+    """Make an exception of another thread's job end the process: the error in the log, exit code 1."""
 
     @functools.wraps(job)
     def run(*arguments: Any, **words: Any) -> Any:
@@ -34,7 +34,7 @@ def ends_the_node(job: JobT) -> JobT:
 
 
 def end_node(error: Exception) -> None:
-    """Log what happened, shut the node down as rospy does, and end the process with exit code 1."""
+    """Log the error, shut the node down as rospy does, and end the process with exit code 1."""
     where = threading.current_thread().name
     told = "".join(traceback.format_exception(type(error), error, error.__traceback__))
     rospy.logfatal("an error in the thread %s ends this node:\n%s", where, told)

@@ -1,4 +1,4 @@
-"""Desired against actual states of one skillset's resources, and which transition to ask for next. No ROS, no threads, no clock."""
+"""Desired against actual states of one skillset's resources, and which transition to request next. No ROS, no threads, no clock."""
 
 from __future__ import annotations
 
@@ -38,7 +38,7 @@ class _Entry:
 
 @dataclass
 class Ledger:
-    """Keep what the hardware says beside what the skillset says. Times are seconds of any clock that only grows.
+    """Keeps the hardware's states beside those that the skillset shows. Times are seconds of any clock that only grows.
 
     Level-triggered: only the last wanted state of a resource counts, and it is asked for again whenever the skillset shows another,
     for instance because it was restarted. Before the skillset has shown its states nothing is asked. Only what it shows counts as
@@ -52,7 +52,7 @@ class Ledger:
     _told: set[tuple[Call, str]] = field(default_factory=set)
 
     def want(self, resource: str, state: str, reason: str = "", *, insist: bool = True) -> bool:
-        """Note the state that the hardware has, and why; return whether this is news. Without ``insist``, see ``ResourceReporter``."""
+        """Store the state that the hardware has, and why; return whether this is news. Without ``insist``, see ``ResourceReporter``."""
         entry = self._wanted.get(resource)
         if entry is None or (entry.state, entry.insist) != (state, insist):
             self._wanted[resource] = _Entry(state, reason, insist)
@@ -62,7 +62,7 @@ class Ledger:
         return news
 
     def observe(self, states: dict[str, str], reasons: dict[str, str] | None = None) -> None:
-        """Note the states that the skillset shows (all of its resources), and the reasons. One that changed may be asked for at once."""
+        """Store the states that the skillset shows (all of its resources), and the reasons. A changed one may be requested at once."""
         for resource, entry in self._wanted.items():
             before, after = self._actual.get(resource), states.get(resource)
             if before not in {after, entry.state}:
@@ -72,7 +72,7 @@ class Ledger:
         self._actual, self._reasons = dict(states), dict(reasons or {})
 
     def next_call(self, now_s: float) -> Call | None:
-        """Return the transition to ask for now, the longest waiting first; None if all agree or must wait."""
+        """Return the transition to request now, the longest waiting first; None if all agree or must wait."""
         due = [(entry.not_before_s, name) for name, entry in self._wanted.items() if self._differs(name) and entry.not_before_s <= now_s]
         if not due:
             return None
@@ -80,30 +80,30 @@ class Ledger:
         return Call(name, self._wanted[name].state, self._wanted[name].reason)
 
     def wait_s(self, now_s: float) -> float | None:
-        """Return for how long nothing is due; None if not before the hardware or the skillset says something new."""
+        """Return for how many seconds nothing is due; None: until the hardware or the skillset has a new state."""
         times = [entry.not_before_s for name, entry in self._wanted.items() if self._differs(name)]
         return max(0.0, min(times) - now_s) if times else None
 
     @property
     def settled(self) -> bool:
-        """Return whether the skillset knows of every state that was reported: it shows it, or has accepted or refused it."""
+        """Return whether the skillset has every reported state: it shows it, or has accepted or refused it."""
         return all(self._known(name, entry) for name, entry in self._wanted.items())
 
     def reached(self, call: Call, now_s: float) -> None:
-        """Note an answer by which the resource has the state asked for; the skillset gets the longest wait to show it."""
+        """Record an answer by which the resource has the requested state; the skillset gets the longest wait to show it."""
         entry = self._asked_for(call)
         if entry is not None:
             entry.answered = True
             entry.not_before_s = now_s + LONGEST_RETRY_S
 
     def refused(self, call: Call, reason: str, now_s: float, *, answered: bool = True) -> bool:
-        """Note a refusal, to be tried again; return whether this (call, reason) is told for the first time.
+        """Record a refusal, to be tried again; return whether this (call, reason) is reported for the first time.
 
         Args:
-            call: what was asked for.
+            call: what was requested.
             reason: why it was refused, in words.
             now_s: when.
-            answered: False where the call failed, so that the skillset may know nothing of it.
+            answered: False where the call failed, so that the skillset may not have received it.
         """
         entry = self._asked_for(call)
         if entry is not None:

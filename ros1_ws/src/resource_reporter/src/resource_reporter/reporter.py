@@ -55,14 +55,14 @@ class ResourceReporter:
     def report(self, resource: str, state: str, reason: str = "", *, insist: bool = True) -> None:
         """Report the state of a resource, and the reason in words where it is known.
 
-        Without ``insist`` nothing is to change: the reason is told where the skillset has that state already.
+        Without ``insist`` nothing is to change: the reason is reported where the skillset has that state already.
         """
         with self._changed:
             if self._ledger.want(resource, state, reason, insist=insist):
                 self._changed.notify()
 
     def when_settled(self, job: Callable[[], None]) -> None:
-        """Do a job once the skillset knows of all states reported so far: at once if it does, else in the reporter's thread.
+        """Run a job once the skillset has all states reported so far: at once if it does, else in the reporter's thread.
 
         It knows what it shows, has accepted or has refused. A job waits for 10 s (wall clock) at most, and not at all where nothing shows
         the skillset's states, or the reporter is closed. Jobs are done in the order given.
@@ -75,7 +75,7 @@ class ResourceReporter:
         job()
 
     def knows(self) -> bool:
-        """Return whether the skillset knows of all states reported so far: it shows, has accepted or has refused them."""
+        """Return whether the skillset has all states reported so far: it shows, has accepted or has refused them."""
         with self._changed:
             return self._ledger.settled
 

@@ -32,7 +32,7 @@ class DirectConnection(QueuedConnection):  # type: ignore[misc]  # rospy has no 
         super().__init__(connection, queue_size)
 
     def write_data(self, data: bytes) -> bool:
-        """Send a message, or let it wait for those before it; what went wrong in the thread is raised here."""
+        """Send a message, or queue it behind those before it; an error of the connection's thread is raised here."""
         if self._silent:
             return True
         with self._lock:
@@ -80,7 +80,7 @@ class DirectConnection(QueuedConnection):  # type: ignore[misc]  # rospy has no 
 
 
 def send_directly(*, not_heard: Collection[str] = ()) -> None:
-    """Have all publishers of this process send so, to all who subscribe from now on.
+    """Make all publishers of this process send directly, to all who subscribe from now on.
 
     ``not_heard``: topics that the node publishes and subscribes to for what others say there; to itself it sends nothing on them.
     """
