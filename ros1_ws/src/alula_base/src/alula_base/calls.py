@@ -1,4 +1,4 @@
-"""What stops the robot: a small class for each kind, with a bounded time. ``run`` says what became of it, or raises CallFailedError."""
+"""The calls that stop the robot, a class for each kind, each with a time limit. ``run`` returns the outcome, or raises CallFailedError."""
 
 from __future__ import annotations
 
@@ -29,10 +29,10 @@ Silent = Callable[[], bool]
 
 
 class StopCall(Protocol):
-    """Something that is called when a heartbeat is silent."""
+    """A call to make when a heartbeat is silent."""
 
     def run(self, silent: Silent) -> str:
-        """Do it, in a thread of its own, and return what became of it; raises CallFailedError."""
+        """Execute the call, in a thread of its own, and return the outcome in words; raises CallFailedError."""
         ...
 
 
@@ -109,7 +109,7 @@ class CancelGoals:
         self._heard_s = time.monotonic()
 
     def run(self, silent: Silent) -> str:
-        """Cancel until the server has said that no goal is open."""
+        """Cancel until the server reports that no goal is open."""
         begin_s = time.monotonic()
         end_s = begin_s + self._within_s
         while True:
@@ -159,5 +159,5 @@ MAKERS: dict[type, Callable[[str, Any], StopCall]] = {
 
 
 def make_call(name: str, settings: CallSettings) -> StopCall:
-    """Make a call of its settings, and open its connections, so that they are there when it counts; raises ConfigError."""
+    """Make a call from its settings, with its connections open before they are needed; raises ConfigError."""
     return MAKERS[type(settings)](name, settings)

@@ -35,10 +35,10 @@ _SLOWER = SlowerClock()
 
 
 def is_simulated() -> bool:
-    """Return whether ROS has simulated time."""
+    """Return whether ROS uses simulated time."""
     return not rospy.rostime.is_wallclock()
 
 
 def now_s() -> float:
-    """Return the time in seconds; its zero means nothing."""
+    """Return the time in seconds, from an arbitrary zero."""
     return _SLOWER.look(time.monotonic(), rospy.get_time()) if is_simulated() else time.monotonic()

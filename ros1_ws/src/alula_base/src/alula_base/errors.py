@@ -1,7 +1,7 @@
-"""What can be wrong with the dead man's configuration."""
+"""The error of a wrong configuration."""
 
 from __future__ import annotations
 
 
 class ConfigError(ValueError):
-    """A parameter is missing, unknown or wrong; the message names it, and says what it has to be."""
+    """A parameter is missing, unknown or wrong; the message has its name and the allowed values."""

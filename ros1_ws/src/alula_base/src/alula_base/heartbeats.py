@@ -37,7 +37,7 @@ class Heartbeats:
     _silent: set[str] = field(default_factory=set)
 
     def hear(self, topic: str, now_s: float) -> list[Change]:
-        """Note a message; return what has changed, also of the other topics."""
+        """Record a message; return the changes, also those of other topics."""
         changes = self.look(now_s)
         last_s = self._heard_s.get(topic)
         if last_s is None or topic in self._silent:
@@ -53,7 +53,7 @@ class Heartbeats:
         return [Change(topic, SILENT, now_s - last_s) for last_s, topic in sorted(due)]
 
     def wait_s(self, now_s: float) -> float | None:
-        """Return for how long none can become silent; None: not before one is heard."""
+        """Return for how many seconds no heartbeat can become silent; None: none has been received yet."""
         times = [last_s for topic, last_s in self._heard_s.items() if topic not in self._silent]
         return max(0.0, min(times) + self.silent_after_s - now_s) if times else None
 

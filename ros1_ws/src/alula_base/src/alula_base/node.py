@@ -28,9 +28,9 @@ SHORTEST_WAIT_S = 0.001
 
 
 class Supervision:
-    """Tells a skillset whether the decision side is heard.
+    """Reports to a skillset whether the decision side is heard.
 
-    A silence is told before that it is over: what a skillset was not told while nobody could be reached, it is told afterwards.
+    A silence is reported before its end: what could not be reported while the skillset was out of reach is reported afterwards.
     """
 
     def __init__(self, settings: ReportSettings) -> None:
@@ -43,7 +43,7 @@ class Supervision:
         self._tell(self._settings.silent, reason)
 
     def heard(self) -> bool:
-        """Report that all is heard, as soon as the skillset knows of the silence before; return whether that was done."""
+        """Report that all heartbeats are back, once the skillset has received the silence before; return whether that was done."""
         if self._told == self._settings.silent and not self._reporter.knows():
             return False
         self._tell(self._settings.heard)
@@ -131,7 +131,7 @@ class DeadMan:
 
 
 def main() -> None:
-    """Run the node; a wrong parameter is told, and ends it with exit code 2."""
+    """Run the node; a wrong parameter is logged, and ends it with exit code 2."""
     rospy.init_node("alula_base")
     try:
         dead_man = DeadMan(read_settings(rospy.get_param("~", {})))

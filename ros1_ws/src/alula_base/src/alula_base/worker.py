@@ -16,7 +16,7 @@ from resource_reporter import CallFailedError
 
 @dataclass(frozen=True)
 class Outcome:
-    """What became of a call.
+    """The outcome of a call.
 
     Attributes:
         done: whether it did what it is for; None: it is under way, or was not called yet.
@@ -53,11 +53,11 @@ class Worker:
 
     @property
     def when(self) -> str:
-        """Return when it calls, in words; "": at once."""
+        """Return when the call is made, in words; "": at once."""
         return f" after {self._after_s:g} s more" if self._after_s else ""
 
     def want(self) -> None:
-        """Have the call made; returns at once."""
+        """Request the call; return at once."""
         self._wanted.set()
 
     def _work(self) -> None:
