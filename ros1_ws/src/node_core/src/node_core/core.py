@@ -1,4 +1,4 @@
-"""What runs the core of a node: ROS in flight, a bag in a replay, a bench. The core says what it takes and gives; no rospy."""
+"""The host of a node's core: ROS in flight, a bag in a replay, a bench. The core declares its inputs and outputs; no rospy."""
 
 from __future__ import annotations
 
@@ -28,7 +28,7 @@ class Output:
 
 @dataclass(frozen=True)
 class Input:
-    """A topic that a core takes: messages go to ``take``, what is none to ``garbage``, with a sentence.
+    """A topic that a core takes: messages go to ``take``; of what can't be decoded, the reason goes to ``garbage``.
 
     Of a topic that carries much for others, those messages alone are decoded whose bytes hold the word ``about``.
     """
@@ -42,7 +42,7 @@ class Input:
     about: bytes = b""
 
     def take_bytes(self, sent: str, data: bytes) -> None:
-        """Decode a message of the type that its publisher has told (``*``: any), and take it."""
+        """Decode a message of the type that its publisher declares (``*``: any), and take it."""
         wanted = self.kind._type  # noqa: SLF001 -- generated messages have it
         if sent not in {"*", wanted}:
             self.garbage(f"{self.topic} carries {sent}, expected {wanted}")
@@ -59,34 +59,34 @@ class Input:
 
 
 class Host(Protocol):
-    """What a core asks of what runs it; all may be called from any thread."""
+    """What a core needs from its host; all may be called from any thread."""
 
     def now_ns(self) -> int:
-        """Return the mission clock."""
+        """Return the mission clock, nanoseconds."""
 
     def publish(self, topic: str, message: Any) -> None:
         """Send a message on one of the core's outputs."""
 
     def wanted(self, topic: str) -> bool:
-        """Return whether anybody takes what an output carries: what is dear to make is made for them alone."""
+        """Return whether an output has a reader: what is expensive is computed only for one."""
 
     def published(self, topic: str) -> bool:
         """Return whether an input has a publisher."""
 
     def done(self, stamp_ns: int) -> None:
-        """Note that nothing is left to do for the measurement made at ``stamp_ns``."""
+        """Report that the measurement made at ``stamp_ns`` is processed."""
 
     def report(self, resource: str, state: str, reason: str = "", *, insist: bool = True) -> None:
         """Report the state of ``skillset.resource``; see ``resource_reporter.ResourceReporter``."""
 
     def offer(self, work: Callable[[], None]) -> None:
-        """Have this done beside the inputs, one at a time; of what waits only the newest is."""
+        """Run this beside the inputs, one at a time; of the waiting ones only the newest is kept."""
 
     def info(self, text: str) -> None:
-        """Log."""
+        """Log a text."""
 
     def warn(self, about: str, text: str, *, every_s: float = 2.0) -> None:
-        """Log a warning; of those ``about`` the same one in ``every_s``."""
+        """Log a warning; of those with the same ``about`` one in ``every_s``."""
 
 
 class Core(Protocol):
@@ -98,7 +98,7 @@ class Core(Protocol):
 
     @property
     def timers(self) -> Sequence[tuple[float, Callable[[], None]]]:
-        """What it does again and again, with the period."""
+        """Its periodic work, with the periods in seconds."""
 
 
 @runtime_checkable
@@ -108,4 +108,4 @@ class Switched(Protocol):
     enabled: bool
 
     def switch(self, enabled: bool) -> None:  # noqa: FBT001 -- a callback's signature
-        """Begin or end it."""
+        """Begin or end the work."""

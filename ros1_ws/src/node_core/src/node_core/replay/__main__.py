@@ -45,7 +45,7 @@ def names_of(texts: Sequence[str], part: SensorPart) -> dict[str, str]:
 
 
 def perceive(part: SensorPart, source: Path, target: Path, given: Conditions) -> None:
-    """Write ``target``: the bag ``source`` with what the cores say of its measurements now; raises ReplayPartError."""
+    """Write ``target``: the bag ``source`` with what the cores publish now about its measurements; raises ReplayPartError."""
     with rosbag.Bag(str(source)) as bag, tempfile.TemporaryDirectory() as folder:
         topics = {given.names.get(topic, topic) for topic in bag.get_type_and_topic_info().topics}
         judged = {topic for topics in part.reports.values() for topic in topics}
@@ -62,7 +62,7 @@ def perceive(part: SensorPart, source: Path, target: Path, given: Conditions) ->
 
 
 def main(words: Sequence[str] | None = None) -> int:
-    """Perceive again; return the exit code."""
+    """Replay a bag through the cores; return the exit code."""
     parser = argparse.ArgumentParser(prog="node_core.replay", description="Perceive a recorded run again.")
     parser.add_argument("bag", type=Path)
     parser.add_argument("out", type=Path)

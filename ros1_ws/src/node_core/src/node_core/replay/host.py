@@ -22,7 +22,7 @@ CALLS = "/calls"
 
 
 class Timeline:
-    """The mission clock, and what is to be done when."""
+    """The mission clock and its jobs."""
 
     def __init__(self) -> None:
         self.now_ns = 0
@@ -30,11 +30,11 @@ class Timeline:
         self._numbers = itertools.count()
 
     def after(self, delay_s: float, job: Callable[[], None]) -> None:
-        """Have a job done after a while."""
+        """Run a job after a delay."""
         heapq.heappush(self._jobs, (self.now_ns + round(delay_s * 1e9), next(self._numbers), job))
 
     def every(self, period_s: float, job: Callable[[], None]) -> None:
-        """Have a job done again and again."""
+        """Run a job in each period."""
 
         def again() -> None:
             self.after(period_s, again)
@@ -43,7 +43,7 @@ class Timeline:
         self.after(period_s, again)
 
     def advance_to(self, stamp_ns: int) -> None:
-        """Let time pass, and do what is due."""
+        """Advance the clock, and run the jobs that are due."""
         while self._jobs and self._jobs[0][0] <= stamp_ns:
             self.now_ns, _, job = heapq.heappop(self._jobs)
             job()
@@ -69,11 +69,11 @@ class BagHost:
         self._busy = False
 
     def now_ns(self) -> int:
-        """Return the bag's time."""
+        """Return the bag's time, nanoseconds."""
         return self._timeline.now_ns
 
     def publish(self, topic: str, message: Any) -> None:
-        """Pass it on with the node's name; what others publish, too, is told by the record."""
+        """Publish a message under the node's name; on a topic that others publish, too, the record's messages stand instead."""
         resolved = self._resolved(topic)
         if resolved in self.topics:
             self._publish(resolved, message)
@@ -82,20 +82,20 @@ class BagHost:
         return f"/{self._name}/{topic[1:]}" if topic.startswith("~") else topic
 
     def wanted(self, _topic: str) -> bool:
-        """Return that nobody takes it."""
+        """Return False: nobody reads it."""
         return False
 
     def published(self, _topic: str) -> bool:
-        """Return that the bag publishes it."""
+        """Return True: the bag publishes it."""
         return True
 
     def done(self, _stamp_ns: int) -> None:
-        """Wait for nobody: time goes on when all of a moment is done."""
+        """Ignore it: time goes on when all of a moment is processed."""
 
     def report(self, resource: str, state: str, reason: str = "", *, insist: bool = True) -> None:
-        """Tell a new state or reason as a call that was accepted.
+        """Record a new state or reason as a call that was accepted.
 
-        Which reason the skillset shows before the first call is not known here: a reason alone is told only of what was said here.
+        The skillset's reason before the first call is not known here: a reason alone is recorded only after a call from here.
         """
         before, known = self._shown.get(resource, (self._initial.get(resource, "UNKNOWN"), reason))
         if insist if before != state else reason not in {"", known}:
@@ -108,7 +108,7 @@ class BagHost:
             self._publish(CALLS, String(data=json.dumps({**call, "begin_s": now_s, "end_s": now_s})))
 
     def offer(self, work: Callable[[], None]) -> None:
-        """Have this done `WORK_S` later; what is offered meanwhile waits, and only the newest of that."""
+        """Run this after `WORK_S`; of what is offered meanwhile only the newest waits."""
         self._waiting = [work]
         if not self._busy:
             self._begin()
@@ -127,9 +127,9 @@ class BagHost:
         self._begin()
 
     def info(self, text: str) -> None:
-        """Log."""
+        """Log a text."""
         log.debug(text)
 
     def warn(self, _about: str, text: str, *, every_s: float = 2.0) -> None:  # noqa: ARG002 -- a protocol's signature
-        """Log."""
+        """Log a warning."""
         log.debug(text)

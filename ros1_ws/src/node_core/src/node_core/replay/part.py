@@ -1,4 +1,4 @@
-"""What a robot says of a replay from its sensors: its part ``sensors`` in ``robot.yaml``, imported in the ROS 1 world."""
+"""A robot's part of a replay from its sensors: its part ``sensors`` in ``robot.yaml``, imported in ROS 1."""
 
 from __future__ import annotations
 
@@ -37,12 +37,12 @@ Change = Callable[[Arrival], Iterable[tuple[Any, int]]]
 
 
 def dead(_arrival: Arrival) -> Iterable[tuple[Any, int]]:
-    """Have nothing arrive."""
+    """Return no arrival: the sensor is silent."""
     return ()
 
 
 def frozen(arrival: Arrival) -> Iterable[tuple[Any, int]]:
-    """Have the last good measurement arrive again, with the stamp of this one; nothing where there was none."""
+    """Return the last good measurement again, with the stamp of this one; nothing where there was none."""
     if arrival.last is not None:
         arrival.last.header.stamp = arrival.message.header.stamp
         yield arrival.last, arrival.at_ns
@@ -63,7 +63,7 @@ class Replayed(Protocol):
         """Return the parameters of a node that were given with ``--set``."""
 
     def hear(self, topic: str, take: Callable[[Any], bool]) -> None:
-        """Have ``take`` called with what was recorded on a topic; where it returns false, that is not in the new bag."""
+        """Call ``take`` with the recorded messages of a topic; those for which it returns false are not in the new bag."""
 
     def publish(self, topic: str, message: Any) -> None:
         """Write a message into the new bag."""

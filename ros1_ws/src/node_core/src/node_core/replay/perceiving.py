@@ -1,4 +1,4 @@
-"""Feeds the cores from one bag, and writes the other: the record with what the cores say now in place of what they said then."""
+"""Feeds the cores from one bag, and writes the other: the record with the cores' messages of now in place of those of then."""
 
 from __future__ import annotations
 
@@ -25,7 +25,7 @@ if TYPE_CHECKING:
 
 @dataclass(frozen=True)
 class Conditions:
-    """Under which conditions it is perceived again.
+    """The conditions of a replay.
 
     Attributes:
         fail: measurements that fail, from ``zero_s`` of mission clock on.
@@ -59,7 +59,7 @@ class Perceiving:
         self._cores: Mapping[str, Core] = {}
 
     def run(self) -> None:
-        """Give every recorded measurement to the cores, in the order of the bag; raises ReplayPartError."""
+        """Feed every recorded measurement to the cores, in the order of the bag; raises ReplayPartError."""
         self._timeline.now_ns = round(self._source.get_start_time() * 1e9)
         self._cores = self._part.make(self)
         for core in self._cores.values():
@@ -96,7 +96,7 @@ class Perceiving:
         return self._given.parameters.get(name, {})
 
     def hear(self, topic: str, take: Callable[[Any], bool]) -> None:
-        """Have ``take`` called with what was recorded on a topic; where it returns false, that is not in the new bag."""
+        """Call ``take`` with the recorded messages of a topic; those for which it returns false are not in the new bag."""
         self._heard[topic] = take
 
     def publish(self, topic: str, message: Any) -> None:

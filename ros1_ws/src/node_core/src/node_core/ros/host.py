@@ -79,11 +79,11 @@ class RosHost:
         self._reporters[skillset].report(name, state, reason, insist=insist)
 
     def offer(self, work: Callable[[], None]) -> None:
-        """Have the node's worker do this next."""
+        """Offer this to the node's worker."""
         self._worker.offer(work)
 
     def info(self, text: str) -> None:
-        """Log."""
+        """Log a text."""
         rospy.loginfo(text)
 
     def warn(self, about: str, text: str, *, every_s: float = 2.0) -> None:

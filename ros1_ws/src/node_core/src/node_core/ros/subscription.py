@@ -17,12 +17,12 @@ LOOK_S = 0.5  # wall clock
 
 
 def warn_of_garbage(reason: str) -> None:
-    """Log that something is left out."""
+    """Log that a message is left out."""
     rospy.logwarn_throttle(2.0, f"left out: {reason}")
 
 
 class Stream:
-    """Tells from what waits in a stream, as seen from time to time, whether it has lost the borders between its messages.
+    """Detects, from the bytes that wait in a stream, whether it has lost the borders between its messages.
 
     It has where bytes have waited for the rest of their message for `SILENCE_S`, from the first look that sees it on: a look may fall
     between the bytes and their message, and the mission clock may have run far since the look before. Each time the timeout is doubled,
