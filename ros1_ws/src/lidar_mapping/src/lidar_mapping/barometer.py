@@ -63,7 +63,7 @@ class _Node:
 
 
 class BarometerZero:
-    """Hears each height, and ties those of keyframes and stays to the keyframes' poses by factors of a graph."""
+    """Receives each height, and ties those of keyframes and stays to the keyframes' poses by factors of a graph."""
 
     def __init__(self, settings: HeightSettings, factors: gtsam.NonlinearFactorGraph) -> None:
         self._settings, self._factors = settings, factors
@@ -74,12 +74,12 @@ class BarometerZero:
 
     @property
     def drifted_m(self) -> float:
-        """How much higher the autopilot takes the vehicle to be than at the start, but for jumps; 0 while nothing was heard."""
+        """By how many metres the autopilot's height has drifted since the start, without jumps; 0 before the first height."""
         return self._above_m - self._nodes[0].zero_m if self._nodes else 0.0
 
     @property
     def rate_m_s(self) -> float:
-        """The drift's rate."""
+        """The rate of the drift, m/s."""
         return self._nodes[-1].rate_m_s if self._nodes else 0.0
 
     @property
@@ -88,7 +88,7 @@ class BarometerZero:
         return [(node.stamp_ns - self._nodes[0].stamp_ns) / NS for node in self._nodes[1:] if node.walk is None]
 
     def hear(self, stamp_ns: int, height_m: float, up_m: float) -> None:
-        """Take the autopilot's height at the end of a sweep, and the height in the map, which the scan says."""
+        """Store the autopilot's height at the end of a sweep, and the height in the map by the scan, metres."""
         above_m = height_m - up_m
         if self._last is not None and 0 < stamp_ns - self._last[0] < JUMP_WITHIN_S * NS:
             step_m = above_m - self._last[1]
@@ -97,7 +97,7 @@ class BarometerZero:
         self._above_m = above_m - self._jumped_m
 
     def forget(self) -> None:
-        """Take the next height for no jump: the map was moved, or the vehicle was not seen."""
+        """Do not take the next height for a jump: the map was moved, or the vehicle was not seen."""
         self._last = None
 
     def due(self, stamp_ns: int, keyframe: Keyframe) -> bool:
@@ -130,13 +130,13 @@ class BarometerZero:
         self._factors.add(gtsam.BarometricFactor(keyframe, _zero(node), measured, isotropic(1, settings.noise_m)))
 
     def insert_into(self, values: gtsam.Values) -> None:
-        """Add what is known of all zeros and rates."""
+        """Insert the present estimates of all zeros and rates."""
         for n, node in enumerate(self._nodes):
             values.insert(_zero(n), node.zero_m)
             values.insert(_rate(n), node.rate_m_s)
 
     def take_from(self, values: gtsam.Values) -> None:
-        """Take what the optimisation has found."""
+        """Store the estimates of an optimisation."""
         for n, node in enumerate(self._nodes):
             node.zero_m, node.rate_m_s = values.atDouble(_zero(n)), values.atDouble(_rate(n))
 

@@ -85,7 +85,7 @@ class LidarMapping:
 
     @property
     def timers(self) -> list[tuple[float, Callable[[], None]]]:
-        """What is saved and published again and again."""
+        """The periodic work: saving and publishing."""
         settings = self._settings
         return [
             (settings.save_period_s, self.save_if_new),
@@ -94,7 +94,7 @@ class LidarMapping:
         ]
 
     def switch(self, enabled: bool) -> None:  # noqa: FBT001 -- a callback's signature
-        """Begin or end to map."""
+        """Begin or end the mapping."""
         self.enabled = enabled
         with self._lock:  # after the scan in work: nothing contradicts this state until the next change
             self._slam.stop()
@@ -109,7 +109,7 @@ class LidarMapping:
             self._host.report("mapping.imu_status", "OK")
 
     def save(self) -> str:
-        """Write the map; return what was written where, raise OSError."""
+        """Write the map; return in words what was written where; raise OSError."""
         with self._saving:
             with self._lock:
                 points, scans = self._slam.map.points, self._slam.count.scans
@@ -118,7 +118,7 @@ class LidarMapping:
         return f"{len(points)} points in {self._path}"
 
     def save_if_new(self) -> None:
-        """Write a map that has grown."""
+        """Write the map if it has grown."""
         if self._slam.count.scans == self._saved_scans:
             return
         try:

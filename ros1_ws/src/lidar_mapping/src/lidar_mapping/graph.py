@@ -64,7 +64,7 @@ class GraphSettings:
 
 
 class PoseGraph:
-    """Adds keyframes one after the other, finds loops, and says how the poses are to be moved."""
+    """Adds keyframes one after the other, finds loops, and corrects the poses."""
 
     def __init__(self, settings: GraphSettings, registration: RegistrationSettings) -> None:
         self._settings, self._registration = settings, registration
@@ -89,7 +89,7 @@ class PoseGraph:
             self.barometer.tie(stamp_ns, len(keyframes.all) - 1, float(keyframes.all[-1].pose[2, 3]))
 
     def add(self, keyframes: Keyframes, T_odom_base: Floats | None, up_m: float = 0.0) -> bool:  # noqa: N803 -- T_target_source
-        """Take the last keyframe and where the autopilot was then; return whether keyframes' poses were moved.
+        """Add the last keyframe and the autopilot's pose at its moment; return whether keyframes' poses were moved.
 
         ``up_m`` is how well the height of that keyframe is known relative to those around: a standard deviation.
         """

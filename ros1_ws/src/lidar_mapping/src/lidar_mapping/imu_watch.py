@@ -30,12 +30,12 @@ class ImuWatch:
         self._last_refusal = ""
 
     def refuse(self, why: str) -> None:
-        """Note a reading that can't be one."""
+        """Count an impossible reading, and store why it is one."""
         self._refused += 1
         self._last_refusal = why
 
     def fails(self, end_ns: int, readings: Sequence[ImuReading]) -> bool:
-        """Judge by the readings of a sweep, up to its end; return whether the IMU has failed just now, for a second: see ``problem``."""
+        """Judge the readings of a sweep, up to its end; return whether the IMU has failed just now, for a second: see ``problem``."""
         if self._useful_ns is None or end_ns < self._useful_ns:  # the first one, or a clock that was set back
             self._useful_ns, self._newest = end_ns, None
         still = self.still = bool(readings) and self._newest is not None and unchanging([self._newest, *readings])

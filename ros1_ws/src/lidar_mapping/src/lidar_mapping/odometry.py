@@ -82,7 +82,7 @@ class OdometrySettings:
 
 @dataclass(frozen=True)
 class AutopilotMotion:
-    """What the autopilot says: R_enu_base (3, 3), with its slow error, and velocity m/s ENU, which a wrong heading does not turn.
+    """The autopilot's motion: R_enu_base (3, 3), with its slow error, and velocity m/s ENU, which a wrong heading does not turn.
 
     The velocity is the mean over the last `VELOCITY_BASE_NS`.
     """
@@ -129,7 +129,7 @@ class LidarInertialOdometry:
 
     @property
     def state(self) -> InertialState:
-        """Pose, velocity and biases as the filter has them now."""
+        """The filter's present pose, velocity and biases."""
         return self.filter.state
 
     def move(self, correction: Floats) -> None:

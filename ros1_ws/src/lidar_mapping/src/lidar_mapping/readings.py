@@ -36,9 +36,9 @@ class ReadingQueue:
         """The last wait was in vain, and nothing has come since."""
 
     def add(self, reading: ImuReading, now_ns: int) -> bool:
-        """Keep a reading that has just arrived; return whether it can be one.
+        """Add a reading that has just arrived; return whether it is plausible.
 
-        It can where it is of now, later than the last one, within an IMU's range, and where the vehicle has felt a weight of late.
+        A plausible reading is of now, later than the last one, and within an IMU's range, while the mean specific force is a weight's.
         """
         if not _within(reading.rates, FASTEST_RAD_S) or not _within(reading.specific_force, STRONGEST_M_S2):
             return False
@@ -69,7 +69,7 @@ class ReadingQueue:
                 self._silent = not self._arrived.wait_for(lambda: self._last_ns >= stamp_ns, timeout_s)
 
     def take_until(self, stamp_ns: int) -> list[ImuReading]:
-        """Take the readings up to a moment; later ones stay for the next sweep.
+        """Remove and return the readings up to a moment; later ones stay for the next sweep.
 
         The last one is what the readings around that moment make of it: without it the points at the end of each sweep would not be
         straightened.

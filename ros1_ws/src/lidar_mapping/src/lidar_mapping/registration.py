@@ -1,4 +1,4 @@
-"""Register a scan against a surface from a predicted state, and say whether to believe it.
+"""Register a scan against a surface from a predicted state, and judge whether the result is plausible.
 
 Point to plane, with a gate that narrows. Where the surfaces do not hold a direction (along a bare wall) the normals' own noise still looks
 like information; what it would amount to is taken off, so that such a direction stays as the inertial prediction has it.
@@ -29,7 +29,7 @@ FITNESS_GATES = 3.0
 
 @dataclass(frozen=True)
 class RegistrationSettings:
-    """How to register, and when to believe it.
+    """How to register, and which results to accept.
 
     Pairs are searched within a gate that shrinks from three standard deviations of the prediction (at least ``widest_m / 5``, at most
     ``widest_m``) to ``gate_m``; residuals beyond ``kernel_m`` count less (Cauchy). A point is known to ``point_sigma_m``, and neighbours
@@ -55,7 +55,7 @@ class RegistrationSettings:
 
 @dataclass(frozen=True)
 class Registration:
-    """What came out: ``fitness`` 0..1, the correction of the prediction, the directions that no surface holds, and why not to believe it.
+    """The result: ``fitness`` 0..1, the correction of the prediction, the directions that no surface holds, and the reason of a refusal.
 
     ``sigma_m`` (3,) are the standard deviations of the scan's own measurement along ``directions`` (3, 3; columns, map frame), best last.
     """

@@ -1,4 +1,4 @@
-"""The procedure: follow the vehicle through a sweep, put the sweep into the map, close loops, and say how well all that went."""
+"""The procedure: follow the vehicle through a sweep, put the sweep into the map, close loops, and judge the quality."""
 
 from __future__ import annotations
 
@@ -51,7 +51,7 @@ class SlamSettings:
 
 @dataclass
 class SlamCount:
-    """What was done so far."""
+    """Counts of what was done so far."""
 
     scans: int = 0
     rejected: int = 0
@@ -85,7 +85,7 @@ class Slam:
 
     @property
     def begun(self) -> bool:
-        """Whether a sweep was followed: from then on ``T_map_odom`` is what the scans say, before it may be set."""
+        """Whether a sweep was followed: from then on ``T_map_odom`` is by the scans, before it may be set."""
         return self.count.scans > 0
 
     @property
@@ -139,7 +139,7 @@ class Slam:
             self._graph.add(self.keyframes, None)
 
     def stop(self) -> None:
-        """Lose track: the next sweep starts from where the autopilot says, corrected as the map was last."""
+        """Lose track: the next sweep starts at the autopilot's pose, corrected as the map was last."""
         self._odometry = None
         self._readings.clear()
         self._lost_since_ns = None

@@ -33,7 +33,7 @@ WARMS_RAD_S2 = 1e-5  # by how much the bias changes in a second after it: 10 K w
 
 
 class StandingGyro:
-    """Hears every reading, in or out of use; ``bias`` (3,) is in rad/s about the body's axes, zero until the vehicle has stood once."""
+    """Receives every reading, in or out of use; ``bias`` (3,) is in rad/s about the body's axes, zero until the vehicle has stood once."""
 
     def __init__(self) -> None:
         self.bias: Floats = np.zeros(3)
@@ -41,7 +41,7 @@ class StandingGyro:
         self._window: list[ImuReading] = []
 
     def add(self, reading: ImuReading, poses: PoseBuffer) -> None:
-        """Hear a reading; ``poses`` are the autopilot's, and tell at the end of each window whether the vehicle has stood."""
+        """Add a reading; by ``poses``, the autopilot's, it is judged at the end of each window whether the vehicle has stood."""
         if self._window and not 0 < reading.stamp_ns - self._window[-1].stamp_ns <= IMU_GAP_NS:
             self._window.clear()
         self._window.append(reading)

@@ -50,7 +50,7 @@ class Body:
 
 @dataclass(frozen=True)
 class LidarAheadSettings:
-    """Where to look, what to believe, what is the vehicle itself and what is ground.
+    """Where to look, how much evidence to require, and which returns are the vehicle's own or ground.
 
     With fewer than ``min_ahead`` returns from one of the parts of the view of the way ahead, near or far, it is unknown what is there.
     """

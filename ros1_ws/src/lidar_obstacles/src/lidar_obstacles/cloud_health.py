@@ -1,4 +1,4 @@
-"""What a LiDAR's sweeps tell of its health: returns, where they come from, how far they are, whether they change."""
+"""The health of a LiDAR by its sweeps: returns, where they come from, how far they are, whether they change."""
 
 from __future__ import annotations
 
@@ -40,7 +40,7 @@ FROZEN_SHARE = 0.9  # of the points, at the same place to the last bit
 
 @dataclass(frozen=True)
 class CloudLimits:
-    """When a sweep is not believed.
+    """When a sweep counts as faulty.
 
     Fewer than ``min_returns`` are nothing; fewer than ``thin_share`` of what came just before is a broken sensor; more than ``far_share``
     of the returns beyond ``max_range_m`` are coordinates in another unit. A sector is lost with less than ``sector_share`` of what it had.
@@ -96,7 +96,7 @@ class CloudJudge:
     def finding(
         self, sweep: Sweep, *, self_m: float, position_m: Floats | None = None, turned_rad: float = 0.0, tilted_rad: float = 0.0
     ) -> Finding:
-        """Return what the sweep tells; returns nearer than ``self_m`` are the vehicle's own. Its position (3,) is None while unknown.
+        """Return the finding about a sweep; returns nearer than ``self_m`` are the vehicle's own. Its position (3,) is None while unknown.
 
         ``turned_rad``: by how much the sensor has turned about its z axis since the sweep before. What it saw has then moved to other
         sectors: a vehicle that leans in a gust loses nothing. ``tilted_rad``: by how much its z axis has turned.
@@ -118,7 +118,7 @@ class CloudJudge:
         return self._changes.finding
 
     def after_change(self, *, back: bool, apart: bool) -> None:
-        """Tell what walls and posts say after a sudden change: they are back where they were, or too few of them are in view."""
+        """Report how walls and posts are after a sudden change: back where they were, or too few of them in view."""
         if back:
             self._changes.forget()
         self._changes.part(apart=apart)
@@ -385,7 +385,7 @@ def _frozen(now: NDArray[np.float32], before: NDArray[np.float32], returned: NDA
 
 
 class Repeats:
-    """Know a sweep again by the sums of its points, in whatever order these come; not thread-safe."""
+    """Recognises a repeated sweep by the sums of its points, in whatever order these come; not thread-safe."""
 
     def __init__(self) -> None:
         self._lately: deque[_Sums] = deque(maxlen=REPEATED_OF)

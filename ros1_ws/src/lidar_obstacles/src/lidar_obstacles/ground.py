@@ -30,7 +30,7 @@ class GroundSettings:
 
 
 class GroundModel:
-    """Tell the height of points above the ground; remembers where the ground was last seen near the vehicle. Not thread-safe."""
+    """Estimates the height of points above the ground; remembers where the ground was last seen near the vehicle. Not thread-safe."""
 
     def __init__(self, settings: GroundSettings) -> None:
         self._rise = float(np.tan(np.radians(settings.slope_deg)))

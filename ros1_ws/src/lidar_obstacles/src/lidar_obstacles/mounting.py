@@ -1,4 +1,4 @@
-"""Is the LiDAR mounted as it is told? What stands still must stay where it is while the vehicle moves, and the ground is below.
+"""Is the LiDAR mounted as configured? What stands still must stay where it is while the vehicle moves, and the ground is below.
 
 A sweep of a mirrored, turned or overturned sensor looks like any other; how it changes with the vehicle's own motion does not. Planes are
 fitted to all returns of a sweep, one in each cube of a grid: so walls count by their area, however dense the sensor is and whatever else it
@@ -118,7 +118,7 @@ class MountCheck:
         self._above, self._below = 0.0, 0.0
 
     def finding(self, sweep: Sweep, T_base_lidar: Floats, poses: PoseBuffer, *, self_m: float) -> Finding:  # noqa: N803 -- T_target_source
-        """Return what the sweep, together with those before it, tells of the mount; without poses what was found before."""
+        """Return the finding about the mount by this sweep and those before it; without poses the finding before."""
         with suppress(PoseUnavailableError):
             pose = poses.at([sweep.end_ns]).matrix()
             if self._due(sweep, pose):
@@ -138,7 +138,7 @@ class MountCheck:
         return FINE
 
     def hold(self, *, changed: bool) -> None:
-        """Tell, before each sweep is looked at, whether the surroundings have suddenly changed: what was seen before is then remembered."""
+        """Report, before each sweep, whether the surroundings have suddenly changed: the last look before is then kept."""
         if changed and not self._held:
             self._good, self._alike, self._apart_m = (None if self._before is None else self._before[1]), 0, 0.0
         self._held = changed
@@ -150,7 +150,7 @@ class MountCheck:
 
     @property
     def apart(self) -> bool:
-        """Whether, after a sudden change, the vehicle has gone far with too little in view that it saw before: none can tell any more."""
+        """Whether, after a sudden change, the vehicle has gone far with too little in view that it saw before: it can't be judged then."""
         return self._held and self._apart_m >= APART_M
 
     @property

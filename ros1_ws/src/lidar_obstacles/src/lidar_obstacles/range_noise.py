@@ -97,7 +97,7 @@ class RangeNoise:
 
 
 class Specks:
-    """Know rain, dust or snow by the returns that stand alone before what is behind them; not thread-safe."""
+    """Recognise rain, dust or snow by the returns that stand alone before what is behind them; not thread-safe."""
 
     def __init__(self) -> None:
         self._lately: deque[float] = deque(maxlen=SPECK_SWEEPS)

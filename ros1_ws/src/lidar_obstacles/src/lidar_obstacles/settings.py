@@ -47,12 +47,12 @@ class LidarSettings:
 
     @property
     def stamps(self) -> StampLimits:
-        """When a sweep's stamp is not believed."""
+        """When a sweep's stamp counts as faulty."""
         return StampLimits(latency_s=self.latency_s, max_delay_s=self.max_delay_s)
 
     @property
     def cloud(self) -> CloudLimits:
-        """When a sweep is not believed."""
+        """When a sweep counts as faulty."""
         return CloudLimits(
             min_returns=self.min_returns,
             thin_share=self.thin_share,

@@ -57,7 +57,7 @@ class SuddenChange:
 
     @property
     def finding(self) -> Finding:
-        """What the sweeps so far tell."""
+        """The finding by the sweeps so far."""
         if self._before is None:
             return FINE
         told = f"{self._changed_share:.0%} of the view changed by more than {CHANGED_M:g} m from one sweep to the next"
@@ -68,7 +68,7 @@ class SuddenChange:
         return broken(FaultKind.RANGE, told, *CHANGES)
 
     def take(self, cells_m: Floats, stamp_ns: int, *, position_m: Floats | None, tilted_rad: float, clear: bool) -> None:
-        """Judge a sweep by the one before it; it tells nothing while the vehicle's position (3,) is not known.
+        """Judge a sweep by the one before it; while the vehicle's position (3,) is None, it is not judged.
 
         ``cells_m``: as of `Seen.mean_ranges`; ``tilted_rad``: by how much the sensor's z axis has turned since the sweep before. Where the
         view is not ``clear``, as on the ground, it only tells whether the vehicle is at rest.
@@ -86,7 +86,7 @@ class SuddenChange:
         self._rest(now)
 
     def part(self, *, apart: bool) -> None:
-        """Return whether the vehicle is where too little is in view that was before the change: it is then not known whether it lasts."""
+        """Store whether the vehicle is where too little is in view that was before the change: the change can't be judged there."""
         self._apart = apart
 
     def forget(self) -> None:

@@ -108,7 +108,7 @@ def sweep_of_cloud(message: CloudLike) -> Sweep:
 
 
 def time_fields(fields: Sequence[FieldLike]) -> tuple[str, ...]:
-    """Return the names of the fields that tell each point's time: one, or that of the seconds and that of the nanoseconds, or none."""
+    """Return the names of the fields with each point's time: one, or that of the seconds and that of the nanoseconds, or none."""
     names = [field.name for field in fields if field.datatype in DATATYPES]
     for name in names:
         nano = NANOSECONDS.fullmatch(name)

@@ -62,7 +62,7 @@ def is_rigid(transform: Transform) -> bool:
 
 
 def obstacle_message(stamp_ns: int, source: str, nearest: Nearest | None, unknown: str = "") -> Obstacle:
-    """Return what one sensor says of one measurement: the nearest obstacle or none, and why nothing more can be said of the corridor."""
+    """Return one sensor's verdict on one measurement: the nearest obstacle or none, and why no more is known of the corridor."""
     stamp = Time(stamp_ns // NS, stamp_ns % NS)
     message = Obstacle(header=Header(stamp=stamp, frame_id=ODOMETRY), source=source, detected=nearest is not None, distance_m=math.inf)
     if nearest is not None:

@@ -46,7 +46,7 @@ class Corridor:
 
 @dataclass(frozen=True)
 class VehicleMotion:
-    """What the guidance says about the motion: velocity (m/s, ENU) and the target (metres, ENU) when it follows a position reference."""
+    """The motion by the guidance: velocity (m/s, ENU) and the target (metres, ENU) when it follows a position reference."""
 
     velocity_enu_m_s: tuple[float, float, float] = (0.0, 0.0, 0.0)
     target_enu_m: tuple[float, float, float] | None = None
@@ -54,7 +54,7 @@ class VehicleMotion:
 
 @dataclass(frozen=True)
 class Support:
-    """How much must be seen in one place before it is believed to be an obstacle.
+    """How much must be seen in one place to count as an obstacle.
 
     The corridor is cut into cells of ``cell_m``; along it they grow as ``range_error_per_m * distance**2`` where that is longer (stereo).
     Two by two by two neighbouring cells must together hold ``min_points`` points and ``min_area_m2`` of seen surface; of a dense sensor
@@ -71,7 +71,7 @@ class Support:
 
 @dataclass(frozen=True)
 class Nearest:
-    """The nearest believed obstacle: metres from the vehicle's centre along the corridor, where, and how large what is seen of it is.
+    """The nearest confirmed obstacle: metres from the vehicle's centre along the corridor, where, and how large what is seen of it is.
 
     The size is along the corridor, across and up, of the connected points in the corridor.
     """
@@ -83,7 +83,7 @@ class Nearest:
 
 @dataclass(frozen=True)
 class Ahead:
-    """What is ahead: the nearest obstacle that is seen, or None; ``unknown`` says why a nearer one may be there that is not seen."""
+    """What is ahead: the nearest obstacle that is seen, or None; ``unknown`` is why a nearer one may be there unseen."""
 
     nearest: Nearest | None
     unknown: str = ""

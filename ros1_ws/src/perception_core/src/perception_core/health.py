@@ -1,4 +1,4 @@
-"""Is a sensor to be believed? A watch that is told of every measurement and asked for its verdict; no ROS, times in nanoseconds."""
+"""Is a sensor healthy? A watch that gets every measurement and returns its verdict; no ROS, times in nanoseconds."""
 
 from __future__ import annotations
 
@@ -17,7 +17,7 @@ LATE_TICK_S = 0.1
 
 
 class Verdict(Enum):
-    """What is known of the sensor; the values are the states of the skillset's resource."""
+    """The health of the sensor; the values are the states of the skillset's resource."""
 
     UNKNOWN = "UNKNOWN"
     OK = "OK"
@@ -25,7 +25,7 @@ class Verdict(Enum):
 
 
 class FaultKind(Enum):
-    """What kind of trouble a sensor has; the values are those of ``SensorHealth.fault``."""
+    """The kind of a sensor's fault; the values are those of ``SensorHealth.fault``."""
 
     NONE = ""
     SILENT = "silent"  # nothing comes
@@ -44,7 +44,7 @@ class FaultKind(Enum):
 
 @dataclass(frozen=True)
 class Finding:
-    """What one measurement tells of its sensor: OK, BROKEN or can't be judged (UNKNOWN), with a sentence where it is not OK."""
+    """What one measurement shows of its sensor: OK, BROKEN or can't be judged (UNKNOWN), with a sentence where it is not OK."""
 
     verdict: Verdict = Verdict.OK
     fault: FaultKind = FaultKind.NONE
@@ -75,7 +75,7 @@ def sentence(measured: str, *causes: str) -> str:
 
 
 def first_trouble(*findings: Finding) -> Finding:
-    """Return the first finding that tells of a broken sensor, else the first that can't be judged, else that all is fine."""
+    """Return the first finding of a broken sensor, else the first that can't be judged, else that all is fine."""
     for verdict in (Verdict.BROKEN, Verdict.UNKNOWN):
         for finding in findings:
             if finding.verdict is verdict:
@@ -121,7 +121,7 @@ class HealthWatch:
         self._arrived_ns: deque[int] = deque(maxlen=INTERVALS + 1)
 
     def take(self, finding: Finding, arrived_ns: int) -> None:
-        """Take the finding about a measurement that arrived at ``arrived_ns``, nanoseconds."""
+        """Store the finding about a measurement that arrived at ``arrived_ns``, nanoseconds."""
         self._arrived_ns.append(arrived_ns)
         if finding.ok:
             self._good(arrived_ns)
@@ -142,7 +142,7 @@ class HealthWatch:
     def tick(self, now_ns: int, *, missing: str = "") -> Verdict:
         """Return the verdict at this moment; call at 20 Hz or faster. A clock that jumps back by a second starts the watch again.
 
-        ``missing`` says what has no driver: as long as nothing was received either, the sensor is not there yet, which is not broken.
+        ``missing`` names what has no driver: as long as nothing was received either, the sensor is not there yet, which is not broken.
         """
         if self._last_tick_ns is not None and now_ns < self._last_tick_ns - NS:
             self._restart()

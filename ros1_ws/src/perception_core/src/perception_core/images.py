@@ -65,7 +65,7 @@ BRIGHTEST = 99.5  # percentile: a few hot pixels do not say how many bits there 
 class GrayConverter:
     """Turn the images of one camera into grey ones; not thread-safe.
 
-    A camera of 10, 12 or 14 bits sends 16 of them, filled from below: how many it uses is told by the brightest pixels seen so far.
+    A camera of 10, 12 or 14 bits sends 16 of them, filled from below: how many it uses is judged by the brightest pixels seen so far.
     """
 
     def __init__(self) -> None:

@@ -25,7 +25,7 @@ _Row = tuple[float, float, float, float, float, float, float]
 
 
 class PoseUnavailableError(LookupError):
-    """No pose is known near enough to the asked moment."""
+    """No pose is known near enough to the requested moment."""
 
 
 @dataclass(frozen=True)

@@ -38,17 +38,17 @@ class SensorWatch:
         self._published_ns = 0
 
     def stamp(self, stamp_ns: int) -> Finding:
-        """Return what the stamp of a measurement tells that has just arrived; call it once for each, in order."""
+        """Return the finding about the stamp of a measurement that has just arrived; call it once for each, in order."""
         with self._lock:
             return self._stamps.finding(stamp_ns, self._host.now_ns())
 
     def take(self, finding: Finding) -> None:
-        """Take the finding about a measurement that has just arrived."""
+        """Store the finding about a measurement that has just arrived."""
         with self._lock:
             self._watch.take(finding, self._host.now_ns())
 
     def tune(self, limits: HealthLimits, stamps: StampLimits) -> None:
-        """Go on with other limits."""
+        """Set other limits."""
         with self._lock:
             self._watch.limits = limits
             self._stamps.limits = stamps
@@ -59,18 +59,18 @@ class SensorWatch:
 
     @property
     def ok(self) -> bool:
-        """Whether the sensor is to be believed now."""
+        """Whether the sensor is healthy now."""
         with self._lock:
             return self._watch.verdict is Verdict.OK
 
     @property
     def reason(self) -> str:
-        """Why it is not to be believed."""
+        """Why it is not healthy; empty where it is."""
         with self._lock:
             return self._watch.reason
 
     def tick(self, missing: str) -> None:
-        """Judge at this moment; ``missing`` says which inputs have no driver."""
+        """Judge at this moment; ``missing`` names the inputs without a driver."""
         now_ns = self._host.now_ns()
         with self._lock:
             verdict, fault, reason = self._watch.tick(now_ns, missing=missing), self._watch.fault, self._watch.reason

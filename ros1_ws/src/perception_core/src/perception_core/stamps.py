@@ -35,7 +35,7 @@ class StampJudge:
         self._late = False
 
     def finding(self, stamp_ns: int, now_ns: int) -> Finding:
-        """Return what this stamp tells at the moment ``now_ns`` of its arrival."""
+        """Return the finding about a stamp at the moment ``now_ns`` of its arrival."""
         previous_ns, self._previous_ns = self._previous_ns, stamp_ns
         delay_s = (now_ns - stamp_ns) / NS - self.limits.latency_s
         share = MEND_SHARE if self._late else 1.0

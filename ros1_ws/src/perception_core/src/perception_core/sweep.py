@@ -59,7 +59,7 @@ class Sweep:
 
 
 class SweepStamps:
-    """Know a driver that stamps the end of its sweeps and counts the points' times from the beginning; not thread-safe.
+    """Recognises a driver that stamps the end of its sweeps and counts the points' times from the beginning; not thread-safe.
 
     By its stamps each sweep would end after it has arrived. One that does is no proof: a busy machine may tell a node the time late. Nor is
     one that does not, of a driver that is known: the node may be late, too. A stamp that lies ahead of the time tells nothing of either.

@@ -18,7 +18,7 @@ class SettingsError(ValueError):
 
 @dataclass(frozen=True)
 class Range:
-    """Between what values a setting may be changed while the node runs, and what it means."""
+    """The range within which a setting may be changed while the node runs, and its meaning."""
 
     low: float
     high: float

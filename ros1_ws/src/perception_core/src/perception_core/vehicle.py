@@ -1,4 +1,4 @@
-"""What the perception nodes know of the vehicle: its poses, its motion, and where its sensors are mounted."""
+"""The vehicle for the perception nodes: its poses, its motion, and where its sensors are mounted."""
 
 from __future__ import annotations
 
@@ -29,7 +29,7 @@ POSE_WAIT_S = 0.3  # wall clock; poses come at 50 Hz
 
 
 class KnownVehicle:
-    """What the guidance and ``/tf_static`` say; the attributes are always the latest.
+    """The vehicle by the guidance and ``/tf_static``; the attributes are always the latest.
 
     All is in the autopilot's frame `odom`, which no correction of the map makes jump: ``poses`` come in it, ``motion`` is turned into it.
     """
@@ -42,7 +42,7 @@ class KnownVehicle:
         self._mounts: dict[str, tuple[str, NDArray[np.float64]]] = {}  # of each frame its parent and T_parent_frame
 
     def inputs(self, garbage: Callable[[str], None]) -> list[Input]:
-        """Return the topics that tell of the vehicle; what is no message goes to ``garbage``."""
+        """Return the topics about the vehicle; reasons of undecodable messages go to ``garbage``."""
         return [
             Input("/uav_guidance/pose", PoseStamped, self._on_pose, garbage, BUFFER_BYTES, queue_size=50),
             Input("/uav_guidance/state", GuidanceState, self._on_state, garbage, BUFFER_BYTES),
@@ -56,13 +56,13 @@ class KnownVehicle:
         return self.poses
 
     def T_odom_map(self, *, wait_s: float = 0.0) -> NDArray[np.float64] | None:  # noqa: N802 -- T_target_source
-        """Return where the guidance has `map`, by which it flies, (4, 4); None where it has not told it within ``wait_s`` (wall clock)."""
+        """Return T_odom_map of the map by which the guidance flies, (4, 4); None where none is received within ``wait_s`` (wall clock)."""
         with self._map_told:
             self._map_told.wait_for(lambda: self._T_odom_map is not None, wait_s)
             return self._T_odom_map
 
     def mount(self, frame: str) -> NDArray[np.float64]:
-        """Return T_base_sensor, (4, 4); raise LookupError while ``/tf_static`` has not told it."""
+        """Return T_base_sensor, (4, 4); raise LookupError before ``/tf_static`` has it."""
         name, T_base_sensor = frame.lstrip("/"), np.eye(4)  # noqa: N806 -- T_target_source
         for _ in range(LONGEST_CHAIN):
             if name == BASE:
@@ -96,5 +96,5 @@ class KnownVehicle:
             self.set_mount(item.header.frame_id, item.child_frame_id, matrix_of_transform(item.transform))
 
     def set_mount(self, parent: str, frame: str, T_parent_frame: NDArray[np.float64]) -> None:  # noqa: N803 -- T_target_source
-        """Take where a frame is mounted on another, (4, 4)."""
+        """Set the place of a frame on its parent, (4, 4)."""
         self._mounts[frame.lstrip("/")] = parent.lstrip("/"), T_parent_frame

@@ -22,7 +22,7 @@ UPWARDS = np.array([0.0, 0.0, 1.0])
 
 @dataclass(frozen=True)
 class ZedAheadSettings:
-    """Where to look, and what to believe.
+    """Where to look, and how much evidence to require.
 
     The range ends where a disparity error of one pixel makes the depth useless: with fx 240 px and 0.12 m between the cameras one pixel is
     0.6 m at 4 m, 2.2 m at 8 m. With a depth for less than ``min_known`` of an eighth of the corridor's width it is unknown what is there.

@@ -142,7 +142,7 @@ class ZedDepth:
             return None
 
     def finding(self, pair: StereoPair) -> Finding:
-        """Return what a pair that has just arrived tells of the camera; call it once for each, in order."""
+        """Return the finding about a pair that has just arrived; call it once for each, in order."""
         stamp = self._health.stamp(pair.stamp_ns)
         return first_trouble(stamp, self._rig.finding(pair))
 

@@ -32,7 +32,7 @@ FIRST_SCALES = np.array([[1.0], [0.5], [0.6], [0.7], [0.8], [0.9], [1.1], [1.25]
 
 @dataclass(frozen=True)
 class ScaleLimits:
-    """When the scale of the depths is not believed; measured in rendered flights, docs/experiments/perception.md.
+    """When the scale of the depths counts as wrong; measured in rendered flights, docs/experiments/perception.md.
 
     ``max_error`` is of the depth. The last ``estimates`` within ``window_s`` must be there, each surer than ``max_sigma``.
     """
@@ -66,14 +66,14 @@ class ScaleJudge:
         return len(self._estimates) >= self._limits.estimates
 
     def compare(self, views: Compared, geometry: StereoGeometry) -> None:
-        """Take two views of a vehicle that moved in between."""
+        """Compare two views of a vehicle that moved in between."""
         near = views.seen.disparity_px - geometry.offset_px >= LEAST_DISPARITY_PX
         estimate = scale_of(views.seen.only(near), views.places[near], views.T_later_earlier, geometry)
         if estimate is not None and estimate.sigma <= self._limits.max_sigma:
             self.judge(views.stamp_ns, estimate.scale)
 
     def judge(self, stamp_ns: int, scale: float) -> None:
-        """Take an estimate of the scale."""
+        """Add an estimate of the scale."""
         limits, known = self._limits, self._estimates
         known.append((stamp_ns, scale))
         while len(known) > limits.estimates or not 0 <= stamp_ns - known[0][0] <= limits.window_s * NS:

@@ -1,4 +1,4 @@
-"""What single images tell of their camera: exposure, content, change. Cheap enough for every pair."""
+"""The health of a camera by single images: exposure, content, change. Cheap enough for every pair."""
 
 from __future__ import annotations
 
@@ -49,7 +49,7 @@ class ImageJudge:
         """Mean second derivative of the less sharp image of the last pair, grey levels; to be compared among images of one scene only."""
 
     def finding(self, pair: StereoPair) -> Finding:
-        """Return what the images of this pair tell; call it once for each pair."""
+        """Return the finding about the images of this pair; call it once for each pair."""
         sides = (("left", pair.left), ("right", pair.right))
         self.sharpness = min(_sharpness(image) for _, image in sides)
         self._blank.clear()

@@ -129,7 +129,7 @@ class StereoRig:
         self._views, self._scale, self._vergence = Views(), ScaleJudge(self._settings.scale), VergenceJudge(VergenceLimits())
 
     def finding(self, pair: StereoPair) -> Finding:
-        """Return what this pair tells of the rig; call it once for each pair, in order."""
+        """Return the finding about this pair; call it once for each pair, in order."""
         images = first_trouble(self._images.finding(pair), fixed_columns_finding(pair.left, pair.right), self._torn.finding(pair))
         with self._lock:
             calibration, info = self._calibration, self._info_finding

@@ -17,7 +17,7 @@ if TYPE_CHECKING:
 
 
 def read_settings(defaults: Settings) -> Settings:
-    """Return the defaults with what the parameter server has under the node's name; a wrong value is told, and ends the process with 2."""
+    """Return the defaults with the parameter server's values for the node; a wrong value is logged, and ends the process with 2."""
     try:
         return override(defaults, rospy.get_param("~", {}))
     except SettingsError as error:
