@@ -60,7 +60,7 @@ class Assembler:
         return self._next_id is None and self.newest_id >= 0
 
     def add(self, packet: VideoPacket, now_ns: int) -> bool:
-        """Take a packet; return whether it is new."""
+        """Add a packet; return whether it is new."""
         mark = packet.mark
         if mark.frame_id <= self._given_id:
             if mark.stamp_ns <= self._given_stamp_ns:

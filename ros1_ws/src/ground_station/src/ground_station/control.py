@@ -1,4 +1,4 @@
-"""The telepilot's control link: the heartbeat by which an autopilot knows that its ground station is there, and the stick. Pure."""
+"""The telepilot's control link: the heartbeat by which an autopilot detects its ground station, and the stick. Pure."""
 
 from __future__ import annotations
 
@@ -24,7 +24,7 @@ class ControlLink:
         self._due_ns = 0
 
     def due(self, now_ns: int) -> list[bytes]:
-        """Return the datagrams that are to be sent now."""
+        """Return the datagrams to send now."""
         messages: list[mavlink.MAVLink_message] = []
         if now_ns >= self._due_ns:
             self._due_ns = now_ns + PERIOD_NS
@@ -40,7 +40,7 @@ class ControlLink:
         return [bytes(message.pack(self._sender)) for message in messages]
 
     def hear(self, data: bytes) -> None:
-        """Take what the autopilot says; what is none of its heartbeats is nothing to us."""
+        """Handle a datagram of the autopilot; ignore what is none of its heartbeats."""
         for message in self._parser.parse_buffer(data) or ():
             if message.get_type() == "HEARTBEAT" and (message.get_srcSystem(), message.get_srcComponent()) == AUTOPILOT:
                 self.stick.hear(message.custom_mode)

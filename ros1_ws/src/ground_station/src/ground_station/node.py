@@ -53,7 +53,7 @@ class GroundStationNode:
             )
 
     def run(self) -> None:
-        """Work until ROS shuts down; the film is whole then."""
+        """Run until ROS shuts down; the film is complete then."""
         self._loop.run()
         if self._log is not None:
             self._log.close()

@@ -57,7 +57,7 @@ class VideoReceiver:
         self.last_refusal = ""
 
     def datagram(self, data: bytes, now_ns: int) -> bool:
-        """Take what came and tell whether it is a new packet of the video; what is not ours is counted and forgotten."""
+        """Handle a datagram; return whether it is a new packet of the video. Others are counted and dropped."""
         try:
             packet = VideoPacket.parse(data, self._seal)
         except WireError as error:
@@ -71,11 +71,11 @@ class VideoReceiver:
         return new
 
     def pictures(self, now_ns: int) -> list[Picture]:
-        """Return the frames to be shown now."""
+        """Return the frames to show now."""
         return [picture for whole in self._assembler.take(now_ns) for picture in self._decode(whole, now_ns)]
 
     def report(self, now_ns: int) -> VideoReport | None:
-        """Return a report when it is time for one."""
+        """Return a report when one is due."""
         if now_ns < self._report_due_ns:
             return None
         self._report_due_ns = now_ns + REPORT_PERIOD_NS

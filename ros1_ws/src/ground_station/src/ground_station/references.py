@@ -25,7 +25,7 @@ class References:
         return self._newest_ns >= 0
 
     def note(self, stamp_ns: int, image: Rgb) -> None:
-        """Learn what the camera saw at a moment, (H, W, 3) uint8 RGB."""
+        """Store what the camera saw at a moment, (H, W, 3) uint8 RGB."""
         with self._changed:
             self._images[stamp_ns] = image
             self._newest_ns = max(self._newest_ns, stamp_ns)

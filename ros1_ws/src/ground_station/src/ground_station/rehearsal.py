@@ -26,7 +26,7 @@ FRAME_NS = NS // 20
 
 @dataclass(frozen=True)
 class RehearsalMoment:
-    """How things were at a report of the ground station."""
+    """The state of the stream at a report of the ground station."""
 
     t_s: float
     report: VideoReport

@@ -1,4 +1,4 @@
-"""The telepilot's stick: when it takes the vehicle over, what is sent of it, and how it gives the vehicle back. Pure.
+"""The telepilot's stick: when it takes over the vehicle, which deflections it sends, and how it gives the vehicle back. Pure.
 
 An ArduCopter lets sticks fly it in modes of the pilot's, in GUIDED it does not: so moving the stick takes LOITER first. Only while the
 vehicle says that it is in LOITER is the stick sent, as MANUAL_CONTROL: four axes without any vehicle's calibration, which can't reach its
@@ -23,7 +23,7 @@ ASK_NS = 3 * NS  # for so long a mode is asked for that the vehicle does not tak
 
 @dataclass(frozen=True)
 class Deflection:
-    """Parts of the way from the middle, -1 to 1: to the front, to the left, up, counter-clockwise."""
+    """A stick's deflection, -1 to 1 on each axis: to the front, to the left, up, counter-clockwise."""
 
     forward: float = 0.0
     left: float = 0.0
@@ -31,7 +31,7 @@ class Deflection:
     turn: float = 0.0
 
     def clipped(self) -> Deflection:
-        """Return what a stick can be; what is no number is centred."""
+        """Return the deflection within the range of a stick; a component that is no number is centred."""
         axes = (axis if math.isfinite(axis) else 0.0 for axis in (self.forward, self.left, self.up, self.turn))
         return Deflection(*(min(max(axis, -1.0), 1.0) for axis in axes))
 
@@ -58,7 +58,7 @@ class Stick:
         self._send_due_ns = 0
 
     def move(self, raw: Deflection, now_ns: int) -> None:
-        """Take where the stick is; moved out of the middle, where it must have been, it takes the vehicle over."""
+        """Store the stick's deflection; moved out of the middle, where it must have been, it takes the vehicle over."""
         deflection = raw.clipped()
         if deflection.moved and self._rested and not self.piloting:
             self._want(LOITER, now_ns)
@@ -66,25 +66,25 @@ class Stick:
         self._deflection, self._moved_ns = deflection, now_ns
 
     def give_back(self, now_ns: int) -> str:
-        """Hand the vehicle back to the mission's guidance; return why not, or nothing."""
+        """Hand the vehicle back to the mission's guidance; return why that is not possible, empty where it is done."""
         if not self.piloting:
             return "the telepilot does not have the vehicle"
         self._want(GUIDED, now_ns)
         return ""
 
     def hear(self, mode: int) -> None:
-        """Take the vehicle's mode. A change that was not asked for here, as by a failsafe, ends the take-over and is not fought."""
+        """Store the vehicle's mode. A change that was not requested here, as by a failsafe, ends the take-over and is not fought."""
         if mode == self._wanted:
             self.piloting, self._wanted = mode == LOITER, None
         elif self.piloting and mode != LOITER:
             self.piloting, self._wanted = False, None
 
     def at(self, now_ns: int) -> Deflection:
-        """Return where the stick is; one that is not heard of is centred."""
+        """Return the stick's deflection; centred while none is received."""
         return self._deflection if now_ns - self._moved_ns <= FRESH_NS else CENTRED
 
     def mode_to_ask(self, now_ns: int) -> int | None:
-        """Return the mode that the vehicle is to be told to take now."""
+        """Return the mode to request from the vehicle now; None: none."""
         if self._wanted is None or now_ns < self._ask_due_ns:
             return None
         if now_ns > self._asked_until_ns:
@@ -94,7 +94,7 @@ class Stick:
         return self._wanted
 
     def to_send(self, now_ns: int) -> Deflection | None:
-        """Return what the vehicle is to be told of the stick now."""
+        """Return the deflection to send to the vehicle now; None: none."""
         if not self.piloting or now_ns < self._send_due_ns:
             return None
         self._send_due_ns = now_ns + PERIOD_NS

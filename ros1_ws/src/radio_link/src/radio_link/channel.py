@@ -41,7 +41,7 @@ class Condition:
     reorder: float = 0.0
 
     def scaled(self, part: float) -> Condition:
-        """Return the same with a part of the rate."""
+        """Return the condition with its rate scaled by ``part``."""
         return replace(self, rate_bps=self.rate_bps * part)
 
 
@@ -62,7 +62,7 @@ class Channel:
         self.sent = self.delivered = self.lost = self.dropped = 0
 
     def send(self, data: bytes, now_ns: int) -> None:
-        """Take a datagram from one end."""
+        """Send a datagram from one end."""
         self._advance(now_ns)
         self.sent += 1
         limit_bytes = max(self.condition.rate_bps * self.condition.queue_s / 8.0, float(2 * BURST_BYTES))
@@ -74,7 +74,7 @@ class Channel:
         self._advance(now_ns)
 
     def due(self, now_ns: int) -> list[bytes]:
-        """Return what has arrived at the other end by now."""
+        """Return the datagrams that have arrived at the other end by now."""
         self._advance(now_ns)
         arrived: list[bytes] = []
         while self._air and self._air[0][0] <= now_ns:

@@ -42,7 +42,7 @@ class LinkBudget:
         return self.eirp_dbm + self.receive_gain_dbi - path_loss_db - noise_dbm
 
     def rate_bps(self, path_loss_db: float) -> float:
-        """Return what the link carries."""
+        """Return the rate that the link carries, bits per second."""
         snr_db = self.snr_db(path_loss_db)
         if snr_db < self.least_snr_db:
             return 0.0

@@ -71,7 +71,7 @@ class MissionLoop(Generic[Item]):
         return self._now_ns
 
     def post(self, item: Item) -> None:
-        """Have an item handled by the loop's thread; may be called from any."""
+        """Queue an item for the loop's thread; may be called from any."""
         with self._lock:
             self._items.append(item)
         os.eventfd_write(self._wake, 1)

@@ -28,7 +28,7 @@ STATE_PERIOD_NS = NS // 2
 
 
 def make_place(settings: RadioSettings) -> Place:
-    """Return what says how good the radio is where; raises ConfigError."""
+    """Return a function from a place to the quality of the radio; raises ConfigError."""
     world = load_world(Path(settings.world)) if settings.world else None
     if settings.law == "zones":
         return by_zones(() if world is None else world.radio_zones)
@@ -76,7 +76,7 @@ class RadioLinkNode:
         )
 
     def run(self) -> None:
-        """Work until ROS shuts down."""
+        """Run until ROS shuts down."""
         self._loop.run()
 
     def _on_pose(self, message: PoseStamped) -> None:

@@ -31,7 +31,7 @@ Place = Callable[[Point | None], Situation]
 
 
 def by_zones(zones: Iterable[RadioZone]) -> Place:
-    """Return what asks the zones of a world; outside of all the radio is good."""
+    """Return a function from a place to the quality of the radio, by the zones of a world; outside of all the radio is good."""
     known = tuple(zones)
 
     def look(point: Point | None) -> Situation:
@@ -56,7 +56,7 @@ class Radio:
         self.control_lost = False
 
     def look(self, point: Point | None, since_lift_off_s: float | None) -> None:
-        """Take the vehicle's place and the time into account."""
+        """Update the quality by the vehicle's place and the time."""
         situation = self._place(point)
         active = [fault for fault in self._faults if fault.lasts(since_lift_off_s)]
         self.control_lost = any(fault.what == "control" for fault in active)

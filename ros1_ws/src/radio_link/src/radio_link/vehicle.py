@@ -1,4 +1,4 @@
-"""Where the vehicle is and when it lifted off: as the simulator says where there is one, else as the guidance has it. Pure."""
+"""Where the vehicle is and when it lifted off: by the simulator where there is one, else by the guidance. Pure."""
 
 from __future__ import annotations
 
@@ -9,7 +9,7 @@ ON_GROUND = 1
 
 
 class RadioCarrier:
-    """What the radio knows of the vehicle; ``point`` is in the frame map (ENU, metres), ``lift_off_s`` on the mission clock."""
+    """The vehicle for the radio; ``point`` is in the frame map (ENU, metres), ``lift_off_s`` on the mission clock."""
 
     def __init__(self) -> None:
         self.point: Point | None = None
@@ -18,17 +18,17 @@ class RadioCarrier:
         self._on_ground = False
 
     def simulated_at(self, point: Point) -> None:
-        """Take the true place: from now on the guidance is not believed."""
+        """Set the true place: from now on the guidance's is ignored."""
         self._simulated = True
         self.point = point
 
     def simulated_lift_off(self, lift_off_s: float | None) -> None:
-        """Take the true time of lift-off; None: not yet."""
+        """Set the true time of lift-off; None: not yet."""
         self._simulated = True
         self.lift_off_s = lift_off_s
 
     def guided(self, point: Point, landed_state: int, now_s: float) -> None:
-        """Take what the guidance believes: on a real vehicle there is no better source."""
+        """Set the guidance's estimate: on a real vehicle there is no better source."""
         if self._simulated:
             return
         self.point = point

@@ -17,12 +17,12 @@ LONGEST_WAIT_S = 0.02
 
 
 class CameraError(RuntimeError):
-    """The source can't be opened, or gives no pictures any more; the message names it and the remedy."""
+    """The source can't be opened, or gives no more pictures; the message names it and the remedy."""
 
 
 @dataclass(frozen=True, kw_only=True)
 class CameraSource:
-    """What pictures come from. ``name``: ``/dev/video0``, a file, or an address as ``rtsp://...``; size and rate are asked of a device."""
+    """A source of pictures. ``name``: ``/dev/video0``, a file, or an address as ``rtsp://...``; a device is asked for size and rate."""
 
     name: str
     width: int = 640
@@ -97,7 +97,7 @@ def _reason(error: Exception) -> str:
 
 
 class CameraThread:
-    """Reads a source in a thread of its own and gives each picture away; a source that ends tells why, once."""
+    """Reads a source in a thread of its own and passes each picture on; a source that ends reports the reason, once."""
 
     def __init__(
         self, source: CameraSource, give: Callable[[Rgb], None], *, now_s: Callable[[], float], ended: Callable[[str], None]
@@ -113,7 +113,7 @@ class CameraThread:
         self._thread.start()
 
     def close(self) -> None:
-        """Read no more, and let the device go."""
+        """Stop reading, and release the device."""
         self._over.set()
         self._thread.join(READ_TIMEOUT_S)
         if not self._thread.is_alive():

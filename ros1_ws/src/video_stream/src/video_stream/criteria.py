@@ -1,4 +1,4 @@
-"""By how much the telepilot's picture misses what was asked for, and for how long that is forgiven. Pure.
+"""By how much the telepilot's picture misses the criteria, and for how long that is tolerated. Pure.
 
 The skill ``stream`` has invariants over the two margins: at least 0 means held. A margin is the best one of the last seconds that
 are forgiven, and never below 0 while adaptation has something left to give: then it is not yet known that the criterion can't be met.
@@ -24,7 +24,7 @@ class Criteria:
     patience_s: float = MODEL_S
 
     def problem(self) -> str:
-        """Return what is wrong with them, or nothing."""
+        """Return what is wrong with the criteria; empty where nothing is."""
         if not 0.0 < self.min_fps <= 60.0:
             return f"the least frame rate is {self.min_fps:g}; it must be above 0 and at most 60 frames per second"
         if not 0.0 <= self.min_quality < 1.0:
@@ -36,7 +36,7 @@ class Criteria:
 
 @dataclass(frozen=True)
 class Margins:
-    """What is seen less what was asked for; not negative: held, or not known to be beyond reach."""
+    """The measured values less the required ones; not negative: held, or not known to be beyond reach."""
 
     fps: float
     quality: float
@@ -52,7 +52,7 @@ class Watch:
         self._values.append((now_ns, Margins(0.0, 0.0)))
 
     def look(self, *, fps: float, quality: float, exhausted: bool, now_ns: int) -> Margins:
-        """Take what the ground station sees; return the margins."""
+        """Update with the ground station's values; return the margins."""
         forgiven_ns = int((self.criteria.patience_s - MODEL_S) * NS)
         present = Margins(fps - self.criteria.min_fps, quality - self.criteria.min_quality)
         self._values.append((now_ns, present if exhausted else Margins(max(present.fps, 0.0), max(present.quality, 0.0))))

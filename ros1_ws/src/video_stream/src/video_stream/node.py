@@ -1,4 +1,4 @@
-"""The node /video_stream: camera in, RTP out, reports in; tells the skills how the telepilot sees."""
+"""The node /video_stream: camera in, RTP out, reports in; publishes how the telepilot sees, for the skills."""
 
 from __future__ import annotations
 
@@ -86,7 +86,7 @@ class VideoStreamNode:
             )
 
     def run(self) -> None:
-        """Work until ROS shuts down, or the camera gives no more pictures (then CameraError); the film is whole then."""
+        """Run until ROS shuts down, or the camera gives no more pictures (then CameraError); the film is complete then."""
         if self._camera is not None:
             self._camera.start()
         self._loop.run()

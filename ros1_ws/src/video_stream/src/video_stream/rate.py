@@ -34,7 +34,7 @@ class RateSettings:
 
 
 class RateController:
-    """Knows the bit rate to encode at. Call ``on_report`` for each report and ``on_time`` at each frame."""
+    """Controls the bit rate to encode at. Call ``on_report`` for each report and ``on_time`` at each frame."""
 
     def __init__(self, settings: RateSettings | None = None) -> None:
         self._settings = settings or RateSettings()
@@ -46,7 +46,7 @@ class RateController:
         """There is nothing more to give: the target fell to the least and has not got away from it."""
 
     def on_report(self, report: VideoReport, now_ns: int) -> None:
-        """Take a report into account."""
+        """Update the rate by a report."""
         limits = self._settings
         self._heard_ns = now_ns
         congested = report.queue_s > limits.queue_limit_s or report.loss > limits.loss_limit
@@ -62,7 +62,7 @@ class RateController:
             self._set(self.target_bps * (limits.careful_increase if near or untried else limits.increase))
 
     def on_time(self, now_ns: int) -> None:
-        """Back off while nothing is heard of the receiver; before its first word, keep on."""
+        """Back off while no report comes from the receiver; before the first one, keep the rate."""
         limits = self._settings
         if self._heard_ns is None or now_ns - self._heard_ns < limits.silence_s * NS:
             return

@@ -89,7 +89,7 @@ class VideoSender:
         return self._send(encoded.payloads, stamp_ns, now_ns, key=encoded.key, size_bytes=encoded.size_bytes)
 
     def feedback(self, data: bytes, now_ns: int) -> list[bytes]:
-        """Take a report; return the packets to be sent again. Raises WireError for what is no report."""
+        """Handle a report; return the packets to send again. Raises WireError for what is no report."""
         report = VideoReport.parse(data, self._seal)
         if self.report is not None and report.number <= self.report.number and report.stamp_ns <= self.report.stamp_ns:
             return []  # a replay, or overtaken

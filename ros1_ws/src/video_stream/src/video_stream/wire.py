@@ -88,7 +88,7 @@ class VideoPacket:
     held_ms: int = 0
 
     def sent(self, now_ns: int) -> VideoPacket:
-        """Return it as it is sent at a moment of mission clock."""
+        """Return the packet as sent at a moment of mission clock."""
         return replace(self, held_ms=min(max(0, (now_ns - self.mark.stamp_ns) // (NS // 1000)), _MOST_HELD_MS))
 
     @property
