@@ -12,7 +12,7 @@ START_AGAIN_S = 5.0  # after GUIDED was refused at the start
 
 
 class AuthorityChange(Enum):
-    """What happened to the authority at an update."""
+    """How the authority changed at an update."""
 
     NONE = auto()
     GAINED = auto()
@@ -33,26 +33,26 @@ class Authority:
     _flown: bool = False
 
     def ask_land(self) -> None:
-        """Note that the companion itself asks for LAND, before it does; a LAND that was heard before is of another landing."""
+        """Record that the companion requests LAND, before it does; a LAND received before belongs to another landing."""
         self._land_asked, self._land_seen = True, False
 
     @property
     def landing_unseen(self) -> bool:
-        """Whether LAND was asked for, and no heartbeat has told it yet: the mode that was heard last may be past."""
+        """Whether LAND was requested, and no heartbeat has shown it yet: the mode received last may be past."""
         return self._land_asked and not self._land_seen
 
     def withdraw_land(self) -> None:
-        """Note that the autopilot did not agree to land, or was told otherwise since: a later LAND is the pilot's or a failsafe's."""
+        """Record that the autopilot refused to land, or got another command since: a later LAND is the pilot's or a failsafe's."""
         if self.landing_unseen:
             self._land_asked = False
 
     def hear_heartbeat(self, vehicle: VehicleSnapshot) -> None:
-        """Note that the vehicle's mode was told just now."""
+        """Record that the vehicle's mode was received just now."""
         self.mode_told = True
         self._land_seen |= self._land_asked and vehicle.mode == Mode.LAND
 
     def update(self, vehicle: VehicleSnapshot, *, link: bool) -> AuthorityChange:
-        """Judge by the mode of the last heartbeat; ``link``: it holds. One that is back tells nothing before the next heartbeat."""
+        """Judge by the mode of the last heartbeat; ``link``: it is up. After an interruption it counts from the next heartbeat on."""
         self.mode_told &= link
         self._flown |= vehicle.off_ground
         if vehicle.mode not in {Mode.GUIDED, Mode.LAND} or (self._land_seen and vehicle.mode != Mode.LAND):
@@ -73,13 +73,13 @@ class Authority:
         return not self._start_settled and vehicle.ready and vehicle.on_ground
 
     def start_over(self) -> None:
-        """Note that the autopilot has restarted: GUIDED may be taken again, unless the vehicle has flown."""
+        """Record that the autopilot has restarted: GUIDED may be taken again, unless the vehicle has flown."""
         self._start_settled = self._flown
 
     def settle_start(self) -> None:
-        """Note that GUIDED was taken."""
+        """Record that GUIDED was taken."""
         self._start_settled = True
 
     def start_refused(self, now_s: float) -> None:
-        """Note that the autopilot refused GUIDED: it is asked again a little later."""
+        """Record that the autopilot refused GUIDED: it is requested again a little later."""
         self._start_refused_s = now_s

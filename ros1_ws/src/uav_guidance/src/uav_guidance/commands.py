@@ -59,26 +59,26 @@ class Command:
 
 
 def set_mode(mode: Mode) -> Command:
-    """Ask for a flight mode."""
+    """Return the command to change the flight mode."""
     evidence = Evidence("HEARTBEAT", lambda vehicle: vehicle.mode == mode)
     return Command(f"mode {mode.name}", DO_SET_MODE, (1.0, float(mode), 0.0, 0.0, 0.0, 0.0, 0.0), evidence=evidence)
 
 
 def arm(failing_check: str = "") -> Command:
-    """Return the command to arm; a HEARTBEAT that says armed is evidence of it. ``failing_check``: what was told last."""
+    """Return the command to arm; a HEARTBEAT with the armed flag is evidence of it. ``failing_check``: the last text of a failed check."""
     evidence = Evidence("HEARTBEAT", lambda vehicle: vehicle.armed)
     return Command("arm", ARM_DISARM, (1.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0), evidence=evidence, known_obstacle=failing_check)
 
 
 def disarm(*, force: bool = False) -> Command:
-    """Ask to disarm; what the autopilot takes for flying is only disarmed by ``force``."""
+    """Return the command to disarm; what the autopilot takes for flying is only disarmed by ``force``."""
     parameters = (0.0, FORCE_MAGIC if force else 0.0, 0.0, 0.0, 0.0, 0.0, 0.0)
     evidence = Evidence("HEARTBEAT", lambda vehicle: not vehicle.armed)
     return Command("disarm by force" if force else "disarm", ARM_DISARM, parameters, evidence=evidence)
 
 
 def take_off(height_above_home_m: float) -> Command:
-    """Ask to climb to a height above home."""
+    """Return the command to climb to a height above home, metres."""
     evidence = Evidence("EXTENDED_SYS_STATE", lambda vehicle: vehicle.off_ground, within_s=LIFT_OFF_S)
     return Command("take-off", NAV_TAKEOFF, (0.0, 0.0, 0.0, 0.0, 0.0, 0.0, height_above_home_m), evidence=evidence)
 
@@ -106,7 +106,7 @@ class Procedure:
         self._texts: list[str] = []
 
     def due(self, now_s: float) -> Command | None:
-        """Return the command to send now, if any; to be asked at every step."""
+        """Return the command to send now, if any; call it at every step."""
         if self.outcome is not None or self._refused(now_s) or (self._attempts and now_s < self._answer_until_s):
             return None
         command = self._commands[0]
@@ -118,7 +118,7 @@ class Procedure:
         return replace(command, confirmation=self._attempts - 1)
 
     def on_answer(self, number: int, result: int, now_s: float) -> None:
-        """Take a COMMAND_ACK; one of a command that is not under way is not meant."""
+        """Handle a COMMAND_ACK; ignore one of a command that is not under way."""
         if self.outcome is not None or self._refusal is not None or not self._attempts or number != self._commands[0].number:
             return
         if result == IN_PROGRESS:
@@ -129,7 +129,7 @@ class Procedure:
             self._refusal = (now_s, self._boot_ms, RESULT_NAMES.get(result, f"result {result}"))
 
     def on_vehicle(self, kind: str, vehicle: VehicleSnapshot) -> None:
-        """Take what a MAVLink message of this kind has just told of the vehicle: a command that is obeyed needs no answer."""
+        """Handle the vehicle's state after a MAVLink message of this kind: a command that is obeyed needs no answer."""
         self._boot_ms = vehicle.boot_ms
         if self.outcome is not None or not self._attempts:
             return
@@ -138,12 +138,12 @@ class Procedure:
             self._go_on()
 
     def on_text(self, severity: int, text: str) -> None:
-        """Take a STATUSTEXT: what comes while a command is under way may be the reason for its refusal."""
+        """Handle a STATUSTEXT: what comes while a command is under way may be the reason for its refusal."""
         if self.outcome is None and self._attempts and severity <= WORST_SEVERITY_TOLD and text not in self._texts:
             self._texts.append(text)
 
     def abort(self, reason: str) -> None:
-        """End it as not accepted, if it has not ended."""
+        """End the procedure as not accepted, if it has not ended."""
         if self.outcome is None:
             self.outcome = Outcome(accepted=False, reason=reason, answered=False)
 

@@ -46,13 +46,13 @@ def setpoint_message(setpoint: Setpoint) -> Any:
 
 
 def interval_message(message_id: int, rate_hz: float) -> Any:
-    """Ask for a message at a rate."""
+    """Return the request for a message at a rate."""
     parameters = (float(message_id), 1e6 / rate_hz, 0.0, 0.0, 0.0, 0.0, 0.0)
     return command_message(Command("message interval", mavlink.MAV_CMD_SET_MESSAGE_INTERVAL, parameters))
 
 
 def from_autopilot_to_us(message: Any) -> bool:
-    """Tell the autopilot's own messages from those that it forwards, and the answers to us from other clients'."""
+    """Return whether a message is the autopilot's own and for us, neither forwarded nor an answer to another client."""
     if (message.get_srcSystem(), message.get_srcComponent()) != (AUTOPILOT_SYSTEM, AUTOPILOT_COMPONENT):
         return False
     if message.get_type() != "COMMAND_ACK":

@@ -46,7 +46,7 @@ class Course:
 
 
 class Follower:
-    """Know what is followed, and where the vehicle should be now. The vehicle's snapshot is passed to each call."""
+    """Keeps the reference and computes the setpoint of now. The vehicle's snapshot is passed to each call."""
 
     def __init__(self, settings: GuidanceSettings) -> None:
         self.reference: Reference | None = None
@@ -61,7 +61,7 @@ class Follower:
         self._last_setpoint_s = -math.inf
 
     def tune(self, settings: GuidanceSettings) -> None:
-        """Go on with other settings; the reference under way keeps those that it was given with."""
+        """Set other settings; the reference under way keeps those that it began with."""
         self.obstacles.settings = settings
         self._still.tune(reached_m=settings.reached_m, reached_rad=settings.reached_rad)
 

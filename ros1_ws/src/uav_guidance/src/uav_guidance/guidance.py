@@ -1,4 +1,4 @@
-"""The guidance's state machine: requests, what the vehicle says and the time go in; commands and setpoints come out.
+"""The guidance's state machine: requests, the vehicle's messages and the time go in; commands and setpoints come out.
 
 Everything is in `map` (ENU, metres); only what the autopilot says and is told is in its own frame, `odom`, and is converted where it comes
 in and goes out. Times are seconds of the mission clock. Nothing here blocks, nothing here knows of ROS or sockets.
@@ -53,7 +53,7 @@ PREARM_PREFIX = "PreArm: "
 
 @dataclass(frozen=True)
 class GuidanceStatus:
-    """What the guidance knows and does."""
+    """The guidance's state for its messages."""
 
     vehicle: VehicleSnapshot
     link: bool
@@ -103,14 +103,14 @@ class Guidance:
         }
 
     def tune(self, settings: GuidanceSettings) -> None:
-        """Go on with other settings; the reference under way keeps those that it was given with."""
+        """Set other settings; the reference under way keeps those that it began with."""
         self._settings = settings
         self._localization.tune(settings)
         self._follower.tune(settings)
 
     @property
     def vehicle(self) -> VehicleSnapshot:
-        """What is known of the vehicle, in `map`; it is made when it is asked for, which is less often than something is heard of it."""
+        """The vehicle's snapshot, in `map`; it is computed on access, which is rarer than messages."""
         if self._in_map is None:
             self._in_map = in_map(self.odometry, self.correction, self._home_map_m)
         return self._in_map
@@ -123,7 +123,7 @@ class Guidance:
     # ---- what comes in -------------------------------------------------------------------------------------------------
 
     def on_message(self, message: Any, now_s: float) -> None:
-        """Take a MAVLink message of the autopilot."""
+        """Handle a MAVLink message of the autopilot."""
         kind = message.get_type()
         self._heard_s = now_s
         if kind == "COMMAND_ACK":
@@ -149,7 +149,7 @@ class Guidance:
             self._procedure.on_vehicle(kind, self.vehicle)
 
     def on_text(self, severity: int, text: str, now_s: float) -> None:
-        """Take a whole STATUSTEXT of the autopilot."""
+        """Handle a whole STATUSTEXT of the autopilot."""
         self._takeover.hear_text(severity, text, now_s)
         if text.startswith(PREARM_PREFIX):
             self._prearm_text = text.removeprefix(PREARM_PREFIX)
@@ -157,15 +157,15 @@ class Guidance:
             self._procedure.on_text(severity, text)
 
     def on_mapping(self, *, running: bool, problem: str, scans: int, now_s: float) -> None:
-        """Take the mapping's state; ``scans`` it has taken since it was started."""
+        """Handle the mapping's state; ``scans`` is how many it has taken since it was started."""
         self._localization.hear_state(running=running, problem=problem, scans=scans, now_s=now_s)
 
     def on_transform(self, newest: Transform) -> None:
-        """Take the newest T_map_odom of the mapping."""
+        """Handle the newest T_map_odom of the mapping."""
         self._localization.hear_transform(newest)
 
     def on_obstacle(self, sighting: Sighting, now_s: float) -> None:
-        """Take a sensor's verdict on the corridor ahead."""
+        """Handle a sensor's verdict on the corridor ahead."""
         self._follower.obstacles.see(sighting, now_s)
 
     def ask(self, request: Request, now_s: float) -> GuidanceDecision:
@@ -186,7 +186,7 @@ class Guidance:
     # ---- what goes out -------------------------------------------------------------------------------------------------
 
     def step(self, now_s: float) -> list[Command | Setpoint]:
-        """Go on to this time; return what has to be sent now, in `odom`. To be called at 20 Hz, and whenever something has come in."""
+        """Advance to this time; return what to send now, in `odom`. Call it at 20 Hz, and whenever an input has arrived."""
         self._localize(now_s)
         self._check_authority(now_s)
         lost = self._positioning.step(self.odometry, now_s, lost_s=self._settings.position_lost_s)
@@ -227,13 +227,13 @@ class Guidance:
         return states
 
     def reasons(self, now_s: float) -> dict[str, str]:
-        """Return why resources are as they are, where that is no matter of course; words that stay while nothing else changes."""
+        """Return the reasons of the resources' states where they are not obvious, as texts that stay while nothing else changes."""
         available = self._authority.held and self._readiness.usable
         reasons = {"position_status": self._positioning.reason} if self._positioning.reason else {}
         return reasons if available else {**reasons, "SDK_authority": self._lost_reason(now_s)}
 
     def report(self, now_s: float) -> GuidanceStatus:
-        """Return what the guidance knows and does."""
+        """Return the guidance's state."""
         return GuidanceStatus(
             vehicle=self.vehicle,
             link=self.link(now_s) and self._authority.mode_told,
@@ -499,7 +499,7 @@ class Guidance:
         self._notes.append(words)
 
     def take_notes(self) -> list[str]:
-        """Return what the guidance has done or seen since the last call that a person should know, in words."""
+        """Return the events since the last call that concern a person, in words."""
         notes, self._notes = self._notes, []
         return notes
 

@@ -85,11 +85,11 @@ class Localization:
         """The map's height above the autopilot's, as told last, what of it has been followed for good, and what it was when that began."""
 
     def tune(self, settings: GuidanceSettings) -> None:
-        """Go on with other settings."""
+        """Set other settings."""
         self._settings = settings
 
     def hear_state(self, *, running: bool, problem: str, scans: int, now_s: float) -> None:
-        """Take the mapping's state, told with each sweep; ``problem`` says why its pose is not to be trusted.
+        """Handle the mapping's state, which comes with each sweep; ``problem``: why its pose is unreliable.
 
         The last transform counts from the first state after it that is sound. A mapping that begins is given time to settle, and so is one
         that was started again (it counts its scans from zero): it has to find itself in its saved map.
@@ -105,7 +105,7 @@ class Localization:
         self._unconfirmed = None
 
     def hear_transform(self, newest: Transform) -> None:
-        """Take T_map_odom of the mapping; one that is known when the guidance has just started counts at once, unless the map is lost."""
+        """Handle the mapping's T_map_odom; the one present when the guidance has just started counts at once, unless the map is lost."""
         if not newest.valid:
             return
         if self._newest is None:

@@ -31,7 +31,7 @@ def vec3(point: Point) -> Vec3:
 
 
 def sighting(message: Obstacle, correction: Correction) -> Sighting:
-    """Return what a sensor says about the corridor ahead, in `map`: sensors are straightened along the autopilot's motion, in `odom`."""
+    """Return a sensor's verdict on the corridor ahead, in `map`: sensors are straightened along the autopilot's motion, in `odom`."""
     nearest = vec3(message.nearest_enu_m)
     return Sighting(
         source=message.source,
@@ -107,7 +107,7 @@ def pose_message(vehicle: VehicleSnapshot, stamp: rospy.Time) -> PoseStamped | N
 
 
 def transform_message(pose: PoseStamped) -> TFMessage:
-    """Return the pose as a transform from odom to base_link: how odom lies in the map is for the SLAM to say."""
+    """Return the pose as a transform from odom to base_link; that from map to odom is the SLAM's."""
     transform = TransformStamped(header=Header(stamp=pose.header.stamp, frame_id=ODOMETRY), child_frame_id=BODY)
     place = pose.pose.position
     transform.transform.translation = Vector3(place.x, place.y, place.z)

@@ -21,7 +21,7 @@ BELIEVE_PLACE_M = 1.0  # the nearest point must fit the distance to be believed
 
 @dataclass(frozen=True)
 class Sighting:
-    """What one sensor says about the corridor ahead; the distance is along it, from the vehicle's centre."""
+    """One sensor's verdict on the corridor ahead; the distance is along it, from the vehicle's centre, metres."""
 
     source: str
     stamp_s: float
@@ -56,7 +56,7 @@ class ObstacleWatch:
         self._last_in_way_s: float | None = None
 
     def see(self, sighting: Sighting, now_s: float) -> None:
-        """Take a sensor's verdict; one that is no newer than the last one, or of the future, is none.
+        """Handle a sensor's verdict; ignore one that is no newer than the last one, or of the future.
 
         Something that is seen at no distance may be anywhere: the way can't be judged by that.
         """

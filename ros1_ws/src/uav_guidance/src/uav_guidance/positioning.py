@@ -1,4 +1,4 @@
-"""Whether the autopilot knows where it is: its estimator's flags, and the satellites' fix that its position rests on.
+"""Whether the autopilot has its position: its estimator's flags, and the satellites' fix that its position rests on.
 
 Without a fix ArduCopter's estimator reckons on and tells its position as before, until its failsafe lands the vehicle after 8 s.
 """
@@ -26,7 +26,7 @@ class Positioning:
         self._stepped_s: float | None = None
 
     def step(self, vehicle: VehicleSnapshot, now_s: float, *, lost_s: float) -> bool:
-        """Judge by what is known now; return whether the position has been lost just now. ``lost_s``: without a fix, until it is lost."""
+        """Judge the present state; return whether the position has been lost just now, as after ``lost_s`` seconds without a fix."""
         passed_s = 0.0 if self._stepped_s is None else max(now_s - self._stepped_s, 0.0)
         self._stepped_s = now_s
         if vehicle.fix_s != self._fix_s:

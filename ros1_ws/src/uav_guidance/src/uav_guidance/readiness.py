@@ -25,20 +25,20 @@ class Readiness:
         return self._been_ready and not self.restarted
 
     def authority_changed(self, now_s: float) -> None:
-        """Note that the authority was gained or lost: what the checks said before is no promise, for GUIDED alone needs a position."""
+        """Record that the authority was gained or lost: earlier checks are no promise, for GUIDED alone needs a position."""
         self._changed_s, self._checks_passed = now_s, False
 
     def hear_checks(self, vehicle: VehicleSnapshot, now_s: float, *, held: bool) -> None:
-        """Take what SYS_STATUS has just told; ``held``: the companion has the authority."""
+        """Handle a new SYS_STATUS; ``held``: the companion has the authority."""
         self._checks_passed = vehicle.ready and held and abs(now_s - self._changed_s) >= CHECKS_S
 
     def update(self, vehicle: VehicleSnapshot, *, held: bool) -> None:
-        """Judge by what is known now; ``held``: the companion has the authority."""
+        """Judge the present state; ``held``: the companion has the authority."""
         able = vehicle.located and (self._checks_passed or vehicle.armed or vehicle.off_ground)
         self._been_ready = held and (self._been_ready or able)
         self.restarted &= not (vehicle.on_ground and not vehicle.armed)
 
     def start_over(self) -> None:
-        """Note that the autopilot has restarted."""
+        """Record that the autopilot has restarted."""
         self.restarted = True
         self._been_ready = self._checks_passed = False

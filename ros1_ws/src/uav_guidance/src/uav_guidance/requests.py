@@ -1,4 +1,4 @@
-"""What the guidance can be asked for, and the checks that refuse a request before anything is changed."""
+"""The requests to the guidance, and the checks that refuse a request before anything is changed."""
 
 from __future__ import annotations
 
@@ -12,7 +12,7 @@ from uav_guidance.vehicle import Landed, VehicleSnapshot
 
 
 class Refusal(Exception):  # noqa: N818  # it is an answer, not an error
-    """A request is refused; the text says why, with the value and the limit."""
+    """A request is refused; the text has the reason, with the value and the limit."""
 
 
 @dataclass(frozen=True)
@@ -59,7 +59,7 @@ class LandRequest:
 
 @dataclass(frozen=True)
 class AuthorityRequest:
-    """An operator wants the companion to have the vehicle (again)."""
+    """An operator requests the companion's authority over the vehicle (again)."""
 
 
 Request = TakeoffRequest | PositionRequest | HeadingRequest | HoverRequest | StopRequest | LandRequest | AuthorityRequest
@@ -118,7 +118,7 @@ def check_flying(vehicle: VehicleSnapshot) -> None:
 
 
 def check_takeoff(vehicle: VehicleSnapshot, prearm_text: str) -> None:
-    """Refuse unless the vehicle stands on the ground, knows where it is, and its own checks are passed."""
+    """Refuse unless the vehicle stands on the ground, has a position, and passes its own checks."""
     require(vehicle.on_ground, "not on the ground")
     require(vehicle.located, "the autopilot does not say where it is")
     require(vehicle.ready or vehicle.armed, "the autopilot is not ready" + (f": {prearm_text}" if prearm_text else ""))

@@ -26,7 +26,7 @@ class FineClock:
         self._usual_wall_ns = 0.0
 
     def tick(self, clock_ns: int, wall_ns: int) -> None:
-        """Take a step of the clock, and the time of a monotonic one at its arrival."""
+        """Record a step of the clock, and the time of a monotonic one at its arrival."""
         if self._tick_ns is None or clock_ns <= self._tick_ns:
             self._step_ns, self._usual_wall_ns = 0, 0.0
         else:
@@ -44,7 +44,7 @@ class FineClock:
 
 
 class Alarm:
-    """Wakes a thread at a moment of a clock whose ticks another thread tells; ``rospy.sleep`` wakes its caller at each of them."""
+    """Wakes a thread at a moment of a clock that another thread ticks; ``rospy.sleep`` wakes its caller at each tick."""
 
     def __init__(self) -> None:
         self._ticked = Condition()
@@ -52,7 +52,7 @@ class Alarm:
         self._set_back = False
 
     def tick(self, now_ns: int) -> None:
-        """Take a tick."""
+        """Set the time."""
         with self._ticked:
             self._set_back |= now_ns < self._now_ns
             self._now_ns = now_ns
@@ -60,7 +60,7 @@ class Alarm:
                 self._ticked.notify()
 
     def wait(self, due_ns: int, timeout_s: float) -> bool:
-        """Wait for a moment, or until the clock is set back, at most ``timeout_s`` of wall clock; tell whether the wait is over."""
+        """Wait for a moment, or until the clock is set back, at most ``timeout_s`` of wall clock; return whether the wait is over."""
         with self._ticked:
             self._due_ns = due_ns
             over = self._ticked.wait_for(lambda: self._over, timeout_s)
@@ -79,7 +79,7 @@ class Steps:
         self.due_ns = begin_ns
 
     def made(self, now_ns: int) -> bool:
-        """Take that a step was made, and what time it is after it; tell whether no step is due by now, so that all is done up to now.
+        """Record a step, and the time after it; return whether no step is due by now, so that all is done up to now.
 
         Steps that were missed meanwhile are left out. Then the next may be due later than a clock comes that is held until what was due
         is done: not the time of the step is to be told for that, but the time after it.

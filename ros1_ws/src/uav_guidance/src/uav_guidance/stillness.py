@@ -1,4 +1,4 @@
-"""For how long the vehicle has not come nearer to what it shall reach."""
+"""For how long the vehicle has not come nearer to its target."""
 
 from __future__ import annotations
 
@@ -17,7 +17,7 @@ class StillWatch:
         self.restart(0.0)
 
     def tune(self, *, reached_m: float, reached_rad: float) -> None:
-        """Go on with other limits."""
+        """Set other limits."""
         self._reached_m, self._reached_rad = reached_m, reached_rad
 
     def restart(self, now_s: float) -> None:

@@ -1,4 +1,4 @@
-"""Which messages the autopilot shall send: nothing but heartbeats and texts comes unasked."""
+"""Which messages the autopilot has to send: only heartbeats and texts come without a request."""
 
 from __future__ import annotations
 
@@ -18,7 +18,7 @@ TIMEOUT_S = 2.5
 
 
 class StreamKeeper:
-    """Know which streams have to be asked for: all on a new link, later those that stay away (the autopilot may have restarted)."""
+    """Keeps the requests for streams: all on a new link, later those that stay away (the autopilot may have restarted)."""
 
     def __init__(self) -> None:
         self._heard_s: dict[int, float] = {}
@@ -28,12 +28,12 @@ class StreamKeeper:
         self._heard_s.clear()
 
     def hear(self, message_id: int, now_s: float) -> None:
-        """Note that a message came, at this time of the mission clock."""
+        """Record that a message came, at this time of the mission clock."""
         if message_id in STREAMS_HZ:
             self._heard_s[message_id] = now_s
 
     def due(self, now_s: float) -> list[int]:
-        """Return the messages to ask for now; they are not due again before 2.5 s are over."""
+        """Return the messages to request now; they are not due again before 2.5 s are over."""
         missing = [number for number in STREAMS_HZ if number not in self._heard_s or abs(now_s - self._heard_s[number]) >= TIMEOUT_S]
         self._heard_s.update(dict.fromkeys(missing, now_s))
         return missing

@@ -14,23 +14,23 @@ CHECKS = ("PreArm: ", "Arm: ")  # why it can't be armed: no reason for a mode
 
 
 class Takeover:
-    """What the autopilot has said around its last change of mode. Times are seconds of the mission clock."""
+    """The autopilot's texts around its last change of mode. Times are seconds of the mission clock."""
 
     def __init__(self) -> None:
         self._changed_s = -math.inf
         self._texts: deque[tuple[float, str]] = deque(maxlen=MOST_TEXTS)
 
     def hear_text(self, severity: int, text: str, now_s: float) -> None:
-        """Take a whole text; infos, and what hinders arming, explain no mode."""
+        """Record a whole text; infos, and what hinders arming, explain no mode."""
         if severity <= LEAST_SEVERITY and not text.startswith(CHECKS):
             self._texts.append((now_s, text))
 
     def mode_changed(self, now_s: float) -> None:
-        """Note that a heartbeat has told another mode."""
+        """Record that a heartbeat has shown another mode."""
         self._changed_s = now_s
 
     def reason(self, vehicle: VehicleSnapshot) -> str:
-        """Return who has the vehicle, in the autopilot's words where it said some."""
+        """Return who has the vehicle, in the autopilot's words where there are some."""
         texts = list(dict.fromkeys(text for heard_s, text in self._texts if -BEFORE_S <= heard_s - self._changed_s <= AFTER_S))
         mode = mode_name(vehicle.mode)
         if vehicle.off_ground and not vehicle.armed:

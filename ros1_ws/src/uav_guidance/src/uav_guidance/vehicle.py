@@ -86,7 +86,7 @@ class Landed(IntEnum):
 
 
 def mode_name(mode: int | None) -> str:
-    """Return a mode's name, or its number if it has none here; empty if nothing was heard."""
+    """Return a mode's name, or its number if it has none here; empty before the first heartbeat."""
     if mode is None:
         return ""
     return Mode(mode).name if mode in Mode._value2member_map_ else str(mode)
@@ -142,13 +142,13 @@ class VehicleSnapshot:
 
     @property
     def located(self) -> bool:
-        """Whether position and attitude are known: an estimator that has lost its position tells none, though heartbeats go on."""
+        """Whether position and attitude are known: an estimator that has lost its position sends none, though heartbeats go on."""
         newest_s = max(self.heartbeat_s or 0.0, self.place_s, self.attitude_s)
         return self.position_enu_m is not None and self.quat_xyzw is not None and newest_s - min(self.place_s, self.attitude_s) < LATE_S
 
     @property
     def on_ground(self) -> bool:
-        """Whether the autopilot says that it stands."""
+        """Whether the autopilot reports that it stands."""
         return self.landed is Landed.ON_GROUND
 
     @property
@@ -275,9 +275,9 @@ _NUMBERS = {
 
 
 def updated(vehicle: VehicleSnapshot, message: Any, now_s: float) -> VehicleSnapshot:
-    """Return the snapshot after a MAVLink message of the autopilot; the same one if the message says nothing about it.
+    """Return the snapshot after a MAVLink message of the autopilot; the same one if the message does not concern it.
 
-    A message with a number that is none says nothing: an estimator that has diverged must not become a setpoint.
+    A message with a number that is none is ignored: an estimator that has diverged must not become a setpoint.
     """
     change = _CHANGES.get(message.get_type())
     numbers = (getattr(message, name) for name in _NUMBERS.get(message.get_type(), ()))

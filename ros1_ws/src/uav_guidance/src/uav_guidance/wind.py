@@ -1,4 +1,4 @@
-"""How strongly the wind blows, by how far the vehicle leans to hold its way: what a person should know before it is blown off it."""
+"""How strongly the wind blows, by how far the vehicle leans to hold its way: a warning before it is blown off it."""
 
 from __future__ import annotations
 
@@ -20,7 +20,7 @@ class WindWatch:
         self._strong = False
 
     def step(self, vehicle: VehicleSnapshot, now_s: float) -> str:
-        """Take the present attitude; return what to tell of a wind that has become strong, empty if there is nothing new."""
+        """Update with the present attitude; return a warning of a wind that has become strong, empty if there is none."""
         passed_s = 0.0 if self._stepped_s is None else max(now_s - self._stepped_s, 0.0)
         self._stepped_s = now_s
         if vehicle.quat_xyzw is None or not vehicle.off_ground:
