@@ -67,7 +67,7 @@ def read_connection(text: str, said: str = "") -> Connection:
 
 
 def check_connection(text: str, said: str = "") -> Connection:
-    """Read a connection and check what can be known of it before it is used, without calling anybody; raises RequestError."""
+    """Read a connection and check it as far as possible without connecting; raises RequestError."""
     said = said or f"--autopilot {text}"
     connection = read_connection(text, said)
     if connection.kind == "serial":

@@ -1,4 +1,4 @@
-"""The drone's options of ``alula run``: what they are, and what goes together."""
+"""The drone's options of ``alula run``: their definitions, and which go together."""
 
 from __future__ import annotations
 
@@ -57,7 +57,7 @@ def add_options(parser: ArgumentParser) -> None:
 
 
 def read_options(given: Options) -> Mapping[str, Any]:
-    """Check them; return what a run keeps of them, by name as in ``Flight``. Raises RequestError."""
+    """Check the options; return what a run keeps of them, by name as in ``Flight``. Raises RequestError."""
     if not 0 <= given.rate <= MAX_RATE:  # also refuses nan
         raise RequestError(f"--rate {given.rate:g}: must be 0 (no limit) or a positive factor up to {MAX_RATE}")
     _check_autopilot(given)

@@ -31,7 +31,7 @@ SENSORS_MB_S = 4.0  # stereo pair, LiDAR and IMU, compressed; measured in the ya
 
 @dataclass(frozen=True)
 class Flight:
-    """What a run knows of the drone.
+    """The drone's settings of a run.
 
     Attributes:
         rate: simulated seconds per second at most; 0: no limit.
@@ -56,7 +56,7 @@ class Flight:
 
     @classmethod
     def of(cls, spec: RunSpec) -> Flight:
-        """Return that of a run."""
+        """Return the drone's settings of a run."""
         return cls(**{one.name: spec.own[one.name] for one in fields(cls) if one.name in spec.own})
 
     @property
@@ -93,14 +93,14 @@ class DronePart(RunPart):
         return read_options(Options(**vars(given)))
 
     def check_world(self, path: str) -> None:
-        """Refuse what the simulator can't build."""
+        """Refuse a world that the simulator can't build."""
         try:
             load_world(Path(path))
         except ConfigError as error:
             raise RequestError(f"--world: {error}") from None
 
     def claim(self, spec: RunSpec) -> Mapping[str, Any]:
-        """Take the UDP ports that only this run takes."""
+        """Return the drone's settings with the UDP ports that this run alone uses."""
         flight = Flight.of(spec)
         port = flight.body_port
         if flight.sensors == "simulated" and flight.autopilot is not None and not port:
@@ -109,7 +109,7 @@ class DronePart(RunPart):
         return asdict(replace(flight, body_port=port, radio_port=radio_port))
 
     def words(self, spec: RunSpec) -> list[str]:
-        """Say how ArduPilot is started, and how much raw measurements will take."""
+        """Return how ArduPilot is started, and how much disk space raw measurements will take, in words."""
         flight, words = Flight.of(spec), []
         if flight.body_port:
             command = command_of_ardupilot(read_connection(flight.autopilot or ""), flight.body_port)
@@ -121,7 +121,7 @@ class DronePart(RunPart):
     # --- in the supervisor --------------------------------------------------------------------------------------------
 
     def launch_arguments(self, spec: RunSpec) -> Mapping[str, object]:
-        """Return what the launch files of ``uav_bringup`` take."""
+        """Return the arguments for the launch files of ``uav_bringup``."""
         flight, scenario = Flight.of(spec), load_scenario(spec.scenario)
         others = [fault for fault in spec.faults if parse_fault(fault).what in dict(scenario.faults)]
         radio = [fault for fault in others if parse_fault(fault).what not in dict(scenario.processes)]
@@ -142,7 +142,7 @@ class DronePart(RunPart):
         return {**arguments, **vehicle, "autopilot": flight.autopilot}
 
     def listen(self, spec: RunSpec, departed: Callable[[float], None]) -> None:  # noqa: ARG002
-        """Hear of the simulator's lift-off, and from the guidance whether the autopilot's heartbeats arrive and who has the vehicle."""
+        """Subscribe to the simulator's lift-off, and to the guidance's state: whether heartbeats arrive, and who has the vehicle."""
         import rospy
         from std_msgs.msg import String
         from uav_msgs.msg import GuidanceState
@@ -171,7 +171,7 @@ class DronePart(RunPart):
         return f"ArduPilot on UDP {flight.body_port}"
 
     def waits(self, spec: RunSpec, *, clock: bool) -> list[str]:
-        """Say that nothing has come from a real autopilot."""
+        """Return what has not arrived from a real autopilot, in words; empty where all has."""
         flight = Flight.of(spec)
         if flight.autopilot is None or self._linked:
             return []
@@ -183,7 +183,7 @@ class DronePart(RunPart):
         return []
 
     def held(self, clock: Clock) -> str:
-        """Return that the pilot or a failsafe has the vehicle in the air, its mode and height."""
+        """Return in words that the pilot or a failsafe has the vehicle in the air, its mode and height; empty where they have not."""
         state = self._guidance
         if state is None or clock.now_s is None:
             return ""
@@ -197,7 +197,7 @@ class DronePart(RunPart):
         return f"the vehicle is to be landed, or given back by GUIDED: {who}"
 
     def bring_to_rest(self, clock: Clock) -> None:
-        """Have the guidance land the vehicle, and wait until it stands, or somebody else has it."""
+        """Make the guidance land the vehicle, and wait until it stands, or somebody else has it."""
         if clock.now_s is None:
             return
         if self._landing is None:
@@ -208,7 +208,7 @@ class DronePart(RunPart):
 
 
 def sensors_words(out: Path) -> str:
-    """Return how much the raw measurements will take, and how much there is, also where the folder is still to be made."""
+    """Return in words how much disk space the raw measurements will take, and how much is free, also before the folder exists."""
     free_gb, minutes_gb = shutil.disk_usage(folder_there(out)).free / 1e9, 120 * SENSORS_MB_S / 1e3
     return (
         f"functional.bag will hold raw measurements: about {SENSORS_MB_S:g} MB a second of flight, {minutes_gb:.1f} GB for two minutes; "
