@@ -110,7 +110,7 @@ class FlightReport:
         return Findings(values, False if found.crash else down)
 
     def entries(self) -> Iterable[Entry]:
-        """Return path, true surfaces, and what the watches of the sensors said."""
+        """Return path, true surfaces, and the verdicts of the sensors' watches."""
         return page_entries(self._recording, self._truth.world)
 
     def _came_down(self) -> bool | None:
@@ -182,7 +182,7 @@ class FlightReport:
 
 
 def explains(fault: Fault, lost_s: float, radio: FaultEffects) -> bool:
-    """Return whether a fault is what the loss of the radio was: a process of the video, or the radio at that moment."""
+    """Return whether a fault explains the loss of the radio: a process of the video, or the radio at that moment."""
     if fault.name == RADIO:
         return abs(fault.at_s - lost_s) < SAME_MOMENT_S
     return fault.holds(lost_s) and bool(fault.effects.ends & radio.ends)

@@ -30,7 +30,7 @@ BEFORE, AFTER, ROUTE, MISSED, OUTLINE, ALARM = "#d1495b", "#f79d1e", "#222222", 
 
 @dataclass(frozen=True)
 class MapScene:
-    """What there is to show, frame map; None where a run left nothing. ``failure_s``: absolute mission clock, like the path's."""
+    """The content of the picture, frame map; None where a run left nothing. ``failure_s``: absolute mission clock, like the path's."""
 
     points: Floats | None
     missed: Floats | None
@@ -87,7 +87,7 @@ class Box:
     height: float
 
     def in_figure(self, size_in: tuple[float, float]) -> tuple[float, float, float, float]:
-        """Return it in fractions of the paper."""
+        """Return the rectangle in fractions of the paper."""
         return (self.left / size_in[0], self.bottom / size_in[1], self.width / size_in[0], self.height / size_in[1])
 
     def bar_beside(self) -> Box:

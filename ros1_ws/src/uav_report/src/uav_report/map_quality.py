@@ -65,7 +65,7 @@ def load_map(path: Path) -> Floats:
 def load_route(mission: Mapping[str, object]) -> Floats:
     """Return the planned waypoints, (N, 3), frame map; raise ReportError when they are missing or unreadable.
 
-    It is among the inputs that the mission's account tells.
+    It is among the inputs in the mission's account.
     """
     listed = mapping(mission.get("inputs")).get("route")
     waypoints = [[finite(number) for number in sequence(waypoint)] for waypoint in sequence(listed)]
@@ -98,7 +98,7 @@ def error_m(points: Floats, world: TrueSurfaces) -> float:
 
 
 def covered_by(points: Floats, patches: Floats) -> NDArray[np.bool_]:
-    """Tell for each patch (N, 3) whether a point of the map lies within a quarter of a metre."""
+    """Return for each patch (N, 3) whether a point of the map lies within a quarter of a metre."""
     distance, _ = cKDTree(points).query(patches, distance_upper_bound=COVERED_WITHIN_M)
     return np.asarray(np.isfinite(distance))
 

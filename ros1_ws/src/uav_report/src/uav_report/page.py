@@ -1,4 +1,4 @@
-"""What only the recordings of the functional layer tell the page: the path, what the watches said, the true surfaces."""
+"""Entries of the page that only the recordings of the functional layer have: the path, the verdicts of the watches, the true surfaces."""
 
 from __future__ import annotations
 

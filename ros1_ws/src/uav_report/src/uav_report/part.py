@@ -1,4 +1,4 @@
-"""The drone's part of a report, as ``robot.yaml`` names it. Of flights over mocks it says that nothing was measured, and needs nothing."""
+"""The drone's part of a report, as ``robot.yaml`` names it. For flights over mocks it reports that nothing was measured."""
 
 from __future__ import annotations
 
@@ -35,7 +35,7 @@ def make(run: ReportedRun) -> ReportPart:
 
 
 class Mocked:
-    """Of a flight over mocks: there is no world to collide with or to map."""
+    """The part of a flight over mocks: there is no world to collide with or to map."""
 
     def observe(self, run: ReportedRun) -> Observed:  # noqa: ARG002
         """Return no observations: there is no functional bag."""
@@ -46,7 +46,7 @@ class Mocked:
         return ()
 
     def measure(self, phases: Phases, recovery: Recovery | None, timeline: Timeline | None) -> Findings:  # noqa: ARG002
-        """Say that nothing was measured."""
+        """Report that nothing was measured."""
         return Findings(NOTHING_MEASURED)
 
     def entries(self) -> Iterable[Entry]:

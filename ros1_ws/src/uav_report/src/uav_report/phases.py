@@ -1,4 +1,4 @@
-"""When a flight began to cruise, began to land and touched down, from the skills and from what the guidance said."""
+"""When a flight began to cruise, began to land and touched down, by the skills and the guidance's states."""
 
 from __future__ import annotations
 
@@ -39,7 +39,7 @@ def flight_phases(phases: Phases, history: History, guidance: tuple[GuidanceAcco
 
 
 def touch_down(guidance: tuple[GuidanceAccount, ...]) -> float | None:
-    """Return when the guidance said last that the vehicle stands again after it had flown; None: it did not say so."""
+    """Return when the guidance last reported that the vehicle stands again after it had flown; None: it did not."""
     block = list(takewhile(lambda state: state.landed_state == ON_GROUND, reversed(guidance)))
     return block[-1].t_s if 0 < len(block) < len(guidance) else None
 

@@ -1,4 +1,4 @@
-"""What the bag of the functional layer tells: where the vehicle truly was, what the simulator and the guidance said."""
+"""The contents of the functional layer's bag: where the vehicle truly was, and the states of simulator and guidance."""
 
 from __future__ import annotations
 
@@ -53,7 +53,7 @@ class Track:
 
 @dataclass(frozen=True)
 class SimulatorAccount:
-    """The last that the simulator said of itself; None where it said nothing."""
+    """The simulator's last state; None where it published none."""
 
     lift_off_s: float | None
     collisions: int | None
@@ -81,7 +81,7 @@ class GuidanceAccount:
 
     @property
     def left(self) -> str:
-        """Say how a vehicle is that ends so, where that is not on the ground with its motors off."""
+        """Return the state of a vehicle that ends so, in words, where that is not on the ground with its motors off."""
         if self.landed_state in {IN_AIR, TAKING_OFF, LANDING}:
             return f"still in the air, in {self.mode}, at {self.height_m:.1f} m"
         return f"on the ground with its motors on, in {self.mode}" if self.armed and self.landed_state == ON_GROUND else ""
@@ -89,7 +89,7 @@ class GuidanceAccount:
 
 @dataclass(frozen=True)
 class HealthChange:
-    """A watch changed its mind about a sensor at ``t_s``, absolute; ``fault`` is one of uav_msgs/SensorHealth, empty when ``ok``."""
+    """A change of a watch's verdict on a sensor at ``t_s``, absolute; ``fault`` is one of uav_msgs/SensorHealth, empty when ``ok``."""
 
     t_s: float
     sensor: str
@@ -113,7 +113,7 @@ class Recording:
 
     @property
     def last_s(self) -> float:
-        """The last moment of which the bag tells where the vehicle is or does; absolute seconds, -inf where it tells nothing."""
+        """The last moment at which the bag has the vehicle's place or state; absolute seconds, -inf where it has none."""
         ends = [float(track.t_s[-1]) for track in (self.truth, self.estimate) if track is not None]
         return max([*ends, *(state.t_s for state in self.guidance[-1:])], default=-math.inf)
 

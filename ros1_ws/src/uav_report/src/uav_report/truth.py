@@ -41,7 +41,7 @@ class Encounter:
 
 
 def encounter(track: Track | None, world: TrueSurfaces | None, phases: FlightPhases) -> Encounter:
-    """Compute it from the true track (None: unknown)."""
+    """Compute the encounter from the true track (None: unknown)."""
     if track is None:
         return Encounter()
     down_s = np.inf if phases.touch_down_s is None else phases.touch_down_s
@@ -108,7 +108,7 @@ def rests(track: Track | None, world: TrueSurfaces | None, phases: FlightPhases)
 
 
 def impact(track: Track | None, phases: FlightPhases) -> str:
-    """Say how the vehicle met what it rests on, if that was no landing; for one that is known to rest (`rests`)."""
+    """Return in words how the vehicle met what it rests on, if that was no landing; for one that is known to rest (`rests`)."""
     if track is None or not phases.lifted_off:
         return ""
     t_s, height = track.t_s, track.position_enu_m[:, 2]
@@ -127,7 +127,7 @@ def _height_above_surface(world: TrueSurfaces, place: NDArray[np.float64]) -> fl
 
 
 def told_or_computed(simulator: SimulatorAccount | None, recomputed: Encounter) -> Encounter:
-    """Return the simulator's numbers; where it told none, those of the recorded path.
+    """Return the simulator's numbers; where it has none, those of the recorded path.
 
     The simulator counts at each step of the body, and knows what is ground and whether the vehicle stands, flies or lands. The path knows
     less: what the autopilot has said of that, and surfaces that are all alike. It has seen a crash that the simulator had no time to tell.
@@ -145,7 +145,7 @@ def told_or_computed(simulator: SimulatorAccount | None, recomputed: Encounter) 
 
 
 def disagreement(recording: Recording, recomputed: Encounter) -> str:
-    """Say where the simulator's way and the recorded one differ by more than sampling explains: a part of the recording is missing."""
+    """Return in words where the simulator's way and the recorded one differ by more than sampling explains: a part is missing."""
     said = recording.simulator
     if said is None or said.distance_m is None or recomputed.distance_m is None:
         return ""

@@ -64,7 +64,7 @@ class VideoSummary(TypedDict):
 
 @dataclass(frozen=True)
 class RadioState:
-    """How the radio was from a moment on."""
+    """The radio's state from a moment on."""
 
     t_s: float
     quality: str
@@ -74,7 +74,7 @@ class RadioState:
 
 @dataclass(frozen=True)
 class Video:
-    """All that is known of a flight's video. Seconds since lift-off."""
+    """The recorded data of a flight's video. Seconds since lift-off."""
 
     frames: tuple[FrameRecord, ...] = ()
     radio: tuple[RadioState, ...] = ()
