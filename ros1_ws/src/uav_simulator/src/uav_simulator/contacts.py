@@ -37,7 +37,7 @@ class ContactMonitor:
         self._seen = Nearest(math.inf, ZERO)
 
     def step(self, body: RigidBody, state: LandedState) -> None:
-        """Look at the present moment; call at 50 Hz."""
+        """Check the present moment; call at 50 Hz."""
         self._meet_the_ground(body)
         if state is LandedState.ON_GROUND:
             self._touching = self._cruising = False

@@ -2,7 +2,7 @@
 
 
 class SimulatorError(Exception):
-    """Something that the simulator was told can't be done; the message names the value, the place and the remedy."""
+    """The simulator can't do what was requested; the message has the value, the place and the remedy."""
 
 
 class ConfigError(SimulatorError):

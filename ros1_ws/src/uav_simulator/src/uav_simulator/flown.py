@@ -32,7 +32,7 @@ class Flown(Protocol):
 
     @property
     def estimator(self) -> Estimator | None:
-        """What the autopilot knows its place by; None: the autopilot is not the simulator's, and nothing can be done to it."""
+        """The autopilot's estimator of its place; None: the autopilot is not the simulator's, and its estimator can't be changed."""
 
     @property
     def landed_state(self) -> LandedState:
@@ -45,7 +45,7 @@ class Flown(Protocol):
         """Return how far its autopilot has gone on beyond this moment; 0 where it waits for the simulation."""
 
     def expose(self, wind: SensorMode, pilot: SensorMode) -> None:
-        """Let wind and pilot do what their faults say; called each tick. Nothing happens where another autopilot flies."""
+        """Apply the faults of wind and pilot; called each tick. Nothing happens where another autopilot flies."""
 
 
 class SimulatedAutopilotVehicle:
@@ -94,7 +94,7 @@ class SimulatedAutopilotVehicle:
         return 0.0
 
     def expose(self, wind: SensorMode, pilot: SensorMode) -> None:
-        """Let the wind rise or calm down; have the pilot take the vehicle, turn it by the stick, or leave it again."""
+        """Apply the faults: a stronger wind, or a pilot who takes the vehicle, turns it by the stick, or leaves it again."""
         self._wind.strong = wind is SensorMode.STRONG
         if pilot is self._pilot:
             return
@@ -107,7 +107,7 @@ class SimulatedAutopilotVehicle:
             self.autopilot.yaw_stick(STICK_RAD_S if pilot is SensorMode.STICK else 0.0)
 
     def tick(self, now_s: float, dt_s: float) -> bool:
-        """Move the body, then let the autopilot decide and speak."""
+        """Move the body, then let the autopilot decide and send."""
         self.vehicle.advance(dt_s)
         self.autopilot.step(now_s, dt_s)
         self.endpoint.step()

@@ -14,7 +14,7 @@ from uav_simulator.errors import ConfigError
 
 @dataclass(frozen=True)
 class Imperfections:
-    """What comes on top of the small errors that are always there. Zero: nothing does."""
+    """Errors on top of the small ones that are always there; zero: none."""
 
     position_drift: float = 0.0
     """Error of the autopilot's position, metres a metre flown, in a direction that depends on the seed."""

@@ -45,18 +45,18 @@ class Pacer:
         self._lock = threading.Lock()
 
     def begin(self, now_s: float) -> None:
-        """Note that simulated time begins: no topic may lag behind the clock, or its sensor, from now on, heard or not."""
+        """Record that simulated time begins: from now on no topic may lag behind the clock, or its sensor, received or not."""
         with self._lock:
             for topic in self._topics:
                 self._listeners.setdefault(topic, _Listener(now_s))
 
     def measured(self, sensor: str, stamp_s: float, now_s: float) -> None:
-        """Note that a sensor has published a measurement just now."""
+        """Record that a sensor has published a measurement just now."""
         with self._lock:
             self._measured.setdefault(sensor, deque(maxlen=MEASUREMENTS)).append((stamp_s, now_s))
 
     def heard(self, topic: str, stamp_s: float) -> None:
-        """Note a message; one that has been left out is back when it speaks with a newer stamp.
+        """Record a message; a topic that was left out is back with a newer stamp.
 
         One that says again how far it has come does not hang: it waits for something itself, as a mission for another robot.
         """
@@ -77,7 +77,7 @@ class Pacer:
             return not any(held)
 
     def gone(self, topic: str) -> None:
-        """Note that nothing publishes the topic any more: it is not waited for until it is heard again."""
+        """Record that nothing publishes the topic any more: it is not waited for until its next message."""
         with self._lock:
             if topic in self._listeners:
                 self._listeners[topic].live = False

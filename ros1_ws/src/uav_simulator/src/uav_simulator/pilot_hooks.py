@@ -15,7 +15,7 @@ NUMBERS = {"YAW_STICK": "a rate in rad/s", "THROTTLE": "a number from -1 to 1"}
 
 
 def apply_pilot_word(text: str, autopilot: Autopilot, endpoint: Endpoint) -> None:
-    """Do what a word says; raises ConfigError for a word that is none."""
+    """Execute a word of the pilot's; raises ConfigError for an unknown one."""
     word, _, argument = text.strip().partition(" ")
     if word in Mode.__members__:
         autopilot.set_mode(Mode[word])

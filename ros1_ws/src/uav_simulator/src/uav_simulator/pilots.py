@@ -1,4 +1,4 @@
-"""What flies the body, as the node sees it: something flown, served while time waits, and told what the pilot does."""
+"""What flies the body, for the node: a vehicle, its links, which are served while time waits, and the pilot's actions."""
 
 from __future__ import annotations
 
@@ -37,16 +37,16 @@ class Pilot(Protocol):
 
     @property
     def ports(self) -> dict[str, int]:
-        """Those that it listens on, by the names of their parameters."""
+        """The ports that it listens on, by the names of their parameters."""
 
     def serve(self, wait_s: float = 0.0) -> None:
-        """Handle what has come over its links, or comes within ``wait_s``."""
+        """Handle what has come over its links, or comes within ``wait_s`` seconds."""
 
     def wake(self) -> None:
         """End a wait of ``serve`` where that can be done; called from other threads."""
 
     def obey(self, word: str) -> None:
-        """Do what a word of ``/sim/pilot`` says; raises ConfigError for one that can't be done."""
+        """Execute a word of ``/sim/pilot``; raises ConfigError for one that can't be executed."""
 
     def close(self) -> None:
         """Close its sockets and connections."""
@@ -125,7 +125,7 @@ class FollowedPilot:
         self.ports: dict[str, int] = {}
 
     def serve(self, wait_s: float = 0.0) -> None:
-        """Hear how far the autopilot has come, also while time waits for nodes."""
+        """Read how far the autopilot has come, also while time waits for nodes."""
         until_s = time.monotonic() + wait_s
         while (rest_s := until_s - time.monotonic()) > 0.0:
             self.flown.listen(rest_s)

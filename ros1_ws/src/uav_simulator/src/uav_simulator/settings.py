@@ -36,7 +36,7 @@ class SimulatorSettings:
 
     @property
     def followed_url(self) -> str:
-        """Where the autopilot is that the sensors follow; empty when there is none."""
+        """The address of the autopilot that the sensors follow; empty when there is none."""
         return self.vehicle.removeprefix(FOLLOWED) if self.vehicle.startswith(FOLLOWED) else ""
 
 

@@ -40,7 +40,7 @@ class MotorPacket:
 
 @dataclass(frozen=True)
 class BodyState:
-    """What it wants back: seconds of the body's time, NED and FRD, SI units, unit quaternion (w x y z)."""
+    """The reply that it expects: seconds of the body's time, NED and FRD, SI units, unit quaternion (w x y z)."""
 
     time_s: float
     gyro_rad_s: Vec3

@@ -74,7 +74,7 @@ class ArduPilotVehicle:
 
     @property
     def landed_state(self) -> LandedState:
-        """What the body's height and the flight so far say: ArduPilot does not tell its intention."""
+        """The landed state by the body's height and the flight so far: ArduPilot does not report its intention."""
         height = self.body.position[2]
         if self.body.on_ground or (height < AIRBORNE_M and not self._high):
             return LandedState.ON_GROUND
@@ -83,7 +83,7 @@ class ArduPilotVehicle:
         return LandedState.LANDING if self._high else LandedState.TAKING_OFF
 
     def tick(self, now_s: float, dt_s: float) -> bool:
-        """Take packets until the tick is complete; False when none has come for a while."""
+        """Handle packets until the tick is complete; False when none has come for a while."""
         until_s = time.monotonic() + WAIT_S
         while True:
             received = self._receive(until_s)

@@ -150,7 +150,7 @@ class Autopilot:
     # --- commands ----------------------------------------------------------------------------------------------------
 
     def set_mode(self, number: int) -> Result:
-        """Change the mode: a client's wish or the pilot's switch, the autopilot makes no difference [3, 11]."""
+        """Change the mode: by a client's request or the pilot's switch, which the autopilot does not distinguish [3, 11]."""
         if number not in [m.value for m in Mode]:
             return self._refused(f"No such mode {number}")
         mode = Mode(number)
@@ -218,7 +218,7 @@ class Autopilot:
         return Result.ACCEPTED
 
     def setpoint(self, raw: RawSetpoint) -> None:
-        """Follow a setpoint, or don't, without a word [5, 6, 7, 11]."""
+        """Follow a setpoint, or ignore it without a reply [5, 6, 7, 11]."""
         if self.mode is not Mode.GUIDED or not self.armed:
             return
         self._takeoff = None
@@ -243,7 +243,7 @@ class Autopilot:
     # --- what happens to it ------------------------------------------------------------------------------------------
 
     def hear_gcs(self) -> None:
-        """Note a heartbeat of the ground station [10]."""
+        """Record a heartbeat of the ground station [10]."""
         if self._failsafes.hear_gcs(self.now_s):
             self._say(Severity.WARNING, "GCS Failsafe Cleared")
 
@@ -253,7 +253,7 @@ class Autopilot:
             self._fail_safe("Radio Failsafe")
 
     def manual_control(self, raw: Deflection) -> None:
-        """Take the sticks of the ground station; they fly in modes of the pilot's, in GUIDED they turn the nose alone [11]."""
+        """Apply the sticks of the ground station; they fly in modes of the pilot's, in GUIDED they turn the nose alone [11]."""
         self._sticks.move(raw, self.now_s)
 
     def throttle_stick(self, up: float) -> None:

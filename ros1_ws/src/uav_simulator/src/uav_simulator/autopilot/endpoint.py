@@ -28,7 +28,7 @@ Message = Any  # pymavlink's messages have no types
 
 
 class Endpoint:
-    """One link: parses what comes, acknowledges, streams what was asked for.
+    """One link: parses messages, acknowledges, streams what was requested.
 
     Texts and notices go to every link of the autopilot, and the heartbeats of one are forwarded to the others, as ArduPilot does.
     Where no other link is open for a ground station (``connect``), one is part of the picture: its heartbeats come to this link, so
@@ -81,14 +81,14 @@ class Endpoint:
         other._others.append(self)
 
     def open_link(self) -> None:
-        """Begin with a fresh link: nothing asked for, nothing left over."""
+        """Begin with a fresh link: no requests, no pending bytes."""
         self._streams = Streams()
         self._out.clear()
         self._parser = mavlink.MAVLink(None)
         self._parser.robust_parsing = True
 
     def feed(self, data: bytes) -> None:
-        """Handle what came over the link; answers wait in ``take_output``."""
+        """Handle received bytes; answers wait in ``take_output``."""
         for message in self._parser.parse_buffer(data) or []:
             handler = self._messages.get(message.get_type())
             if handler and getattr(message, "target_system", SYSTEM) in {0, SYSTEM}:
@@ -96,7 +96,7 @@ class Endpoint:
         self._tell()
 
     def step(self) -> None:
-        """Send what is due now; call after the autopilot's step."""
+        """Send the messages that are due now; call after the autopilot's step."""
         pilot = self._pilot
         if self.gcs_present and pilot.now_s >= self._gcs_due_s:
             self._gcs_due_s = pilot.now_s + 1.0
@@ -111,7 +111,7 @@ class Endpoint:
             self._send(mavlink.MAVLink_timesync_message(0, round(pilot.boot_s * 1e9)))
 
     def take_output(self) -> bytes:
-        """Return and forget the bytes to send."""
+        """Return the bytes to send, and clear them."""
         data = bytes(self._out)
         self._out.clear()
         return data

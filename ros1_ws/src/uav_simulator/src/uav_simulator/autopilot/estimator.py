@@ -24,7 +24,7 @@ BROKEN_M_S = 0.015  # ArduCopter flown with this drift of its barometer sank by 
 
 @dataclass(frozen=True)
 class Estimate:
-    """Position relative to the origin and velocity (ENU), attitude (FLU to ENU), body rates (FLU)."""
+    """The estimate: position relative to the origin and velocity (ENU), attitude (FLU to ENU), body rates (FLU)."""
 
     position: Vec3
     velocity: Vec3
@@ -64,7 +64,7 @@ class Drift:
         return self._turned_rad + self._turn_sign * walk_rad
 
     def step(self, body: RigidBody, dt_s: float) -> None:
-        """Go on with the body."""
+        """Advance with the body."""
         here, last = body.position, self._last or body.position
         self._last = here
         if body.on_ground:
@@ -96,7 +96,7 @@ class Leaning:
         self._walk = SlowNoise(sigma=walk_rad, tau_s=30.0, limit=3.0 * walk_rad, seed=f"ekf tilt walk {seed}")
 
     def step(self, dt_s: float) -> Quat:
-        """Return the turn from the body to where the autopilot takes it to be."""
+        """Advance by ``dt_s``; return the turn from the body's attitude to the estimated one."""
         walk = self._walk.step(dt_s)
         x, y = (0.5 * (bias + moved) for bias, moved in zip(self._bias_rad, walk, strict=False))
         return math.sqrt(1.0 - x * x - y * y), x, y, 0.0

@@ -11,7 +11,7 @@ POSITION_LOST_S = 0.8  # without a position, ten checks in a row
 
 
 class Failsafes:
-    """Remembers the remote control's and the ground station's state; what follows from a loss is the autopilot's to decide."""
+    """Remembers the remote control's and the ground station's state; the autopilot decides the response to a loss."""
 
     def __init__(self, params: Parameters) -> None:
         self._params = params
@@ -32,19 +32,19 @@ class Failsafes:
         return self._unlocated_s >= POSITION_LOST_S
 
     def hear_gcs(self, now_s: float) -> bool:
-        """Note a heartbeat of the ground station; return whether that ends its failsafe."""
+        """Record a heartbeat of the ground station; return whether that ends its failsafe."""
         self._gcs_heard_s = now_s
         was_lost, self.gcs_lost = self.gcs_lost, False
         return was_lost
 
     def set_rc(self, *, lost: bool) -> bool:
-        """Note the remote control's state; return whether that begins its failsafe."""
+        """Record the remote control's state; return whether that begins its failsafe."""
         begins = lost and not self.rc_lost and bool(self._params["FS_THR_ENABLE"])
         self.rc_lost = lost
         return begins
 
     def gcs_falls_silent(self, now_s: float) -> bool:
-        """Return whether the ground station's failsafe begins now: it is enabled, had spoken, and has been silent for too long."""
+        """Return whether the ground station's failsafe begins now: it is enabled, had sent heartbeats, and has been silent for too long."""
         heard = self._gcs_heard_s
         if not self._params["FS_GCS_ENABLE"] or heard is None or self.gcs_lost:
             return False

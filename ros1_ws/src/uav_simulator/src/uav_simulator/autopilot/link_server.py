@@ -28,7 +28,7 @@ class LinkServer:
             self.gcs_port = udp.port
 
     def serve(self, wait_s: float = 0.0) -> None:
-        """Handle what has come, or comes within ``wait_s``, and send what is ready."""
+        """Handle what has come, or comes within ``wait_s`` seconds, and send what is ready."""
         for link in self._links:
             link.send()
         readable, _, _ = select.select([self._woken, *(link.socket for link in self._links)], [], [], max(0.0, wait_s))

@@ -15,7 +15,7 @@ LEAK_M_S2 = 0.03  # of gravity, into an acceleration that is reckoned with: a ti
 
 
 class Satellites:
-    """A receiver that fails in two ways: it says that it has no fix (``jammed``), or nothing (``silent``)."""
+    """A receiver that fails in two ways: it reports that it has no fix (``jammed``), or nothing (``silent``)."""
 
     def __init__(self, seed: int) -> None:
         self.jammed = self.silent = False
@@ -29,7 +29,7 @@ class Satellites:
 
     @property
     def fix(self) -> int | None:
-        """Return the GPS_FIX_TYPE that is told; None: nothing is."""
+        """Return the reported GPS_FIX_TYPE; None: none is reported."""
         if self.silent:
             return NO_GPS if self._lost_s >= SILENT_S else None
         return NO_FIX if self.jammed else FIX_3D
@@ -40,7 +40,7 @@ class Satellites:
         return self._lost_s >= RECKONED_S
 
     def step(self, dt_s: float, *, flying: bool) -> None:
-        """Go on by ``dt_s``; a vehicle that stands knows that it does."""
+        """Advance by ``dt_s`` seconds; a vehicle that stands does not drift."""
         if not (self.jammed or self.silent):
             kept = 0.0 if self.given_up else math.exp(-dt_s / REGAINED_S)
             self._lost_s, self.velocity = 0.0, (0.0, 0.0, 0.0)

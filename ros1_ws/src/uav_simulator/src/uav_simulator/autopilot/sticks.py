@@ -1,4 +1,4 @@
-"""A pilot's sticks, the remote control's or as a ground station moves them with MANUAL_CONTROL: what they say now, and how fast that is."""
+"""A pilot's sticks, the remote control's or those of MANUAL_CONTROL by a ground station: their deflection, and the motion it requests."""
 
 from __future__ import annotations
 
@@ -44,18 +44,18 @@ class Sticks:
         self._own = Deflection(up=_live(up, THROTTLE_DEAD))
 
     def move(self, raw: Deflection, now_s: float) -> None:
-        """Take what a MANUAL_CONTROL says."""
+        """Apply a MANUAL_CONTROL."""
         self._moved_s = now_s
         self._last = Deflection(
             _live(raw.forward, ROLL_PITCH_DEAD), _live(raw.left, ROLL_PITCH_DEAD), _live(raw.up, THROTTLE_DEAD), _live(raw.turn, YAW_DEAD)
         )
 
     def at(self, now_s: float) -> Deflection:
-        """Return what they say; what a ground station has said too long ago says nothing."""
+        """Return the present deflection; a ground station's counts only for RC_OVERRIDE_TIME."""
         return self._last if now_s - self._moved_s <= self._params["RC_OVERRIDE_TIME"] else self._own
 
     def velocity_m_s(self, stick: Deflection, yaw_rad: float) -> Vec3:
-        """Return the velocity (ENU) that a deflection asks for."""
+        """Return the velocity (m/s, ENU) that a deflection requests."""
         p = self._params
         scale = p["LOIT_SPEED"] / 100.0 / max(1.0, math.hypot(stick.forward, stick.left))
         east = math.cos(yaw_rad) * stick.forward - math.sin(yaw_rad) * stick.left
@@ -63,7 +63,7 @@ class Sticks:
         return scale * east, scale * north, p["PILOT_SPEED_UP"] / 100.0 * stick.up
 
     def turn_rad_s(self, stick: Deflection) -> float:
-        """Return the rate of turn that a deflection asks for, counter-clockwise."""
+        """Return the rate of turn (rad/s) that a deflection requests, counter-clockwise."""
         return math.radians(self._params["PILOT_Y_RATE"]) * stick.turn
 
 

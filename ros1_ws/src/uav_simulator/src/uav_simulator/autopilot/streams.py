@@ -1,4 +1,4 @@
-"""Which messages a link has asked for, and when each is due."""
+"""Which messages a link has requested, and when each is due."""
 
 from __future__ import annotations
 
@@ -29,7 +29,7 @@ class Streams:
         self._streams = {HEARTBEAT_ID: _Stream(1.0, 0.0, individual=False)}
 
     def set_interval(self, message_id: int, interval_us: float, now_s: float) -> None:
-        """Ask for one message: microseconds between two, 0 or less for none."""
+        """Set the interval of one message: microseconds between two, 0 or less for none."""
         if interval_us > 0.0:
             self._streams[message_id] = _Stream(interval_us * 1e-6, now_s, individual=True)
         else:
@@ -41,7 +41,7 @@ class Streams:
         return round(stream.interval_s * 1e6) if stream else -1
 
     def request_group(self, group: int, rate_hz: int, *, start: bool, now_s: float) -> None:
-        """Serve REQUEST_DATA_STREAM, which also forgets what was asked for one by one."""
+        """Serve REQUEST_DATA_STREAM, which also clears the requests for single messages."""
         self._streams = {k: s for k, s in self._streams.items() if not s.individual}
         groups = DATA_STREAMS.values() if group == ALL_STREAMS else [DATA_STREAMS.get(group, ())]
         for message_id in (i for ids in groups for i in ids):

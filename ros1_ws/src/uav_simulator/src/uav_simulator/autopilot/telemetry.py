@@ -52,7 +52,7 @@ def boot_ms(pilot: Autopilot) -> int:
 
 
 def charge(pilot: Autopilot) -> float:
-    """Return what is left in the battery, 0..1."""
+    """Return the battery's charge, 0..1."""
     return max(0.0, 1.0 - pilot.flown_s / ENDURANCE_S)
 
 
@@ -118,7 +118,7 @@ def extended_sys_state(pilot: Autopilot) -> Message:
 
 
 def position_target(pilot: Autopilot) -> Message:
-    """Return POSITION_TARGET_LOCAL_NED: the place or the velocity that is flown to."""
+    """Return POSITION_TARGET_LOCAL_NED: the target place or velocity."""
     goal = pilot.goal
     mask = (
         mavlink.POSITION_TARGET_TYPEMASK_AX_IGNORE | mavlink.POSITION_TARGET_TYPEMASK_AY_IGNORE | mavlink.POSITION_TARGET_TYPEMASK_AZ_IGNORE
@@ -157,7 +157,7 @@ def gps_global_origin(pilot: Autopilot) -> Message | None:
 
 
 def gps_raw(pilot: Autopilot) -> Message | None:
-    """Return GPS_RAW_INT; None where the receiver says nothing [18]."""
+    """Return GPS_RAW_INT; None where the receiver is silent [18]."""
     fix = pilot.estimator.satellites.fix
     if fix is None:
         return None
@@ -168,7 +168,7 @@ def gps_raw(pilot: Autopilot) -> Message | None:
 
 
 def ekf_status(pilot: Autopilot) -> Message:
-    """Return the message EKF_STATUS_REPORT: what the estimator knows, as flags [18]."""
+    """Return the message EKF_STATUS_REPORT: the estimator's flags [18]."""
     aligned = pilot.boot_s >= ALIGNED_AFTER_S
     flags = (RELATIVE_FLAGS if aligned else 0) | (LOCATED_FLAGS if pilot.located else mavlink.EKF_CONST_POS_MODE)
     return mavlink.MAVLink_ekf_status_report_message(flags, 0.05, 0.05, 0.05, 0.05, 0.0)

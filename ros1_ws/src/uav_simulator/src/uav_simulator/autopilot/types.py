@@ -58,7 +58,7 @@ class Severity(IntEnum):
 
 
 class Notice(Enum):
-    """What a link is told unasked at the moment it happens."""
+    """An event that a link sends without a request."""
 
     HEARTBEAT = "heartbeat"  # the mode or the arming state changed
     HOME = "home"

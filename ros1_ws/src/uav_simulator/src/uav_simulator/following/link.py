@@ -1,4 +1,4 @@
-"""A MAVLink connection that listens to an autopilot beside the guidance's own: it asks for streams, and commands nothing."""
+"""A MAVLink connection that listens to an autopilot beside the guidance's own: it requests streams, and commands nothing."""
 
 from __future__ import annotations
 
@@ -24,7 +24,7 @@ log = logging.getLogger(__name__)
 
 
 class ListeningLink:
-    """Reads in the caller's thread, connects again by itself, and asks again for streams that stay away (the autopilot restarted)."""
+    """Reads in the caller's thread, reconnects by itself, and requests again streams that stay away (the autopilot restarted)."""
 
     def __init__(self, url: str) -> None:
         self._url = url

@@ -1,4 +1,4 @@
-"""What an autopilot tells of its motion, between its messages, on its own clock."""
+"""An autopilot's motion between its messages, on its own clock."""
 
 from __future__ import annotations
 
@@ -27,7 +27,7 @@ class FollowedMotion:
 
 
 class LinkTrack:
-    """Time is counted in seconds from the first moment at which position and attitude were told; an autopilot that restarts goes on.
+    """The track of an autopilot. Time is in seconds from the first moment with position and attitude; a restarted autopilot continues it.
 
     One that has no position yet counts as standing where it was last known to be, first at ``home`` (map, metres).
     """
@@ -40,7 +40,7 @@ class LinkTrack:
         self._asked_s = 0.0
 
     def take(self, message: Any) -> None:
-        """Take a message of the autopilot; of no use are all but LOCAL_POSITION_NED and ATTITUDE."""
+        """Handle a message of the autopilot; all but LOCAL_POSITION_NED and ATTITUDE are ignored."""
         kind = message.get_type()
         if kind == "LOCAL_POSITION_NED":
             place, velocity = (message.x, message.y, message.z), (message.vx, message.vy, message.vz)
@@ -53,7 +53,7 @@ class LinkTrack:
 
     @property
     def newest_s(self) -> float | None:
-        """The last moment that is known; None before the first."""
+        """The last known moment; None before the first."""
         if self._zero_ms is None:
             return None
         newest_ms = min(told[-1][0] for told in (self._places, self._attitudes) if told)

@@ -1,4 +1,4 @@
-"""The body of a vehicle that is simulated or flown elsewhere: pose and time are those that its autopilot tells."""
+"""The body of a vehicle that is simulated or flown elsewhere: pose and time are its autopilot's."""
 
 from __future__ import annotations
 
@@ -34,7 +34,7 @@ class FollowedVehicle:
         self._tell_wall_s = time.monotonic() + SILENCE_S
 
     def tick(self, now_s: float, dt_s: float) -> bool:
-        """Move the body to where the autopilot was at this moment of its clock; False when it has not come so far."""
+        """Move the body to the autopilot's pose at this moment of its clock; False when that has not come so far."""
         until_s = time.monotonic() + WAIT_S
         while self.listen():
             pass  # all that has come: what waits in the socket is how late the simulation is
@@ -48,7 +48,7 @@ class FollowedVehicle:
         return True
 
     def listen(self, wait_s: float = 0.0) -> bool:
-        """Take what the autopilot has told, or tells first within ``wait_s``; return whether there was something."""
+        """Handle the autopilot's messages so far, or the first within ``wait_s`` seconds; return whether there was one."""
         messages = self._link.read(wait_s)
         for message in messages:
             self._take(message)
@@ -72,7 +72,7 @@ class FollowedVehicle:
         """Do nothing: wind and pilot are those of the autopilot that flies."""
 
     def late_s(self, now_s: float) -> float:
-        """Return how much newer the autopilot's last word is."""
+        """Return how many seconds the autopilot's last message is ahead."""
         newest_s = self._track.newest_s
         return 0.0 if newest_s is None else max(newest_s - now_s, 0.0)
 

@@ -1,4 +1,4 @@
-"""Which sensor fares how: the ways in which each can fail, and when they do."""
+"""The modes of the sensors: the ways in which each can fail, and when they do."""
 
 from __future__ import annotations
 
@@ -75,7 +75,7 @@ AUTOPILOTS = {
 
 @dataclass(frozen=True)
 class FaultRecord:
-    """A change that happened, at a moment of the simulated clock."""
+    """A change of a mode, at a moment of the simulated clock."""
 
     sensor: str
     mode: SensorMode
@@ -115,7 +115,7 @@ class SensorBoard:
 
     @property
     def records(self) -> list[FaultRecord]:
-        """Return what happened so far, in order."""
+        """Return the changes so far, in order."""
         with self._lock:
             return list(self._records)
 
@@ -136,7 +136,7 @@ class SensorBoard:
             raise ConfigError(f"no fault of the {sensor}: it is the autopilot's, which is not simulated; {AUTOPILOTS[sensor]}")
 
     def apply_due(self, now_s: float, lift_off_s: float | None) -> bool:
-        """Let the scheduled changes happen that are due; return whether one did."""
+        """Apply the scheduled changes that are due; return whether there was one."""
         due = [change for change in self._pending if _is_due(change, now_s, lift_off_s)]
         for change in due:
             self._pending.remove(change)

@@ -73,5 +73,5 @@ class RadioZone:
 
 
 def radio_zone_at(zones: Iterable[RadioZone], point: Vec3) -> RadioZone | None:
-    """Return the zone that counts at a point: the first one listed that contains it; None outside of all, where the radio is good."""
+    """Return the zone at a point: the first one listed that contains it; None outside of all, where the radio is good."""
     return next((zone for zone in zones if zone.volume.contains(point)), None)
