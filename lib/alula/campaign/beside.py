@@ -66,7 +66,7 @@ class Beside:
 
     @property
     def end(self) -> str:
-        """How the skill ends, in words: by name where the tree tells it apart."""
+        """How the skill ends, in words: by name where the tree distinguishes it."""
         return "fails" if self.key[1] == FAILED else self.key[1]
 
     @property

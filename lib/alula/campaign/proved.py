@@ -28,7 +28,7 @@ from alula.records.tree import Path
 
 LOOKED_AT = Failures(aborts=False)
 """What can happen in a campaign: hooks may refuse and raise, too; nobody aborts, and processes of managers that die are not compared."""
-"""What the search has where nothing else is said, seconds of wall clock."""
+"""The default time of the search, seconds of wall clock."""
 End = tuple[str, str]
 """State and result of an execution."""
 Asked = frozenset[Path]
@@ -125,7 +125,7 @@ def _bound(time_s: float) -> str:
 
 
 def _both(one: ProvedAnswer, other: ProvedAnswer) -> ProvedAnswer:
-    """Return the answers of two leaves at one place, as names tell it: what one of them can do."""
+    """Return the union of the answers of two leaves whose names give them one place."""
     asked, outcomes = one.asked | other.asked, one.outcomes | other.outcomes
     return ProvedAnswer(one.place, one.skill, one.end, one.ends, one.moment, one.faults, asked, outcomes)
 

@@ -138,7 +138,7 @@ def _answers(answers: Sequence[FlownAnswer], events: Sequence[EngineEvent], faul
 
 
 def _ended(died: Mapping[str, Any], events: Sequence[EngineEvent], effects: EffectsByFault) -> Fault:
-    """Return the end of a process, as the summary tells of it, as a fault; without a time it ended before the mission clock ran."""
+    """Return the end of a process, as in the summary, as a fault; without a time it ended before the mission clock ran."""
     begun_s = min((event.stamp_s for event in events), default=0.0)
     at_s = begun_s if died["when_s"] is None else origin_of(events, departure()) + died["when_s"]
     until_s = math.inf if died.get("again_s") is None else origin_of(events, departure()) + died["again_s"]
