@@ -127,7 +127,7 @@ class Commands:
 
 
 def _words_of_search(folder: Path, fault: object) -> list[str]:
-    """Return the command that answers a fault of a run; raise ActError where the run does not say of which mission it is."""
+    """Return the command that answers a fault of a run; raise ActError where the run does not name its mission."""
     try:
         scenario = str(json.loads((folder / "run.json").read_text(encoding="utf-8"))["scenario"])
         return words_for(robot_of(folder) or find_robot(), scenario, fault)

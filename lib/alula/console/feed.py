@@ -40,7 +40,7 @@ class Feed:
         self._robot = robot
         self.session = secrets.token_hex(8)
         self.last_s: float | None = None
-        """Mission clock of the newest entry; None: it has not been heard yet."""
+        """Mission clock of the newest entry; None: none has been received yet."""
         self.changed = asyncio.Event()
         self._follower = RunFollower(folder)
         self._log: list[str] = []

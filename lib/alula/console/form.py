@@ -55,7 +55,7 @@ def fields(skill: Skill, kinds: Mapping[str, str], remembered: Mapping[str, str]
 
 
 def _said(parameter: Parameter, kind: str) -> str:
-    """Return the comment, with the unit that the name tells in front of it where the comment begins with none."""
+    """Return the comment, with the unit from the name in front of it where the comment begins with none."""
     unit = UNIT_OF_NAME.get(parameter.name, "") if kind in FLOATS else ""
     first = re.split(r"[,;:]", parameter.comment, maxsplit=1)[0].strip()
     told = first in KIND_OF_UNIT or first in UNIT_OF_NAME.values()
