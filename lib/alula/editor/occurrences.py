@@ -1,4 +1,4 @@
-"""Where a file says what: every place of a name, and what the name stands for there."""
+"""The occurrences of names in a file: every place of a name, and what the name stands for there."""
 
 from __future__ import annotations
 
