@@ -226,7 +226,7 @@ def default_script(skill: Skill) -> Script:
 
 
 def cascade(rules: Sequence[Rule], script: Script) -> Script:
-    """Return the script as the rules that apply change it; the first one that says a thing counts."""
+    """Return the script after the rules that apply; for each field the first rule that has it counts."""
     for rule in reversed(rules):
         said = {name: value for name in vars(script) if (value := getattr(rule, name)) is not None}
         script = replace(script, **said)

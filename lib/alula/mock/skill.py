@@ -83,7 +83,7 @@ class MockSkill(SkillHooks):
         return choice.script.ending.refuse
 
     def on_dispatch(self, execution: Execution) -> None:
-        """Begin the script that ``validate`` chose: its changes of resources, and its end. Raises MockCrashError where it says so."""
+        """Begin the script that ``validate`` chose: its changes of resources, and its end. Raises MockCrashError where it is to crash."""
         choice = execution.inputs.choice if isinstance(execution.inputs, MockInputs) else self._unattached
         run = self._begin(execution, choice)
         after = self._state.host.after

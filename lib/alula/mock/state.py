@@ -28,7 +28,7 @@ class MockState:
         self._moving: list[Callable[[], None]] = []
         """What brings the memory up to date, called with the lock held."""
         self._held: dict[Place, str] = {}
-        """What faults hold resources at, whatever else is said of them."""
+        """The states at which faults hold resources, whatever else is requested."""
 
     def take(self, states: Mapping[Place, str], reason: str = "") -> None:
         """Put resources into these states by extern transitions, each with this ``reason``."""
