@@ -135,12 +135,12 @@ CODES: Mapping[str, str] = {
 }
 
 PROOF_CODES: Mapping[str, str] = {code: meaning for code, meaning in CODES.items() if code.startswith("ALU5")}
-"""Those of the prover, told in skillsets/PROOFS.md; those of models are in skillsets/LANGUAGE.md."""
+"""Those of the prover, described in skillsets/PROOFS.md; those of models are in skillsets/LANGUAGE.md."""
 
 MISSION_CODES: Mapping[str, str] = {
     code: meaning for code, meaning in CODES.items() if code.startswith("ALU6") or code in {"ALU004", "ALU007", "ALU008", "ALU009"}
 }
-"""Those of missions, told in docs/reference/mission-checks.md."""
+"""Those of missions, described in docs/reference/mission-checks.md."""
 
 RUN_CODES: Mapping[str, str] = {code: meaning for code, meaning in CODES.items() if code.startswith("ALU7")}
-"""Those of all runs of a mission, told in docs/reference/mission-proofs.md."""
+"""Those of all runs of a mission, described in docs/reference/mission-proofs.md."""

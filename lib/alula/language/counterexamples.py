@@ -126,7 +126,7 @@ class CounterexampleStep:
 
 @dataclass(frozen=True)
 class Counterexample:
-    """The steps of a run; ``stops`` tells that nothing more can happen after the last."""
+    """The steps of a run; ``stops``: nothing more can happen after the last."""
 
     steps: tuple[CounterexampleStep, ...] = ()
     stops: bool = False

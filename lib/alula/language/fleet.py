@@ -1,4 +1,4 @@
-"""The models of a robot's folder; those of a fleet are its robots', each under a name that says whose it is."""
+"""The models of a robot's folder; those of a fleet are its robots', each under a name with its robot's as prefix."""
 
 from __future__ import annotations
 

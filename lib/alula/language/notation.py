@@ -32,7 +32,7 @@ _RL_WORDS = frozenset({"guard", "start", "postcondition", "failure"})
 
 
 def notation_of(file: str, text: str) -> Notation:
-    """Return the notation of a file by its suffix, or by its words where the suffix tells nothing."""
+    """Return the notation of a file by its suffix, or by its words where the suffix is none of the notations'."""
     suffix = PurePath(file).suffix.lower()
     return SUFFIXES[suffix] if suffix in SUFFIXES else sniff(tokenize(Source("", text)))
 

@@ -12,7 +12,7 @@ from alula.model.model import NO_EFFECT, Effect, Skillset
 
 
 class NotInThisNotationError(ValueError):
-    """The model holds something that no text says (it was made by hand): it would not read back as it is."""
+    """The model holds something that no text can express (it was made by hand): it would not read back as it is."""
 
 
 _STYLES: Mapping[Notation, Style] = {Notation.PAPER: PAPER, Notation.ROBOT_LANGUAGE: ROBOT_LANGUAGE}

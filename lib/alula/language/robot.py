@@ -34,7 +34,7 @@ class BridgedTopic:
 
 @dataclass(frozen=True)
 class _Served:
-    """What is called across the bridge, with the keys that the bridge has for it; ``server`` says in which world it is answered."""
+    """What is called across the bridge, with the keys that the bridge has for it; ``server`` is the ROS version of its server."""
 
     name: str
     server: World

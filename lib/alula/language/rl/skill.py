@@ -184,7 +184,7 @@ class _SkillReader(SkillReader):
         self.parts.results.append(Result(name.text, kind, effect, body.postcondition, comment, span=cursor.span(name)))
 
     def _free_name(self, stem: str) -> str:
-        """Return a name for what was written without one; `check` tells if another element has it."""
+        """Return a name for what was written without one; `check` reports it if another element has it."""
         self._nameless[stem] += 1
         number = self._nameless[stem]
         return stem if number == 1 else f"{stem}_{number}"
