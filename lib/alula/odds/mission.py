@@ -247,7 +247,7 @@ class MissionSteps:
 
 
 def achieved(skillset: str, skill: Skill) -> Iterator[tuple[str, str]]:
-    """Yield the states that a model says are there after a success of a skill: resource and state."""
+    """Yield the states that a model declares after a success of a skill: resource and state."""
     several = skill.achieves.operands if isinstance(skill.achieves, And) else (skill.achieves,)
     yield from ((f"{skillset}.{one.resource}", one.state) for one in several if isinstance(one, ResourceIs) and not one.negated)
 

@@ -19,7 +19,7 @@ class Kind(Enum):
     NOW = "now"
     """The software takes it, as soon as it can: a tick, a message, an answer of a manager."""
     END = "end"
-    """An execution ends with a result; its skill's figures say when, and how likely with which."""
+    """An execution ends with a result; its skill's figures give the time, and the probability of each result."""
     FAULT = "fault"
     """A fault comes."""
     MENDED = "mended"
@@ -27,7 +27,7 @@ class Kind(Enum):
     WAIT = "wait"
     """The tree has waited long enough: for a time that its file says, or for the progress of a skill."""
     SOON = "soon"
-    """It comes some time, if nothing else does; no figure says when."""
+    """It comes some time, if nothing else does; no figure gives the time."""
     ANY = "any"
     """It may come at any time, or never; no figure is for it."""
 
