@@ -108,7 +108,7 @@ def _port(port: Port) -> str:
 
 
 def _models(files: TreeFiles, trees: Mapping[str, Element]) -> dict[str, Mapping[str, Port]]:
-    """Return the ports of trees that files tell of."""
+    """Return the ports of trees that files declare."""
     names = {TREES.get(name, name): one for name, one in files.models.items() if one.category is Category.SUBTREE}
     return {name: names[name].ports for name in trees if name in names}
 

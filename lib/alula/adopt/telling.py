@@ -9,7 +9,7 @@ from alula.adopt.skillset import in_a_line
 from alula.adopt.vocabulary import Vocabulary
 
 SHOWN = 3
-"""Names of one kind that are told by name."""
+"""Names of one kind that are listed; of more, the number is given."""
 
 
 def names_of_nodes(vocabulary: Vocabulary) -> Iterator[str]:

@@ -65,7 +65,7 @@ class Vocabulary:
     robot: str
     types: Mapping[str, NodeType]
     subtrees: Mapping[str, NodeType]
-    """Of trees, as far as files tell of their ports."""
+    """Of trees, as far as files declare their ports."""
     skills: dict[str, SkillOf] = field(default_factory=dict)
     resources: dict[tuple[str, Arguments], ResourceOf] = field(default_factory=dict)
     stand_ins: dict[str, StandIn] = field(default_factory=dict)
@@ -101,7 +101,7 @@ def arguments(node: Element) -> Arguments:
 
 
 def _is_asked(one: NodeType) -> bool:
-    """Return whether a node is a condition that tells yes or no; one that writes entries, too, has to be a skill."""
+    """Return whether a node is a condition with inputs only; one that writes entries, too, has to be a skill."""
     return one.category is Category.CONDITION and all(port.direction is Direction.INPUT for port in one.ports.values())
 
 
