@@ -13,7 +13,7 @@ DEFAULT_TIME_S = 30.0
 
 
 EVERY_S = 5.0
-"""How often a long search says how far it is."""
+"""How often a long search reports its progress."""
 
 
 class OutOfTimeError(AlulaError):

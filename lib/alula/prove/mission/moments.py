@@ -149,7 +149,7 @@ def numbered(values: Sequence[Hashable], moments: Mapping[int, tuple[str, Moment
 
 
 class Thawing:
-    """Makes the moments of one memory of what they were frozen to; of those that were one, all know what is told of one."""
+    """Makes the moments of one memory from their frozen values; moments that were one share what is known of it."""
 
     def __init__(self, oracle: Oracle) -> None:
         self._oracle = oracle

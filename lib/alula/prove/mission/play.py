@@ -41,7 +41,7 @@ from alula.runtime.local import LocalManagers, LocalWorld
 
 FLIPPED = {"<": ">", "<=": ">=", ">": "<", ">=": "<=", "==": "=="}
 STEP_S = 0.01
-"""Between two ticks; times that the run says are over pass before the tick that sees it."""
+"""Between two ticks; times that are over in the run pass before the tick that sees it."""
 MORE_S = 1e-6
 """A time is over when it has passed; the mission gives up waiting for its begin when more has."""
 
@@ -101,7 +101,7 @@ def _alike(chosen: Question, asked: Question) -> bool:
 
 
 class _Told(MissionClient):
-    """A client to whose mission the run says what is measured."""
+    """A client whose data have the values of the run."""
 
     said: dict[str, object]
     on_start: Callable[[SkillHandle], None]
@@ -125,7 +125,7 @@ class _Player:
         self._held: dict[str, Callable[[], None]] = {}
         self._running: dict[str, Execution] = {}
         self._told: dict[str, float] = {}
-        """The progress that functions tell."""
+        """The progress that functions report."""
         self._arriving: Event | None = None
         """The step by which a request arrives now."""
         self._stays: set[str] = set()
@@ -152,7 +152,7 @@ class _Player:
         self._begun: list[tuple[int, SkillHandle]] = []
         """What leaves have started in this tick."""
         self._said: dict[str, object] = {}
-        """The data that are told, None for one that is not fresh."""
+        """The values of the data, None for one that is not fresh."""
 
         def client(name: str, wake: Callable[[], None]) -> _Told:
             made = _Told(Client(HeldMiddleware(bus, name, self._held), name), wake, record)
@@ -220,7 +220,7 @@ class _Player:
         self._take_to(skillset, self._data[skillset], state)
 
     def _fail(self, event: Event) -> None:
-        """Have fail what models say nothing of."""
+        """Execute an event that no model has: a function raises, or managers die or restart."""
         match event.kind:
             case Kind.FAIL:
                 self._execution(event).fail("as in the counterexample")
@@ -251,7 +251,7 @@ class _Player:
         execution.interrupted()
 
     def _tick(self, event: Event, tick: Callable[[], object]) -> None:
-        """Have the tree ticked, or the mission aborted, when times and data are as the step says."""
+        """Tick the tree, or abort the mission, once times and data are as in the step."""
         over = [float(str(one.question[1])) for one in event.choices if one.question[0] == "time" and one.answer]
         over_s = [one if one == START_TIMEOUT_S else one / 1e9 for one in over]  # the director counts seconds, nodes nanoseconds
         self.world.run_for(max([STEP_S, *(one + MORE_S for one in over_s)]))
@@ -282,7 +282,7 @@ class _Player:
             self._tell_starts(len(self._leaves) - len(more))
 
     def _tell_starts(self, first: int) -> None:
-        """Have leaves, from one on, say when they start; nothing that is played hangs on inputs."""
+        """Make leaves, from one on, record when they start; nothing that is played depends on inputs."""
         for number, node in enumerate(self._leaves[first:], first):
             node.leaf.with_inputs(partial(self._inputs, number))
 
@@ -294,7 +294,7 @@ class _Player:
         self._begun.append((self._starting, handle))
 
     def _tell_data(self, event: Event) -> None:
-        """Tell values that fit what the tick answers about data."""
+        """Set values that fit the answers of the tick about data."""
         values = values_told(of_data(event.choices))
         if values is None:
             raise LeftError("no values of data fit what the counterexample says of them")
@@ -305,7 +305,7 @@ class _Player:
                 self._record.sample(skillset, data, value, None)
 
     def _progress(self, choice: Asked) -> None:
-        """Have a function tell progress that a script answers as the run does; what is told arrives before the tick."""
+        """Make a function report progress that a script answers as in the run; the report arrives before the tick."""
         for leaf, handle in self._handles.items():
             node = self._leaves[leaf]
             if choice.question[:2] != ("compare", progress_of(node.skillset, node.model.name)) or handle.id not in self._running:

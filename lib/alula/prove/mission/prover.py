@@ -26,7 +26,7 @@ from alula.prove.mission.waits import Waits
 from alula.prove.mission.wanted import wanted
 
 LOOKED_AT = Failures(hooks=False, aborts=False)
-"""What the models say can fail, and functions that refuse inputs."""
+"""Failures in the models, and functions that refuse inputs."""
 ALSO = Failures(deaths=True, pauses=True)
 """What is looked at afterwards: hooks that raise, managers' processes that die, an abort and a pause from outside besides."""
 SHARE = 0.5
@@ -119,7 +119,7 @@ class _Search:
         return System.of(self._file, LOOKED_AT, why_any_order=why)
 
     def within(self, deadline: Deadline, given: str) -> _Seen:
-        """Look at what the models say, and at the properties of the file."""
+        """Search the failures in the models, and the properties of the file."""
         try:
             regions, several = self._regions(deadline)
         except (UndecidedError, InputError) as error:

@@ -68,7 +68,7 @@ SYNTAX = (*STATEMENTS, *EXPRESSIONS, *PARTS)
 DECLARED = frozenset(name for name, kind in Node.__annotations__.items() if kind.startswith("ClassVar")) | {"may_end", "never_ticked"}
 """The description of a class's nodes."""
 WORDS = "feedback_message"
-"""What nodes say of themselves, which decides nothing."""
+"""The attribute with a text about a node, which decides nothing."""
 CONSTANT = (type(None), bool, int, float, str, Status, Skipped)
 
 

@@ -40,7 +40,7 @@ class Kind(Enum):
 
 
 class Execution(NamedTuple):
-    """An execution that the tree has asked for and still hangs on.
+    """An execution that the tree has requested and still depends on.
 
     ``leaf`` is the number of its leaf (``System.leaves``), ``phase`` "sent", "running" or "ended", ``asked``: its interruption was asked
     for; ``state`` and ``result`` say how it ended, as a client's handle has them. ``left``: the tree hangs on it no more, but it is to end

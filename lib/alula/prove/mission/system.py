@@ -315,7 +315,7 @@ class System:
 
 
 class _Starting:
-    """Tells the robot which leaf starts; nothing that the search looks at hangs on inputs."""
+    """Sets the leaf that starts in the robot; nothing that the search looks at depends on inputs."""
 
     def __init__(self, robot: Robot, leaf: int) -> None:
         self._robot = robot

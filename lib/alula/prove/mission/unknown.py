@@ -21,7 +21,7 @@ if TYPE_CHECKING:
 LARGE = 2.0**53
 """Bounds of C's numbers are compared with, too; no unknown number is meant to be beyond."""
 COMPARE = "compare"
-"""The kind of questions by which two values are told apart: ``("compare", what, symbol, other)``."""
+"""The kind of questions that distinguish two values: ``("compare", what, symbol, other)``."""
 ORDERS: dict[str, Callable[[str, str], bool]] = {"==": operator.eq, "<": operator.lt, ">": operator.gt}
 
 

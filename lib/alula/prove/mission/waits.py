@@ -96,7 +96,7 @@ class Waits:
     def _never_over(
         self, first: Mapping[State, int], never: set[State], told: set[tuple[int, bool]]
     ) -> Iterator[tuple[Node, list[Event], State, bool]]:
-        """Yield what was not ``told`` yet of the situations after which the mission never ends."""
+        """Yield the situations after which the mission never ends, without those in ``told``."""
         known: set[State] = set()
         for begin in (state for state in first if state in never):
             if begin in known:

@@ -57,7 +57,7 @@ def _lines(system: System, event: Event) -> Iterator[str]:
 
 
 def _failed(event: Event) -> str:
-    """Return what models say nothing of."""
+    """Return an event that no model has in words: a function raises, or managers die or restart."""
     match event.kind:
         case Kind.FAIL:
             return f"{event.skill} fails: its function raises{_changes(event)}{_violated(event, event.leaf)}"

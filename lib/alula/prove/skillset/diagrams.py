@@ -19,7 +19,7 @@ from alula.model.model import Effect, Skillset
 from alula.model.transitions import origins, targets_of
 
 ENDED = "ended"
-"""A variable to tell, where it matters, the steps that end a certain skill."""
+"""A variable that marks, where it matters, the steps that end a certain skill."""
 
 
 @dataclass(frozen=True)

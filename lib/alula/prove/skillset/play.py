@@ -38,7 +38,7 @@ class PlayedStep:
 
 
 class _Function(PlayedFunction):
-    """A function that tells when it was asked for its progress."""
+    """A function that records when its progress was requested last."""
 
     def __init__(self) -> None:
         super().__init__({})

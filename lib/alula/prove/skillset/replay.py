@@ -233,7 +233,7 @@ class Replay:
         return invariant.recovered if fell else invariant.condition
 
     def _broken_at_birth(self, fault: Key) -> Invariant | None:
-        """Return the invariant over data that a fault says is false right after the start."""
+        """Return the invariant over data that is false right after the start by a fault."""
         if not fault or fault[0] != "after start":
             return None
         invariant = self._invariant(fault[1], fault[2])
