@@ -23,7 +23,7 @@ from alula.trees.values import ANY
 WAITING = frozenset({"WaitFor", "Awaits", "Stays"})
 """Nodes that may take more than a tick."""
 TOLD_WITHIN_S = "5"
-"""How long the functional layer has to tell what a skill has brought about, seconds: drivers tell it a moment later."""
+"""How long the functional layer has to report what a skill has brought about, seconds: drivers report it a moment later."""
 
 
 @dataclass(frozen=True)

@@ -21,7 +21,7 @@ from alula.repair.fates import MOST_FAULTS, Fate, Known, fate_of, needs
 from alula.repair.subject import Subject
 
 BOUND, UNREAD = "ALU710", "ALU713"
-"""The findings that say that not all runs were looked at, and that a property can't be read."""
+"""The findings for a search that is not complete, and for a property that can't be read."""
 
 
 @dataclass(frozen=True)

@@ -21,7 +21,7 @@ from alula.trees.node import Node, pointer
 AGAIN_S = "1"
 """How long after a failure a node gets its other chance, seconds."""
 SAFE = "safe"
-"""A mission's input that has this word in its name says where the robot may be left."""
+"""A mission's input that has this word in its name is a place where the robot may be left."""
 MOST_COURSES = 3
 LOOP = "Until"
 """A node that ticks its child again when that has succeeded, unless it is through."""
