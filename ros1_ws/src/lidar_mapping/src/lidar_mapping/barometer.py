@@ -108,7 +108,7 @@ class BarometerZero:
         return (stamp_ns - self._nodes[-1].stamp_ns) / NS >= max(self._settings.stay_s, 0.1 * stayed_s)
 
     def tie(self, stamp_ns: int, keyframe: int, keyframe_up_m: float) -> None:
-        """Tie the height that was heard last to a keyframe's pose, which has the height ``keyframe_up_m`` in the map now."""
+        """Tie the height received last to a keyframe's pose, which has the height ``keyframe_up_m`` in the map now."""
         settings, isotropic = self._settings, gtsam.noiseModel.Isotropic.Sigma
         node = len(self._nodes)
         if node:
@@ -183,7 +183,7 @@ def _rate(node: int) -> int:
 
 
 def _drifting(node: int, passed_s: float, walk: gtsam.noiseModel.Isotropic) -> gtsam.LinearContainerFactor:
-    """Return the factor that says: the zero of a node is that of the node before, and what its rate makes of the time between."""
+    """Return the factor by which the zero of a node is that of the node before, and what its rate makes of the time between."""
     one, at = np.eye(1), gtsam.Values()
     for key in (_zero(node), _zero(node - 1), _rate(node - 1)):
         at.insert(key, 0.0)

@@ -172,7 +172,7 @@ class LidarMapping:
         self._standing.add(reading, self._vehicle.poses)
 
     def _imu_turn(self, frame: str) -> Floats:
-        """Return R_base_imu (3, 3); an IMU of which ``/tf_static`` says nothing is taken to lie in the body's axes."""
+        """Return R_base_imu (3, 3); an IMU that is not in ``/tf_static`` is taken to lie in the body's axes."""
         if frame in {"", BASE_LINK}:
             return np.eye(3)
         try:

@@ -84,7 +84,7 @@ class PoseGraph:
         return self._lean_rad[:2]
 
     def stay(self, keyframes: Keyframes, stamp_ns: int) -> None:
-        """Take the height that the barometer has heard, where the vehicle stays near the last keyframe."""
+        """Add the barometer's last height, where the vehicle stays near the last keyframe."""
         if self.barometer.due(stamp_ns, keyframes.all[-1]):
             self.barometer.tie(stamp_ns, len(keyframes.all) - 1, float(keyframes.all[-1].pose[2, 3]))
 
@@ -116,7 +116,7 @@ class PoseGraph:
         self._path_m.append(0.0)
 
     def _lead_on(self, keyframes: Keyframes, up_m: float) -> None:
-        """Take what the odometry says of the way from the keyframe before."""
+        """Add the odometry's way from the keyframe before."""
         settings, index = self._settings, len(keyframes.all) - 1
         before, pose = keyframes.all[index - 1].pose, keyframes.all[index].pose
         step = np.linalg.inv(before) @ pose
@@ -197,7 +197,7 @@ class PoseGraph:
 
 
 def _leaning(index: int, pose: Floats, up: Floats, noise: gtsam.noiseModel.Isotropic) -> gtsam.LinearContainerFactor:
-    """Return the factor that says: the autopilot's vertical ``up`` (3,), body frame, is that of a keyframe's pose, and the lean.
+    """Return the factor by which the autopilot's vertical ``up`` (3,), body frame, is that of a keyframe's pose, and the lean.
 
     A turn d of the pose about the body's axes, and a lean l, both small, take the vertical v to v - (d + l) x v.
     """

@@ -260,7 +260,7 @@ class LidarInertialOdometry:
         self.filter.correct(linearise)
 
     def _learn_anew(self, autopilot: AutopilotMotion) -> None:
-        """Take the autopilot's attitude for as wrong as the scan says: what was known of its error is over."""
+        """Set the error of the autopilot's attitude by the scan: the earlier estimate is discarded."""
         state, covariance = self.filter.state, self.filter.covariance.copy()
         covariance[AUTOPILOT, :], covariance[:, AUTOPILOT] = 0.0, 0.0
         covariance[AUTOPILOT, AUTOPILOT] = np.diag(self._settings.noise.autopilot_rad**2)

@@ -70,7 +70,7 @@ class Slam:
         self.count = SlamCount()
         self.T_map_odom: Floats = np.eye(4)
         self.gyro_bias: Floats = np.zeros(3)
-        """What the gyro says at rest, (3,) rad/s about the body's axes, as far as it is known when track is taken up."""
+        """The gyro's rates at rest, (3,) rad/s about the body's axes, as far as it is known when track is taken up."""
         self.gyro_bias_rad_s = math.inf
         """How well that is known: a standard deviation; what the settings say of any gyro holds where it is less."""
         self._graph = PoseGraph(settings.graph, settings.odometry.registration)

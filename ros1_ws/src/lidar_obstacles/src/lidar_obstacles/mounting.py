@@ -223,7 +223,7 @@ class MountCheck:
             self._suspected, self._times = set(), 0
 
     def _found(self) -> Finding:
-        """Return what the walls tell, once they have said it often enough: all that it may be, where the motion does not tell it apart."""
+        """Return the finding with the causes that the walls showed: all of them, where the motion does not distinguish them."""
         if self._suspected == {FROZEN}:
             told = "the sweeps do not change with the vehicle's own motion"
             return broken(FaultKind.FROZEN, told, "the LiDAR repeats what it saw", "the vehicle stands and its poses move")

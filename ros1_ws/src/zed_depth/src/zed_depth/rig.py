@@ -125,7 +125,7 @@ class StereoRig:
         self._begin_motion()
 
     def _begin_motion(self) -> None:
-        """Forget what earlier views told, and what was found by it."""
+        """Forget the earlier views, and the findings from them."""
         self._views, self._scale, self._vergence = Views(), ScaleJudge(self._settings.scale), VergenceJudge(VergenceLimits())
 
     def finding(self, pair: StereoPair) -> Finding:

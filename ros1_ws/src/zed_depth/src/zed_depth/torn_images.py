@@ -121,7 +121,7 @@ class Suspect:
     absent: int = 0
 
     def take(self, breaks_off: bool, moved_px: float) -> None:  # noqa: FBT001 -- what a pair tells
-        """Take what a pair tells."""
+        """Store the finding about a pair."""
         if breaks_off:
             self.moved_px += moved_px if self.seen and not self.absent else 0.0
             self.seen += 1

@@ -70,7 +70,7 @@ class VergenceJudge:
 
     @property
     def judged(self) -> bool:
-        """Whether the motion has told enough estimates."""
+        """Whether the motion has given enough estimates."""
         return len(self._estimates) >= self._limits.estimates
 
     def look(self, stamp_ns: int, landmarks: Landmarks, right: Gray, geometry: StereoGeometry, camera_pose: CameraPose) -> bool | None:

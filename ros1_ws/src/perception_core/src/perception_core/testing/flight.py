@@ -170,7 +170,7 @@ class FakeFlight:
             self._wait_for_health()
 
     def _wait_for_health(self) -> None:
-        """Let the node's timers follow the clock: a node that tells its health tells it each tenth of a second."""
+        """Let the node's timers follow the clock: a node that publishes its health does so each tenth of a second."""
         end_s = time.monotonic() + LONGEST_WORK_WALL_S
         while self.health and self.health[-1].header.stamp.to_nsec() <= self.now_ns - HEALTH_NS and time.monotonic() < end_s:
             self._heard.clear()
