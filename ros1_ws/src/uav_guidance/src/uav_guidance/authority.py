@@ -25,7 +25,7 @@ class Authority:
 
     held: bool = False
     mode_told: bool = False
-    """Whether a heartbeat has told the mode since the link holds."""
+    """Whether a heartbeat has had the mode since the link is up."""
     _land_asked: bool = False
     _land_seen: bool = False
     _start_settled: bool = False

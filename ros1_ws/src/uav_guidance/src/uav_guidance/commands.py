@@ -36,7 +36,7 @@ class Evidence:
     """How the vehicle shows that it has done what a command asks for."""
 
     kind: str
-    """The MAVLink message that tells it."""
+    """The MAVLink message that shows it."""
     seen: Callable[[VehicleSnapshot], bool]
     within_s: float = ANSWER_S
     """From the last attempt until it is given up."""
@@ -168,5 +168,5 @@ class Procedure:
         return True
 
     def _heard_s(self, since_ms: int | None) -> float:
-        """Return the autopilot's own time that was heard since then: on a slow machine, what it has sent may wait to be read."""
+        """Return the autopilot's own time that was received since then: on a slow machine, what it has sent may wait to be read."""
         return TEXT_GRACE_S if since_ms is None or self._boot_ms is None else (self._boot_ms - since_ms) / 1e3

@@ -94,7 +94,7 @@ class Follower:
         """Return whether the reference ended on the ground with the motors off; a landing keeps its name after that."""
         if isinstance(self.reference, Land | None) or vehicle.armed or not vehicle.on_ground:
             return False
-        # A heartbeat tells up to a second late that the vehicle is armed: a take-off has ended only if it was so before.
+        # A heartbeat shows up to a second late that the vehicle is armed: a take-off has ended only if it was so before.
         return self._seen_armed or not isinstance(self.reference, Takeoff)
 
     def step(self, vehicle: VehicleSnapshot, now_s: float, *, commanded: bool) -> Setpoint | None:

@@ -57,7 +57,7 @@ class GuidanceStatus:
 
     vehicle: VehicleSnapshot
     link: bool
-    """Whether the vehicle's mode counts: a heartbeat has told it since the link holds."""
+    """Whether the vehicle's mode counts: a heartbeat has had it since the link is up."""
     authority: bool
     reference_id: int
     course: Course
@@ -68,7 +68,7 @@ class Guidance:
 
     def __init__(self, settings: GuidanceSettings) -> None:
         self.odometry = VehicleSnapshot()
-        """As the autopilot says, in `odom`."""
+        """The autopilot's own, in `odom`."""
         self._in_map: VehicleSnapshot | None = None
         self._settings = settings
         self._localization = Localization(settings)
@@ -293,7 +293,7 @@ class Guidance:
         require(self.vehicle.off_ground, "the autopilot has not said whether it is in the air")
         require(self.vehicle.located, "the autopilot does not say where it is")
         if isinstance(self._follower.reference, Land):
-            # A late request would lift a vehicle that is touching down, for the autopilot tells of the ground seconds later.
+            # A late request would lift a vehicle that is touching down, for the autopilot reports the ground seconds later.
             height_m = above_home_m(self.vehicle)
             require(height_m > LOW_M, f"it is landing, {height_m:.1f} m above home: a landing is not broken off so low")
         return self._accept(Hold(self._settings), self._to_guided(), now_s)
@@ -474,7 +474,7 @@ class Guidance:
             self._follower.take(None, self.vehicle, now_s)
 
     def _stop_motors(self, now_s: float) -> None:
-        """Disarm a vehicle that stands on the ground in a landing of ours that does not end; one that lies higher is only told of.
+        """Disarm a vehicle that stands on the ground in a landing of ours that does not end; one that lies higher is only reported.
 
         First as any client may, then by force, for the autopilot takes it for flying.
         """

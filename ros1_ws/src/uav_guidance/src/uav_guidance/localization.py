@@ -82,7 +82,7 @@ class Localization:
         self._begun = False
         self._stepped_s: float | None = None
         self._above_m = self._level_m = self._begun_m = 0.0
-        """The map's height above the autopilot's, as told last, what of it has been followed for good, and what it was when that began."""
+        """The map's height above the autopilot's as received last, how much was followed for good, and what it was when that began."""
 
     def tune(self, settings: GuidanceSettings) -> None:
         """Set other settings."""

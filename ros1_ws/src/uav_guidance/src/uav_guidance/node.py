@@ -266,7 +266,7 @@ class GuidanceNode:
             self._done.done(stepped_ns)
 
     def _advance(self) -> None:
-        """Step the guidance to now and send what it says."""
+        """Step the guidance to now and send its output."""
         for item in self._guidance.step(_now_s()):
             self._link.send(setpoint_message(item) if isinstance(item, Setpoint) else command_message(item))
         for note in self._guidance.take_notes():

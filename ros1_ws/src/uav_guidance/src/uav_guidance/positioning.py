@@ -18,7 +18,7 @@ class Positioning:
 
     def __init__(self) -> None:
         self.known: bool | None = None
-        """None: the autopilot has said nothing of it."""
+        """None: the autopilot has not reported it."""
         self.reason = ""
         """Why it is not known: what was found first."""
         self._fix_s: float | None = None

@@ -123,12 +123,12 @@ class VehicleSnapshot:
     """How often the autopilot was seen to start, the first time included."""
     place_s: float = -math.inf
     attitude_s: float = -math.inf
-    """When place and attitude were told last, seconds of the mission clock, as ``heartbeat_s``."""
+    """When place and attitude were received last, seconds of the mission clock, as ``heartbeat_s``."""
     gps_s: float = -math.inf
     fix_s: float | None = None
-    """When the GPS was told of last, and when with a fix in three dimensions; None: never with one."""
+    """When the GPS was reported last, and when with a fix in three dimensions; None: never with one."""
     estimator_flags: int | None = None
-    """EKF_STATUS_FLAGS, what the autopilot's estimator knows; None: not told."""
+    """EKF_STATUS_FLAGS of the autopilot's estimator; None: not received."""
     position_enu_m: Vec3 | None = None
     velocity_enu_m_s: Vec3 = ZERO
     quat_xyzw: Quaternion | None = None
@@ -209,7 +209,7 @@ def _estimator(vehicle: VehicleSnapshot, message: Any, _now_s: float) -> Vehicle
 
 
 def _of_this_boot(vehicle: VehicleSnapshot, message: Any) -> VehicleSnapshot:
-    """Forget what was said before a restart; the attitude shows it at once, a position comes half a minute later."""
+    """Forget what was received before a restart; the attitude shows it at once, a position comes half a minute later."""
     if message.time_boot_ms + REBOOT_MS >= max(vehicle.boot_ms, vehicle.attitude_boot_ms):
         return vehicle
     fresh = VehicleSnapshot(heartbeat_s=vehicle.heartbeat_s, foreign=vehicle.foreign, critical=vehicle.critical)
