@@ -29,9 +29,9 @@ from uav_report.world import TrueSurfaces
 
 RADIO = "radio"
 SAME_MOMENT_S = 1.0
-"""The radio tells its state twice a second: a fault of it and what it says of it are no farther apart."""
+"""The radio publishes its state twice a second: a fault of it and its next state are no farther apart."""
 UNHEARD_S = 2.0
-"""A guidance that says nothing for so long before the end has died: nobody knows where the vehicle is then."""
+"""A guidance that is silent for so long before the end has died: nobody knows where the vehicle is then."""
 MOVING_M_S = 0.2
 
 
@@ -118,7 +118,7 @@ class FlightReport:
         phases, resting, place = self._phases, self._truth.resting, home()
         if not phases.lifted_off:
             return None
-        # A recording that broke off before the lift-off tells of a vehicle that had not flown yet.
+        # A recording that broke off before the lift-off has a vehicle that had not flown yet.
         said = [state.landed_state == ON_GROUND for state in self._recording.guidance[-1:] if state.t_s > phases.zero_s]
         said += [place is not None and change.to_state == place[1] for change in status_changes(self._run.history)[-1:]]
         if not said or resting is None:

@@ -109,7 +109,7 @@ class Recording:
     map_points: int | None = None
     health: tuple[HealthChange, ...] = ()
     told: tuple[tuple[float, str], ...] = ()
-    """What autopilot and guidance told a person, ``who: words``, each with its absolute seconds; what comes again within 10 s once."""
+    """Texts of autopilot and guidance for people, ``who: words``, each with its absolute seconds; what comes again within 10 s once."""
 
     @property
     def last_s(self) -> float:
