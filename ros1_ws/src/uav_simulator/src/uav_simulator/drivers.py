@@ -1,4 +1,4 @@
-"""The sensors' drivers on ROS: measure when a measurement is due and has subscribers, publish as the sensor's mode says."""
+"""The sensors' drivers on ROS: measure when a measurement is due and has subscribers, publish by the sensor's mode."""
 
 from __future__ import annotations
 
@@ -200,6 +200,6 @@ class Drivers:
 
     def _publish(self, sensor: str, mode: SensorMode, measurement: Measurement) -> None:
         measurement.publish()
-        # A node that rightly refuses a stamp of the future never says that it is done, so time does not wait for it.
+        # A node that rightly refuses a stamp of the future never reports that it is done, so time does not wait for it.
         if mode is not SensorMode.FUTURE:
             self._measured(sensor, measurement.taken_ns * 1e-9, self._simulation.now_s)

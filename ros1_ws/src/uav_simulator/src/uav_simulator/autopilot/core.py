@@ -370,7 +370,7 @@ class Autopilot:
             self.set_mode(Mode.BRAKE if self.params["FENCE_ACTION"] == FENCE_BRAKE else Mode.RTL)
 
     def _follow_sticks(self) -> None:
-        """Fly as the ground station's sticks say, and stop when they are centred, or were not heard of for too long."""
+        """Fly by the ground station's sticks, and stop when they are centred, or were not received for too long."""
         stick, nav = self._sticks.at(self.now_s), self._navigator
         turning_rad_s = self._sticks.turn_rad_s(stick) if self.mode in {*STEERED, Mode.GUIDED} else 0.0
         if turning_rad_s != self._turning_rad_s:
