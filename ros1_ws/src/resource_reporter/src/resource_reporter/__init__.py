@@ -1,4 +1,4 @@
-"""Extern transitions: the functional layer says which state a resource has, this package sees to it that the skillset knows.
+"""Extern transitions: the functional layer reports which state a resource has, this package brings the report to the skillset.
 
 Also: what the functional layer is told by services, as messages (``ToldService``), how far a node has come (``DoneReporter``), and that its
 messages are sent without waking a thread for each (``send_directly``). For nodes beside it: calls of services that end in time

@@ -57,7 +57,7 @@ class Ledger:
         if entry is None or (entry.state, entry.insist) != (state, insist):
             self._wanted[resource] = _Entry(state, reason, insist)
             return True
-        # A reason that changes often must not be told more often than calls are repeated.
+        # A reason that changes often must not be reported more often than calls are repeated.
         news, entry.reason = entry.reason != reason, reason
         return news
 

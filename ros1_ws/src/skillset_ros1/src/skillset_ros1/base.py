@@ -35,7 +35,7 @@ class RospyBase:
         self.loop = Loop(what, self._raised)
         self.waiter: Waiter = self.loop
         self.server = ""
-        """The node of the managers, as a client has heard of it."""
+        """The node of the managers, from a client's last heartbeat."""
         self._skillset = skillset
         self._place = place
         self._workers = Workers(f"{skillset}_hooks", self.log)

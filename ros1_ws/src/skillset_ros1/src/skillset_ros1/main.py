@@ -38,7 +38,7 @@ def run_skillset(
     except SkillRuntimeError as error:
         sys.stderr.write(f"{error}\n")
         sys.exit(REFUSED)
-    # Our own handlers: rospy's would close the connections before the callers were told.
+    # Our own handlers: rospy's would close the connections before the callers had their results.
     rospy.init_node(skillset.name, disable_signals=True)
     for number in (signal.SIGINT, signal.SIGTERM):
         signal.signal(number, on_signal)

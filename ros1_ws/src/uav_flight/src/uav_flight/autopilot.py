@@ -1,4 +1,4 @@
-"""A real autopilot: how it is reached, checked before anything starts; and how ArduPilot's simulator is told to fly our body."""
+"""A real autopilot: how it is reached, checked before anything starts; and how ArduPilot's simulator is configured to fly our body."""
 
 from __future__ import annotations
 

@@ -63,7 +63,7 @@ class BagHost:
     def __init__(self, name: str, outputs: Sequence[Output], initial: Mapping[str, str], timeline: Timeline, publish: Publish) -> None:
         self._name, self._initial, self._timeline, self._publish = name, initial, timeline, publish
         self.topics = {self._resolved(output.topic) for output in outputs if not output.shared}
-        """Topics on which the core alone says something."""
+        """Topics that the core alone publishes."""
         self._shown: dict[str, tuple[str, str]] = {}
         self._waiting: list[Callable[[], None]] = []
         self._busy = False

@@ -143,7 +143,7 @@ class Perceiving:
         return self._part.ways[sensor][failing](Arrival(topic, message, now_ns, self._last.get(topic), self._rng))
 
     def _say(self, topic: str, message: Any) -> None:
-        """Write what a core says, and have the cores hear it that listen to it, once this one is done."""
+        """Write a core's message, and pass it to the cores that subscribe to it, once this one is done."""
         self.publish(topic, message)
         if topic in self._inputs:
             wire = BytesIO()
