@@ -66,8 +66,8 @@ SIZES = {
     "docs/start": 6_000,
     "docs/reference/performance.md": 22_500,
     "docs/reference/robots.md": 10_500,
-    "docs/reference/mocks.md": 7_600,
-    "docs/reference/bridge.md": 10_300,
+    "docs/reference/mocks.md": 7_000,
+    "docs/reference/bridge.md": 9_600,
     "docs/concepts": 8_400,
 }
 """How many bytes a page may have: of a task, which is read whole, and of a reference that was made shorter."""
