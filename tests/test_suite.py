@@ -140,7 +140,8 @@ def test_an_expression_that_is_called_as_a_folder_is_selects_tests_and_no_part()
 
 PLACES = {
     "ROS 1 world": "flight/test/test_members.py",
-    "ROS 2 world": "bridge/ros_bridge/test/test_ros_bridge_layout.py",
+    "ROS 2 world": "ros2_ws/src/skill_panel/test/test_skill_panel_view.py",
+    "bridge": "bridge/ros_bridge/test/test_ros_bridge_layout.py",
     "across the rooms": "tests/test_manifests.py",
     "builds and Pythons": "tests/test_pythons.py",
     "early ends and the rover": "tests/test_endings.py",

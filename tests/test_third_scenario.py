@@ -76,6 +76,7 @@ def test_the_scenario_of_the_page_flies_over_mocks(checkout: Path, tmp_path: Pat
 
 
 def test_its_launch_file_starts_what_every_flight_needs(checkout: Path, tmp_path: Path) -> None:
-    listed = run(checkout, "setup/in_ros1", "roslaunch", "--nodes", "uav_bringup", "patrol.launch", f"out:={tmp_path}")
+    launch = "ros1_ws/src/uav_bringup/launch/patrol.launch"  # by its path: the workspace that is shared has the packages it was built of
+    listed = run(checkout, "setup/in_ros1", "roslaunch", "--nodes", launch, f"out:={tmp_path}")
     assert listed.returncode == 0, listed.stderr
     assert {"/uav_simulator", "/uav_guidance"} <= set(listed.stdout.split())
