@@ -84,14 +84,12 @@ def do(command: Command, words: Sequence[str], robot: Path | None, here: Checkou
         return 0
     if command.robot and robot is None:
         raise WordsError(f"there is no {ROBOT_FILE} in {Path.cwd()} or above; name the robot's folder with {OPTION} DIR, or {MAKE_ONE}")
+    if here is None and not command.module:
+        raise WordsError(f"{command.name}: {command.elsewhere}")
     why = next((why for name in deployments_in(command, words) if robot and (why := why_no_deployment(name, robot))), "")
     if why:
         raise WordsError(why)
-    if here is not None:
-        return here.do(command, words)
-    if not command.module:
-        raise WordsError(f"{command.name}: {command.elsewhere}")
-    return run_module(command, words)
+    return here.do(command, words) if here is not None else run_module(command, words)
 
 
 def deployments_in(command: Command, words: Sequence[str]) -> list[str]:

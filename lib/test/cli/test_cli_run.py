@@ -48,7 +48,7 @@ WRONG = (
     ("robot.yaml", "departure: bot.wheels FRE", "robot.yaml: `departure`: the resource `wheels` has no state `FRE`; did you mean `FREE`?"),
     ("scenarios/patrol.yaml", "fallback: drivee", "patrol.yaml: `fallback`: the robot has no skill `drivee`; did you mean `drive`?"),
     ("scenarios/patrol.yaml", "motion: [bot.drive, dirve]", "patrol.yaml: `motion`: the robot has no skill `dirve`; did you mean `drive`?"),
-    ("missions/patrol.xml", "", "missions/patrol.xml:39:"),
+    ("missions/patrol.xml", "", "missions/patrol.xml:40:"),
     ("skillsets/types.yaml", "Goal: geometry_msgs/PoseStampd", "geometry_msgs has no message `PoseStampd`"),
 )
 
