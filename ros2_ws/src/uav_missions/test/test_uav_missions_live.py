@@ -272,6 +272,10 @@ def test_the_first_heartbeat_comes_while_the_clock_stands_still(whole_rig, tmp_p
         mission = Mission(whole_rig, tmp_path / "run")
         try:
             until(mission.has_told, "a heartbeat", 120.0)
+            # Told to end and not killed: what is dead leaves its port of shared memory, and this process would write to that for some time,
+            # not to the next process that takes the port's number.
+            mission.process.terminate()
+            assert mission.exit_code() == 1
         finally:
             mission.close()
 
