@@ -13,6 +13,7 @@ from typing import Any
 import pytest
 from key_tables import COMMAND, pages
 
+from alula.common.generated import MARK
 from alula_testing.waits import until
 from manual_site import contents
 from manual_site.sizes import lines, size_of, sizes
@@ -87,7 +88,6 @@ def test_a_page_is_no_longer_than_it_may_be(name: str) -> None:
     assert (ALULA_ROOT / name).stat().st_size <= limit
 
 
-WRITTEN = "<!-- Below this line"
 MOST_COLUMNS = 120
 UNFOLDED = ("|", "#", "!", "<", "    ")
 """Tables, headings, pictures, comments and code have one line each."""
@@ -96,7 +96,7 @@ UNFOLDED = ("|", "#", "!", "<", "    ")
 def too_long(text: str) -> list[int]:
     """Return the numbers of the lines, written by hand and to be folded, that are longer than an editor beside another one shows."""
     fenced, found = False, []
-    for number, line in enumerate(text.partition(WRITTEN)[0].splitlines(), start=1):
+    for number, line in enumerate(text.partition(MARK)[0].splitlines(), start=1):
         fenced ^= line.startswith("```")
         if len(line) > MOST_COLUMNS and not fenced and not line.startswith(UNFOLDED):
             found.append(number)
@@ -110,7 +110,7 @@ def test_lines_of_a_page_are_folded(name: str) -> None:
 
 def test_a_line_that_is_not_folded_is_found() -> None:
     long = "word " * 30
-    assert too_long(f"a\n{long}\n| {long}\n```\n{long}\n```\n- {long}\n{WRITTEN}: x -->\n{long}") == [2, 7]
+    assert too_long(f"a\n{long}\n| {long}\n```\n{long}\n```\n- {long}\n{MARK} x -->\n{long}") == [2, 7]
 
 
 def test_the_pages_are_counted_apart_from_what_programs_write() -> None:

@@ -1,4 +1,4 @@
-"""Writes the findings of docs/reference/mission-checks.md: what stands below the line that begins with MARK.
+"""Writes the findings of docs/reference/mission-checks.md: the part below its mark.
 
 python -m finding_pages.mission_checks docs/reference
 """
@@ -11,13 +11,13 @@ from pathlib import Path
 
 from alula.check.findings import findings_of
 from alula.common.files import write_text
+from alula.common.generated import replaced
 from alula.language.codes import MISSION_CODES
 from alula.language.errors import Diagnostic
 from alula.language.models import ModelFile, check_texts
 from finding_pages.examples import MISSIONS, Example, examples
 
 NAME = "mission-checks.md"
-MARK = "<!-- Below this line: written by"
 ROBOT = """
 skillset drone {
   resource axes { state { FREE USED } initial FREE transition { FREE -> USED USED -> FREE } }
@@ -58,11 +58,9 @@ def main() -> int:
 
 def page(text: str) -> str:
     """Return the page with its findings replaced."""
-    above, _, _ = text.partition(MARK)
     known = examples(MISSIONS)
     sections = (line for code, meaning in MISSION_CODES.items() for line in _section(code, meaning, known[code]))
-    head = f"{MARK} `python -m finding_pages.mission_checks docs/reference`, from the rules and their examples. -->"
-    return "\n".join([f"{above}{head}\n", *sections])
+    return replaced(text, "python -m finding_pages.mission_checks docs/reference", "the rules and their examples", sections)
 
 
 def _section(code: str, meaning: str, example: Example) -> Iterator[str]:

@@ -1,4 +1,4 @@
-"""Writes the findings of docs/reference/mission-proofs.md: what stands below the line that begins with MARK.
+"""Writes the findings of docs/reference/mission-proofs.md: the part below its mark.
 
 python -m finding_pages.mission_proofs docs/reference
 """
@@ -11,6 +11,7 @@ from collections.abc import Iterator
 from pathlib import Path
 
 from alula.common.files import write_text
+from alula.common.generated import replaced
 from alula.language.codes import RUN_CODES
 from alula.language.errors import Diagnostic
 from alula.language.models import ModelFile, check_texts
@@ -21,7 +22,6 @@ from finding_pages.examples import RUNS, Example, examples
 from finding_pages.mission_checks import whole
 
 NAME = "mission-proofs.md"
-MARK = "<!-- Below this line: written by"
 ROBOT = """
 skillset drone {
   resource control { state { OURS THEIRS } initial OURS transition { extern OURS -> THEIRS  extern THEIRS -> OURS } }
@@ -67,11 +67,9 @@ def main() -> int:
 
 def page(text: str) -> str:
     """Return the page with its findings replaced."""
-    above, _, _ = text.partition(MARK)
     known = examples(RUNS)
     sections = (line for code, meaning in RUN_CODES.items() for line in _section(code, meaning, known[code]))
-    mark = f"{MARK} `python -m finding_pages.mission_proofs docs/reference`, from the rules and their examples. -->\n"
-    return "\n".join([above + mark, *sections])
+    return replaced(text, "python -m finding_pages.mission_proofs docs/reference", "the rules and their examples", sections)
 
 
 def found_in(text: str) -> list[Diagnostic]:

@@ -1,4 +1,4 @@
-"""Writes the findings of `skillsets/LANGUAGE.md` and `skillsets/PROOFS.md`: what stands below the line that begins with MARK.
+"""Writes the findings of `skillsets/LANGUAGE.md` and `skillsets/PROOFS.md`: the part below its mark.
 
     python -m finding_pages.skillsets skillsets
 
@@ -14,13 +14,12 @@ from collections.abc import Callable, Iterator, Mapping
 from pathlib import Path
 
 from alula.common.files import write_text
+from alula.common.generated import replaced
 from alula.language.codes import CODES, PROOF_CODES
 from alula.language.errors import Diagnostic
 from alula.language.models import ModelFile, check_texts
 from alula.prove.skillset.prover import prove
 from finding_pages.examples import LANGUAGE, PROOFS, Example, examples
-
-MARK = "<!-- Below this line: written by"
 
 
 def main() -> int:
@@ -33,8 +32,7 @@ def main() -> int:
 
 def page(text: str, findings: str) -> str:
     """Return a page with its findings replaced."""
-    above, _, _ = text.partition(MARK)
-    return f"{above}{MARK} `python -m finding_pages.skillsets skillsets`, from the rules and their examples. -->\n\n{findings}"
+    return replaced(text, "python -m finding_pages.skillsets skillsets", "the rules and their examples", findings.splitlines())
 
 
 def language_findings() -> str:

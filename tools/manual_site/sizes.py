@@ -13,8 +13,10 @@ from collections.abc import Iterator
 from dataclasses import dataclass
 from pathlib import Path
 
+from alula.common.generated import MARK
+
 ALULA_ROOT = Path(__file__).resolve().parents[2]
-MARKS = "<!-- Below this line: written by", "<!-- Written by"
+MARKS = MARK, "<!-- Written by"
 """What a program writes stands below one of these."""
 APART = "docs/experiments/"
 NO_PAGES = ".github/", "CHANGELOG.md"

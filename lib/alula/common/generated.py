@@ -15,7 +15,7 @@ MARK = "<!-- Below this line: written by"
 def replaced(text: str, command: str, source: str, lines: Iterable[str]) -> str:
     """Return a page whose generated part is these lines; ``command`` writes it from ``source``."""
     above, _, _ = text.partition(MARK)
-    return "\n".join([f"{above}{MARK} `{command}`, from {source}. -->", "", *lines, ""])
+    return "\n".join([f"{above}{MARK} `{command}`, from {source}. -->", "", *lines]).rstrip() + "\n"
 
 
 def table(*rows: tuple[str, ...]) -> Iterator[str]:

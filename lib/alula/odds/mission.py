@@ -42,7 +42,7 @@ TIME, PROGRESS = "time", "the progress of "
 """How the search asks whether a time is over, and whether the progress of a skill is large enough."""
 SECOND_NS = 1e9
 MOST_KNOWN = 1 << 14
-"""Situations of which it is kept what the system can do there."""
+"""Situations of which it is kept what can happen there."""
 
 
 class Place(NamedTuple):
@@ -86,6 +86,8 @@ class MissionSteps:
         self._actions = actions(system.nodes)
         self._moves = lru_cache(maxsize=MOST_KNOWN)(lambda state: tuple(system.steps(state)))
         """What the system can do in a situation: it is the same whichever faults are there, and asked for by each of them."""
+        self.steps_at = lru_cache(maxsize=MOST_KNOWN)(lambda place: tuple(self.steps(place)))
+        """`steps`, kept for whoever looks at the same situations for several faults."""
         self._never_comes = lru_cache(maxsize=MOST_KNOWN)(self._never)
 
     def initial(self) -> list[Place]:

@@ -27,8 +27,6 @@ from alula.prove.limits import Deadline
 from alula.prove.mission.state import Kind as Happens
 
 GOOD = frozenset({Outcome.ACCOMPLISHED, Outcome.DEGRADED})
-Known = dict[Place, tuple[Step[Place], ...]]
-"""What can happen, by the situation."""
 MOST_FAULTS = 2
 """How often a fault strikes that ends skills, or comes again once a skill has taken its state away, unless more is asked for."""
 
@@ -128,17 +126,15 @@ def fate_of(
     goal: Expression | None = None,
     strikes: int = MOST_FAULTS,
     reached: Expression | None = None,
-    known: Known | None = None,
 ) -> Fate | None:
     """Return the fate; None: more than ``most`` situations. ``rest`` are states of resources, in one of which each robot is safe.
 
     With a ``goal``, a mission survives, too, when it comes to be true after the faults; what has to be ``reached`` is true at a good end.
-    Faults strike ``strikes`` times. What can happen in a situation is kept in ``known``, for other faults of the same mission.
+    Faults strike ``strikes`` times.
 
     Raises OutOfTimeError.
     """
     ends = _Ends.of(skillsets)
-    can_happen = _can_happen(steps, {} if known is None else known)
 
     def is_good(here: Here) -> bool:
         accomplished = steps.outcome(here.place) in GOOD and (reached is None or steps.holds(here.place, reached))
@@ -146,7 +142,7 @@ def fate_of(
 
     def following(here: Here) -> list[tuple[Step[Place], Here]]:
         deadline.check()
-        return [] if steps.outcome(here.place) is not None else _following(steps, can_happen(here.place), here, faults, ends, strikes)
+        return [] if steps.outcome(here.place) is not None else _following(steps, here, faults, ends, strikes)
 
     graph = _Graph([Here(place) for place in steps.initial()], following)
     if not graph.explore(lambda here, step: steps.comes_later(here.place, step.name), most):
@@ -168,16 +164,6 @@ def fate_of(
     chosen = () if lost is None or before is None else steps.chosen(before.place, lost.place)
     again = any(one.struck or one.away for one in graph.ways.found)
     return Fate(tuple(faults), outcomes, lost is None, safe, run, states, len(graph.ways.found), assuming, refused, chosen, again)
-
-
-def _can_happen(steps: MissionSteps, known: Known) -> Callable[[Place], Sequence[Step[Place]]]:
-    def can_happen(place: Place) -> Sequence[Step[Place]]:
-        found = known.get(place)
-        if found is None:
-            found = known[place] = tuple(steps.steps(place))
-        return found
-
-    return can_happen
 
 
 def _refused(
@@ -251,29 +237,22 @@ def needs(steps: MissionSteps, skillsets: Sequence[Skillset], skill: str, deadli
 
     def following(here: Here) -> Iterator[tuple[Step[Place], Here]]:
         deadline.check()
-        several = _following(steps, list(steps.steps(here.place)), here, (), ends, 0, also_failing=True)
-        return (one for one in several if skill not in one[0].uses)
+        return (one for one in _following(steps, here, (), ends, 0, also_failing=True) if skill not in one[0].uses)
 
     without = ShortestWays((Here(place) for place in steps.initial()), following)
     return not any(steps.outcome(here.place) in GOOD for here in without)
 
 
 def _following(
-    steps: MissionSteps,
-    several: Sequence[Step[Place]],
-    here: Here,
-    faults: Sequence[str],
-    ends: _Ends,
-    strikes: int,
-    *,
-    also_failing: bool = False,
+    steps: MissionSteps, here: Here, faults: Sequence[str], ends: _Ends, strikes: int, *, also_failing: bool = False
 ) -> list[tuple[Step[Place], Here]]:
-    """Return which of ``several`` steps are taken; while the software is at work, nothing but a fault comes between.
+    """Return the steps that are taken; while the software is at work, nothing but a fault comes between.
 
     ``also_failing``: what may fail though no fault says so, fails, too.
     """
     place = here.place
     found: list[tuple[Step[Place], Here]] = []
+    several = steps.steps_at(place)
     can_start = {step.name for step in several if step.uses and step.kind is Kind.NOW}
     for step in (one for one in several if not _is_left_out(one, ends, also_failing=also_failing)):
         there = here._replace(place=step.target)

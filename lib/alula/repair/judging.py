@@ -17,7 +17,7 @@ from alula.prove.mission.prover import Proved, prove_within
 from alula.prove.mission.run import MissionRun
 from alula.prove.mission.system import System
 from alula.repair.errors import RepairError
-from alula.repair.fates import MOST_FAULTS, Fate, Known, fate_of, needs
+from alula.repair.fates import MOST_FAULTS, Fate, fate_of, needs
 from alula.repair.subject import Subject
 
 BOUND, UNREAD = "ALU710", "ALU713"
@@ -140,13 +140,13 @@ class Judge:
 
     def fates(self, text: str) -> Callable[[Sequence[str], int | None], Fate | None]:
         """Return a function from faults and a limit of situations to the fate of a text; for several faults it is faster than ``fate``."""
-        steps, known = self._steps(text), Known()
+        steps = self._steps(text)
 
         def fate(faults: Sequence[str], most: int | None) -> Fate | None:
             self._deadline.doing = f"looking at the runs with {' and then '.join(faults) or 'no fault'}"
             subject = self._subject
             rest, skillsets = subject.at_rest, subject.skillsets
-            return fate_of(steps, skillsets, faults, self._deadline, rest, most, self._goal, self._strikes, self._reached, known)
+            return fate_of(steps, skillsets, faults, self._deadline, rest, most, self._goal, self._strikes, self._reached)
 
         return fate
 
