@@ -34,8 +34,9 @@ from alula_testing.waits import until
 NOWHERE = "02:00:00:00:00:fe"
 """A hardware address that no computer has."""
 
-PROGRAMS = ("ip", "nsenter", "unshare", "setpriv")
-HOLD = "mount --bind $1 /etc/hosts && ip link set lo up && echo ready && exec sleep infinity"
+PROGRAMS = ("ip", "mount", "nsenter", "unshare", "setpriv")
+HOLD = "mount --bind $1 /etc/hosts && mount -t tmpfs shm /dev/shm && ip link set lo up && echo ready && exec sleep infinity"
+"""A computer has shared memory of its own, too: DDS names what lies there by the domain, which others on this machine may have as well."""
 BAD_CABLE = Path(__file__).with_name("bad_cable.py")
 SEE_HOSTS = 'mount --bind $0 /etc/hosts && exec "$@"'
 _numbers = itertools.count(1)

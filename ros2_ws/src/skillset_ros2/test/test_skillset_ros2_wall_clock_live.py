@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import os
 import signal
 import subprocess
 import sys
@@ -14,10 +15,16 @@ import pytest
 rclpy = pytest.importorskip("rclpy")
 pytest.importorskip("navigation_interfaces.action")
 
+from rclpy.context import Context  # noqa: E402
+from rclpy.executors import SingleThreadedExecutor  # noqa: E402
 from rclpy.node import Node  # noqa: E402
 from skillset_interfaces.msg import Heartbeat  # noqa: E402
 from skillset_ros2_rig import READY_S, until  # noqa: E402
+from std_srvs.srv import Trigger  # noqa: E402
 
+from alula.common.fast_dds import PROFILE_VARIABLES, leave  # noqa: E402
+from alula.common.network import claim_domain  # noqa: E402
+from alula.common.shared_memory import SWEPT_AFTER_S, sweep_shared_memory  # noqa: E402
 from alula.common.steady_clock import STEADY_CLOCK  # noqa: E402
 from alula.model.execution_state import ExecutionState  # noqa: E402
 from alula.runtime.codecs import stamp_ns_of  # noqa: E402
@@ -31,13 +38,25 @@ STEPS = {"forward": HOUR_S, "back": -HOUR_S}
 S = ExecutionState
 
 
+WORDS = [sys.executable, str(Path(__file__).with_name("skillset_ros2_stepped.py"))]
+
+
+def without_shared_memory(folder: Path) -> dict[str, str]:
+    """Return the variables of a process that leaves no times of its clock in the shared memory of this one's participant."""
+    usual = Path(os.environ[PROFILE_VARIABLES[0]]).read_text(encoding="utf-8")
+    profile = folder / "udp.xml"
+    profile.write_text(usual.replace("<transport_id>alula_shm</transport_id>\n          <", "<"), encoding="utf-8")
+    return dict.fromkeys(PROFILE_VARIABLES, str(profile))
+
+
 class Stepped:
     """The managers' process, what it says, and a client on another clock."""
 
     def __init__(self, spinning, folder: Path) -> None:
         self.clock = WallClock(folder)
-        words = [sys.executable, str(Path(__file__).with_name("skillset_ros2_stepped.py")), "--ros-args", "-p", "interrupt_timeout_s:=2.0"]
-        self.process = subprocess.Popen(words, env=self.clock.environment, stdout=subprocess.PIPE, text=True)
+        words = [*WORDS, "--ros-args", "-p", "interrupt_timeout_s:=2.0"]
+        environment = {**self.clock.environment, **without_shared_memory(folder)}
+        self.process = subprocess.Popen(words, env=environment, stdout=subprocess.PIPE, text=True)
         self.told: list[str] = []
         self.reader = threading.Thread(target=lambda: self.told.extend(map(str.strip, self.process.stdout)), daemon=True)
         self.reader.start()
@@ -117,3 +136,51 @@ def test_a_silence_that_has_begun_is_noticed_when_the_clock_is_set_meanwhile(ste
     stepped.clock.step(by_s)
     assert handle.wait(LONG_S)
     assert handle.outcome == "RESOURCE_INVARIANT_VIOLATED"
+
+
+SERVER = """
+import rclpy
+from std_srvs.srv import Trigger
+rclpy.init()
+node = rclpy.create_node("server")
+node.create_service(Trigger, "reach", lambda request, answer: answer)
+rclpy.spin(node)
+"""
+
+
+@pytest.fixture
+def survivor():
+    """Return a node in a context and a domain of its own."""
+    claim = claim_domain()
+    context = Context()
+    rclpy.init(context=context, domain_id=claim.domain)
+    node = Node("survivor", context=context)
+    yield node
+    leave(node)
+    claim.release()
+
+
+def test_after_a_clock_was_set_back_who_is_started_for_one_that_was_killed_is_reached(survivor, tmp_path):
+    executor = SingleThreadedExecutor(context=survivor.context)
+    executor.add_node(survivor)
+    client = survivor.create_client(Trigger, "reach")
+    environment = {**os.environ, "ROS_DOMAIN_ID": str(survivor.context.get_domain_id())}
+
+    def is_answered() -> bool:
+        asked = client.call_async(Trigger.Request())
+        executor.spin_until_future_complete(asked, timeout_sec=1.0)
+        return asked.done()
+
+    clock = WallClock(tmp_path)
+    clock.step(HOUR_S)
+    for variables in (clock.variables, {}):
+        begun_s = time.monotonic()
+        server = subprocess.Popen([sys.executable, "-c", SERVER], env={**environment, **variables})
+        try:
+            until(is_answered, "the server is reached", READY_S)
+            until(lambda: time.monotonic() - begun_s > 1.5 * SWEPT_AFTER_S, "its locks are old enough", READY_S)  # noqa: B023
+        finally:
+            server.kill()
+            server.wait()
+        sweep_shared_memory()
+    survivor.destroy_client(client)
