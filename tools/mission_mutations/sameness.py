@@ -182,9 +182,9 @@ class Seen:
 
     def _deals(self, node: Node) -> Hashable | None:
         """Return a node that writes on the blackboard, or gives inputs to what it asks for, as its file has it."""
-        element, wiring = node.wiring.element, node.wiring
-        writes = any(port.direction is not Direction.INPUT for port in wiring.type.ports.values() if port.name in wiring.ports)
-        if not (writes or isinstance(node, SkillNode) or any(self._computes(node, one) for one in scripts_of(element, wiring.type))):
+        element, config = node.config.element, node.config
+        writes = any(port.direction is not Direction.INPUT for port in config.type.ports.values() if port.name in config.ports)
+        if not (writes or isinstance(node, SkillNode) or any(self._computes(node, one) for one in scripts_of(element, config.type))):
             return None
         return (node.name, *_attributes(element))
 

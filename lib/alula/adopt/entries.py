@@ -12,13 +12,13 @@ from alula.missions.skill_types import PORT_TYPES, STATE_PORT
 from alula.trees.access import NUMBER, TEXT, Access, Accesses, Key
 from alula.trees.attributes import type_name
 from alula.trees.blackboard import Blackboard
-from alula.trees.node import Shared, Wiring, pointer
+from alula.trees.configuration import configure
+from alula.trees.node import NodeConfig, Shared, pointer
 from alula.trees.node_type import Category, NodeType, node_type
 from alula.trees.palette import Palette
 from alula.trees.ports import Direction, Port
 from alula.trees.reading import TreeFiles
 from alula.trees.values import ANY, DOUBLE, NUMBERS, STRING, TYPES, PortType, literal
-from alula.trees.wiring import wire
 
 Slot = tuple[str, str]
 """A skill's input or output: the names of both."""
@@ -47,7 +47,7 @@ class _MainTree:
 
     files: TreeFiles
     board: Blackboard
-    accesses: Sequence[tuple[Wiring, Access]]
+    accesses: Sequence[tuple[NodeConfig, Access]]
     optional: frozenset[str]
 
     @classmethod
@@ -55,10 +55,10 @@ class _MainTree:
         board = Blackboard(int)
         if not files.trees[files.main].children:
             return cls(files, board, (), frozenset())
-        root = wire(files, palette, files.main, Shared(int), blackboard=board)
+        root = configure(files, palette, files.main, Shared(int), blackboard=board)
         accesses = Accesses(Scripts().statements)
-        wirings = {id(one): wiring for wiring in root.walk() for one in accesses.of_node(wiring)}
-        several = [(wirings[id(one)], one) for one in accesses.of(root) if one.write or one.needed]
+        configs = {id(one): config for config in root.walk() for one in accesses.of_node(config)}
+        several = [(configs[id(one)], one) for one in accesses.of(root) if one.write or one.needed]
         return cls(files, board, several, frozenset(_optional(root)))
 
     def read_first(self) -> dict[str, Access]:
@@ -79,11 +79,11 @@ class _MainTree:
         return set(self.optional) - {access.key[1] for _, access in self.accesses if access.write and access.key[0] is self.board}
 
 
-def _optional(root: Wiring) -> Iterator[str]:
-    for wiring in root.walk():
-        for port in wiring.type.ports.values():
-            key = pointer(wiring.element.get(port.name), port.name) if port.optional else None
-            board, name = (None, "") if key is None else wiring.blackboard.where(key)
+def _optional(root: NodeConfig) -> Iterator[str]:
+    for config in root.walk():
+        for port in config.type.ports.values():
+            key = pointer(config.element.get(port.name), port.name) if port.optional else None
+            board, name = (None, "") if key is None else config.blackboard.where(key)
             if board is root.blackboard:
                 yield name
 
@@ -124,8 +124,8 @@ class Entries:
             found.append(GivenEntry(name, value))
         return found
 
-    def _slot(self, wiring: Wiring, port: str) -> Slot | None:
-        skill = self._skills.get(wiring.type.name)
+    def _slot(self, config: NodeConfig, port: str) -> Slot | None:
+        skill = self._skills.get(config.type.name)
         return (skill.name, port) if skill is not None and (skill.name, port) in self._types else None
 
     def _refuse_literals(self) -> None:
@@ -146,17 +146,17 @@ class Entries:
             changed = False
             for pairs in (pairs for found in groups for pairs in found):
                 kind = self._common(pairs)
-                for wiring, access in pairs:
-                    slot = self._slot(wiring, access.attribute.name)
+                for config, access in pairs:
+                    slot = self._slot(config, access.attribute.name)
                     if kind is not ANY and slot is not None and self._types[slot] is ANY:
                         self._types[slot], changed = kind, True
 
-    def _common(self, pairs: Iterable[tuple[Wiring, Access]]) -> PortType:
+    def _common(self, pairs: Iterable[tuple[NodeConfig, Access]]) -> PortType:
         """Return the type that all who name an entry agree on: of several kinds of number the widest, else a text; ANY where nobody says.
 
         A number of a script is of any of these kinds.
         """
-        told = [(self._told(wiring, access), access.type == NUMBER) for wiring, access in pairs]
+        told = [(self._told(config, access), access.type == NUMBER) for config, access in pairs]
         kinds = {kind for kind, is_of_script in told if kind is not ANY and not is_of_script}
         if not kinds:
             return DOUBLE if any(is_of_script for _, is_of_script in told) else ANY
@@ -164,22 +164,22 @@ class Entries:
             return next(iter(kinds))
         return DOUBLE if kinds <= set(NUMBERS) else STRING
 
-    def _told(self, wiring: Wiring, access: Access) -> PortType:
-        slot = self._slot(wiring, access.attribute.name) if access.offsets is None else None
+    def _told(self, config: NodeConfig, access: Access) -> PortType:
+        slot = self._slot(config, access.attribute.name) if access.offsets is None else None
         if slot is not None:
             return self._types[slot]
         return STRING if access.type == TEXT else TYPES.get(access.type, ANY)
 
-    def _kind(self, pairs: Sequence[tuple[Wiring, Access]]) -> str:
+    def _kind(self, pairs: Sequence[tuple[NodeConfig, Access]]) -> str:
         kind = self._common(pairs)
         is_of_scripts = all(access.offsets is not None for _, access in pairs) and pairs
         return "float64" if kind is ANY and is_of_scripts else model_type(kind)
 
 
-def _by_key(accesses: Iterable[tuple[Wiring, Access]]) -> dict[Key, list[tuple[Wiring, Access]]]:
-    found: dict[Key, list[tuple[Wiring, Access]]] = {}
-    for wiring, access in accesses:
-        found.setdefault(access.key, []).append((wiring, access))
+def _by_key(accesses: Iterable[tuple[NodeConfig, Access]]) -> dict[Key, list[tuple[NodeConfig, Access]]]:
+    found: dict[Key, list[tuple[NodeConfig, Access]]] = {}
+    for config, access in accesses:
+        found.setdefault(access.key, []).append((config, access))
     return found
 
 

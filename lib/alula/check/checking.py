@@ -19,6 +19,7 @@ from alula.trees import nav2
 from alula.trees.access import Accesses, scripts_of
 from alula.trees.attributes import type_name
 from alula.trees.blackboard import Blackboard
+from alula.trees.configuration import configure
 from alula.trees.errors import Problem
 from alula.trees.library import Library
 from alula.trees.node import Shared
@@ -27,7 +28,6 @@ from alula.trees.ports import Direction
 from alula.trees.reach import Reach
 from alula.trees.reading import TreeFiles
 from alula.trees.structure import verify
-from alula.trees.wiring import wire
 
 ENDLESS = frozenset({"ALU007", "ALU009"})
 """What keeps the tree from being put together at all."""
@@ -99,7 +99,7 @@ def _wholes(files: TreeFiles, palette: Palette, names: Collection[str], beside: 
     several = dict.fromkeys((*mains, *started, *_others(files)))
     board = Blackboard(shared.clock)
     boards = dict.fromkeys((*mains, *started), board)
-    roots = {one: wire(files, palette, one, shared, blackboard=boards.get(one)) for one in several if files.trees[one].children}
+    roots = {one: configure(files, palette, one, shared, blackboard=boards.get(one)) for one in several if files.trees[one].children}
     for name, root in roots.items():
         known = given if name in started or (name == files.main and not files.is_part) else None
         around = tuple(roots[one] for one in boards if one in roots and one != name) if name in boards else ()
@@ -123,25 +123,25 @@ def _others(files: TreeFiles) -> list[str]:
 
 
 def _scripts(whole: Whole) -> Iterator[Problem]:
-    for wiring in whole.root.walk():
-        for attribute in scripts_of(wiring.element, wiring.type):
+    for config in whole.root.walk():
+        for attribute in scripts_of(config.element, config.type):
             whole.scripts.program(attribute)
     yield from whole.scripts.problems
 
 
 def _missing(whole: Whole) -> Iterator[Problem]:
     """Yield inputs that a file does not give and that have no default; of nodes that only a model tells of, nobody knows."""
-    for wiring in whole.root.walk():
-        for port in wiring.type.ports.values() if wiring.type.is_tickable else ():
-            if port.direction is not Direction.OUTPUT and not port.optional and wiring.ports.get(port.name) is None and not port.required:
-                message = f"'{wiring.type.name}' has no input '{port.name}', which has no default"
-                yield of_element("ALU604", wiring.element, message, f'add {port.name}="..."', warning=whole.foreign)
+    for config in whole.root.walk():
+        for port in config.type.ports.values() if config.type.is_tickable else ():
+            if port.direction is not Direction.OUTPUT and not port.optional and config.ports.get(port.name) is None and not port.required:
+                message = f"'{config.type.name}' has no input '{port.name}', which has no default"
+                yield of_element("ALU604", config.element, message, f'add {port.name}="..."', warning=whole.foreign)
 
 
 def _unreached(whole: Whole) -> Iterator[Problem]:
     waited = list(waits_in_vain(whole.root, whole.reach))
     yield from (problem for problem, _ in waited)
-    explained = {wiring for _, wiring in waited}
+    explained = {config for _, config in waited}
     for child, waits_for in unreached(whole.root, whole.reach):
         if waits_for not in explained:
             yield never_reached(child, waits_for, whole.reach)
@@ -153,7 +153,7 @@ def _several_run(whole: Whole) -> Iterator[Problem]:
 
 def _entries(whole: Whole) -> Iterator[Problem]:
     if whole.given is not None:
-        of_nav2 = whole.foreign and any(wiring.type.name in nav2.declared() for wiring in whole.root.walk())
+        of_nav2 = whole.foreign and any(config.type.name in nav2.declared() for config in whole.root.walk())
         given = (*whole.given, *(nav2.WRITTEN if of_nav2 else ()))
         yield from entries.read_too_early(whole.root, whole.accesses, given, whole.others, late=whole.begins_late, foreign=whole.foreign)
     yield from entries.mismatched(whole.root, whole.accesses)

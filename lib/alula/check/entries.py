@@ -10,7 +10,7 @@ from alula.common.suggestions import nearest
 from alula.trees.access import NUMBER, TEXT, UNKNOWN, Access, Accesses, Key
 from alula.trees.attributes import PRECONDITIONS
 from alula.trees.errors import Problem
-from alula.trees.node import Wiring, pointer
+from alula.trees.node import NodeConfig, pointer
 from alula.trees.status import SUCCESS
 from alula.trees.values import NUMBERS, STRING, TYPES
 
@@ -22,17 +22,17 @@ Writers = dict[Key, Access]
 """What writes entries first, by entry."""
 
 
-def written(root: Wiring, accesses: Accesses) -> Writers:
+def written(root: NodeConfig, accesses: Accesses) -> Writers:
     """Return what first writes each entry of the blackboard that a tree itself stands on."""
     return {key: access for key, access in _written_in(root, accesses).items() if key[0] is root.blackboard}
 
 
-def _written_in(root: Wiring, accesses: Accesses) -> Writers:
+def _written_in(root: NodeConfig, accesses: Accesses) -> Writers:
     return {access.key: access for access in reversed(list(accesses.of(root))) if access.write}
 
 
 def read_too_early(
-    root: Wiring, accesses: Accesses, given: Collection[str], others: Writers, *, late: bool, foreign: bool
+    root: NodeConfig, accesses: Accesses, given: Collection[str], others: Writers, *, late: bool, foreign: bool
 ) -> Iterator[Problem]:
     """Yield each reading of an entry that nothing can have written by then.
 
@@ -42,21 +42,21 @@ def read_too_early(
     by_then = {root.blackboard.where(name) for name in given}
     later = {**others, **_written_in(root, accesses)}
     names = sorted({access.name for access in later.values()} | set(given))
-    taken: dict[Key, Wiring] = {}
+    taken: dict[Key, NodeConfig] = {}
 
-    def visit(wiring: Wiring, *, within: bool = False) -> Iterator[Problem]:
-        yield from judged(accesses.before(wiring))
-        if not within and goes_back(wiring):  # what one writes, any other may find
+    def visit(config: NodeConfig, *, within: bool = False) -> Iterator[Problem]:
+        yield from judged(accesses.before(config))
+        if not within and goes_back(config):  # what one writes, any other may find
             within = True
-            by_then.update(access.key for child in wiring.children for access in accesses.of(child) if access.write)
+            by_then.update(access.key for child in config.children for access in accesses.of(child) if access.write)
         unset: set[Key] = set()
-        for child in wiring.children:
+        for child in config.children:
             yield from visit(child, within=within)
-            unset |= {key for key in _unset(wiring, child) if key in by_then}
-            by_then.difference_update(unset & set(_unset(wiring, child)))
-            taken.update(dict.fromkeys(_unset(wiring, child), child))
+            unset |= {key for key in _unset(config, child) if key in by_then}
+            by_then.difference_update(unset & set(_unset(config, child)))
+            taken.update(dict.fromkeys(_unset(config, child), child))
         by_then.update(unset)  # behind this node nobody knows whether it came to that
-        yield from judged(accesses.after(wiring))
+        yield from judged(accesses.after(config))
 
     def judged(found: list[Access]) -> Iterator[Problem]:
         for access in found:
@@ -80,12 +80,12 @@ def _perhaps_unwritten(access: Access, writer: Access) -> Problem:
     return of_access(access, "ALU607", message, "have it from the start: an output port of the main tree's model, with a default")
 
 
-def goes_back(wiring: Wiring) -> bool:
+def goes_back(config: NodeConfig) -> bool:
     """Return whether a child of a node may be ticked after another one that stands behind it."""
-    return wiring.ticking.goes_back(len(wiring.children))
+    return config.ticking.goes_back(len(config.children))
 
 
-def _unset(parent: Wiring, child: Wiring) -> tuple[Key, ...]:
+def _unset(parent: NodeConfig, child: NodeConfig) -> tuple[Key, ...]:
     """Return the entry that a child has surely taken away when the next one's turn comes."""
     port = child.described.takes_away if child.described else ""
     if not port:
@@ -98,7 +98,7 @@ def _unset(parent: Wiring, child: Wiring) -> tuple[Key, ...]:
     return (child.blackboard.where(key),)
 
 
-def _taken_away(access: Access, by: Wiring) -> Problem:
+def _taken_away(access: Access, by: NodeConfig) -> Problem:
     message = f"`{access.name}` is read, and {by.type.name} in line {by.element.place.line} has taken it away"
     return of_access(access, "ALU607", message, "read it before, or write it again")
 
@@ -115,7 +115,7 @@ def _unwritten(access: Access, writer: Access | None, names: list[str]) -> Probl
     return of_access(access, "ALU607", message, cure)
 
 
-def mismatched(root: Wiring, accesses: Accesses) -> Iterator[Problem]:
+def mismatched(root: NodeConfig, accesses: Accesses) -> Iterator[Problem]:
     """Yield entries that are written with two types, or read as another type or in another unit than they are written."""
     writers: dict[Key, Access] = {}
     readers: list[Access] = []

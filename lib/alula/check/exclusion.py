@@ -10,7 +10,7 @@ from math import prod
 from typing import TypeAlias
 
 from alula.check.scripts import Scripts
-from alula.trees.node import Wiring
+from alula.trees.node import NodeConfig
 from alula.trees.script.syntax import Call, Chain, Comparison, Literal, Name, Node, Prefix
 
 MOST = 4096
@@ -32,31 +32,31 @@ class _Unclear(Exception):  # noqa: N818 - ends an attempt, is no error
 class _Guard:
     """A condition that has to hold, or not to, where it stands."""
 
-    wiring: Wiring
+    config: NodeConfig
     node: Node
     holds: bool
 
 
-def exclude(one: Wiring, other: Wiring, scripts: Scripts, names: Collection[str]) -> bool:
+def exclude(one: NodeConfig, other: NodeConfig, scripts: Scripts, names: Collection[str]) -> bool:
     """Return whether the two can't both begin: whatever values entries have, a condition of one of them is not met."""
     guards = [*_guards(one, scripts), *_guards(other, scripts)]
-    if {guard.wiring for guard in guards} != {one, other}:
+    if {guard.config for guard in guards} != {one, other}:
         return False
     try:
         domains = _Domains(names)
         for guard in guards:
-            domains.add(guard.wiring, guard.node)
-        return not any(all(domains.truth(guard.wiring, guard.node, values) is guard.holds for guard in guards) for values in domains.all())
+            domains.add(guard.config, guard.node)
+        return not any(all(domains.truth(guard.config, guard.node, values) is guard.holds for guard in guards) for values in domains.all())
     except _Unclear:
         return False
 
 
-def _guards(wiring: Wiring, scripts: Scripts) -> Iterator[_Guard]:
+def _guards(config: NodeConfig, scripts: Scripts) -> Iterator[_Guard]:
     for name, holds in (("_while", True), ("_skipIf", False)):
-        attribute = wiring.element.attributes.get(name)
+        attribute = config.element.attributes.get(name)
         program = scripts.program(attribute) if attribute else None
         if program is not None and len(program.statements) == 1:
-            yield _Guard(wiring, program.statements[0], holds)
+            yield _Guard(config, program.statements[0], holds)
 
 
 class _Domains:
@@ -76,62 +76,62 @@ class _Domains:
         for chosen in product(*self._values.values()):
             yield dict(zip(self._values, chosen, strict=True))
 
-    def add(self, wiring: Wiring, node: Node) -> None:
+    def add(self, config: NodeConfig, node: Node) -> None:
         """Take in a condition."""
         match node:
             case Chain(operators=operators) if set(operators) <= {"&&", "||"}:
                 for operand in node.operands:
-                    self.add(wiring, operand)
+                    self.add(config, operand)
             case Prefix(operator="!"):
-                self.add(wiring, node.operand)
+                self.add(config, node.operand)
             case Comparison():
                 for left, right in pairwise(node.operands):
-                    self._compared(wiring, left, right)
+                    self._compared(config, left, right)
             case Literal():
                 pass
             case _:
-                self._values.setdefault(self._key(wiring, node), set()).update({0.0, 1.0})
+                self._values.setdefault(self._key(config, node), set()).update({0.0, 1.0})
 
-    def _compared(self, wiring: Wiring, left: Node, right: Node) -> None:
+    def _compared(self, config: NodeConfig, left: Node, right: Node) -> None:
         fixed = [self._fixed(one) for one in (left, right)]
         for node, value in ((left, fixed[1]), (right, fixed[0])):
             if self._fixed(node) is None:
                 if value is None:
                     raise _Unclear
                 near: set[Value] = {_OTHER} if isinstance(value, str) else {value - NEAR, value + NEAR}
-                self._values.setdefault(self._key(wiring, node), set()).update({value, *near})
+                self._values.setdefault(self._key(config, node), set()).update({value, *near})
 
-    def truth(self, wiring: Wiring, node: Node, values: Values) -> bool:
+    def truth(self, config: NodeConfig, node: Node, values: Values) -> bool:
         """Return whether a condition holds with these values."""
         match node:
             case Chain():
-                answers = [self.truth(wiring, operand, values) for operand in node.operands]
+                answers = [self.truth(config, operand, values) for operand in node.operands]
                 return all(answers) if set(node.operators) == {"&&"} else any(answers) if set(node.operators) == {"||"} else self._mixed()
             case Prefix():
-                return not self.truth(wiring, node.operand, values)
+                return not self.truth(config, node.operand, values)
             case Comparison():
-                known = [self._value(wiring, operand, values) for operand in node.operands]
+                known = [self._value(config, operand, values) for operand in node.operands]
                 return all(_compare(sign, *pair) for sign, pair in zip(node.operators, pairwise(known), strict=True))
             case _:
-                return self._value(wiring, node, values) != 0.0
+                return self._value(config, node, values) != 0.0
 
     @staticmethod
     def _mixed() -> bool:
         raise _Unclear
 
-    def _value(self, wiring: Wiring, node: Node, values: Values) -> Value:
+    def _value(self, config: NodeConfig, node: Node, values: Values) -> Value:
         fixed = self._fixed(node)
-        return values[self._key(wiring, node)] if fixed is None else fixed
+        return values[self._key(config, node)] if fixed is None else fixed
 
     def _fixed(self, node: Node) -> Value | None:
         if isinstance(node, Literal):
             return node.value if isinstance(node.value, str) else float(node.value)
         return node.name if isinstance(node, Name) and "." not in node.name and node.name in self._names else None
 
-    def _key(self, wiring: Wiring, node: Node) -> object:
+    def _key(self, config: NodeConfig, node: Node) -> object:
         match node:
             case Name(name=name):
-                return name if "." in name else wiring.blackboard.where(name)
+                return name if "." in name else config.blackboard.where(name)
             case Call() if all(isinstance(argument, Name) for argument in node.arguments):
                 return (node.function, *(argument.name for argument in node.arguments if isinstance(argument, Name)))
             case _:

@@ -27,8 +27,8 @@ class NameRules:
 
     def names(self, whole: Whole) -> Iterator[Problem]:
         """Yield dotted names, states and functions in scripts that nothing of the robot has."""
-        for wiring in whole.root.walk():
-            for attribute in scripts_of(wiring.element, wiring.type):
+        for config in whole.root.walk():
+            for attribute in scripts_of(config.element, config.type):
                 for statement in whole.scripts.statements(attribute):
                     yield from self._unguarded(attribute, statement)
                     asked: set[int] = set()

@@ -16,7 +16,7 @@ from alula.trees.access import Key, scripts_of, takes_script_from_entry
 from alula.trees.blackboard import Blackboard
 from alula.trees.document import Attribute
 from alula.trees.errors import Problem
-from alula.trees.node import Wiring, pointer
+from alula.trees.node import NodeConfig, pointer
 from alula.trees.script.syntax import Comparison, Conditional, Literal, Name, Node, walk
 
 SWITCH, VARIABLE, CASE = "Switch", "variable", "case_"
@@ -31,11 +31,11 @@ class OutcomeRules:
     def asked(self, whole: Whole) -> Iterator[Problem]:
         """Yield texts that an entry never has in which nothing but ends of skills and texts of the file are written."""
         written = _Written.of(self.skills, whole)
-        if any(takes_script_from_entry(wiring.element, wiring.type) for one in (whole.root, *whole.beside) for wiring in one.walk()):
+        if any(takes_script_from_entry(config.element, config.type) for one in (whole.root, *whole.beside) for config in one.walk()):
             return
-        for wiring in whole.root.walk():
-            for attribute, name, text, place in _compared(wiring, whole):
-                key = wiring.blackboard.where(name)
+        for config in whole.root.walk():
+            for attribute, name, text, place in _compared(config, whole):
+                key = config.blackboard.where(name)
                 ends = written.ends.get(key)
                 if not text or ends is None or key not in written.skills_of or key in written.anything or text in ends:
                     continue
@@ -78,25 +78,25 @@ class _Written:
             found.anything.update(key for key in found.ends if key[0] is board)
         return found
 
-    def tree(self, root: Wiring) -> None:
+    def tree(self, root: NodeConfig) -> None:
         """Add what a tree writes."""
-        for wiring in root.walk():
-            skill = self.skills.of(wiring)
-            for access in self.whole.accesses.of_node(wiring):
+        for config in root.walk():
+            skill = self.skills.of(config)
+            for access in self.whole.accesses.of_node(config):
                 if not access.write:
                     continue
                 if skill is not None and access.value is None and access.attribute.name == OUTCOME_PORT:
                     self.ends.setdefault(access.key, set()).update(_ends(skill))
-                    self.skills_of.setdefault(access.key, set()).add(wiring.type.name)
+                    self.skills_of.setdefault(access.key, set()).add(config.type.name)
                     continue
                 for text in _texts(access.value):
                     if text is None:
                         self.anything.add(access.key)
                     else:
                         self.ends.setdefault(access.key, set()).add(text)
-            for attribute in wiring.port_attributes() if wiring.type.unknown else ():
+            for attribute in config.port_attributes() if config.type.unknown else ():
                 key = pointer(attribute.value, attribute.name)
-                self.anything.update([] if key is None else [wiring.blackboard.where(key)])
+                self.anything.update([] if key is None else [config.blackboard.where(key)])
 
     def take(self, other: _Written, board: Blackboard) -> None:
         """Add what another tree writes on one blackboard."""
@@ -119,17 +119,17 @@ def _texts(value: Node | None) -> Iterator[str | None]:
             yield None
 
 
-def _compared(wiring: Wiring, whole: Whole) -> Iterator[tuple[Attribute, str, str, tuple[int, int] | None]]:
+def _compared(config: NodeConfig, whole: Whole) -> Iterator[tuple[Attribute, str, str, tuple[int, int] | None]]:
     """Yield texts that a node compares an entry with: where it does, the entry, the text, and its place in a script."""
-    for attribute in scripts_of(wiring.element, wiring.type):
+    for attribute in scripts_of(config.element, config.type):
         for node in _nodes_of(attribute, whole):
             match node:
                 case Comparison(operands=(Name(name=name), Literal(value=str(text)) as one), operators=("==" | "!=",)):
                     yield attribute, name, text, (one.offset, one.end)
                 case Comparison(operands=(Literal(value=str(text)) as one, Name(name=name)), operators=("==" | "!=",)):
                     yield attribute, name, text, (one.offset, one.end)
-    variable = pointer(wiring.element.get(VARIABLE), VARIABLE) if wiring.type.name.startswith(SWITCH) else None
-    for attribute in wiring.port_attributes() if variable is not None else ():
+    variable = pointer(config.element.get(VARIABLE), VARIABLE) if config.type.name.startswith(SWITCH) else None
+    for attribute in config.port_attributes() if variable is not None else ():
         if attribute.name.startswith(CASE) and pointer(attribute.value, attribute.name) is None:
             yield attribute, variable or "", attribute.value, None
 

@@ -17,7 +17,7 @@ from alula.model.model import Skill
 from alula.model.units import KIND_OF_UNIT, UNIT_IN_SI
 from alula.trees.document import Attribute
 from alula.trees.errors import Problem
-from alula.trees.node import Wiring
+from alula.trees.node import NodeConfig
 
 _NUMBER_WITH_UNIT = re.compile(r"\s*[-+]?[0-9.]+(?:[eE][-+]?[0-9]+)?\s*([A-Za-z%/]+)\s*")
 
@@ -30,37 +30,37 @@ class SkillRules:
 
     def units(self, whole: Whole) -> Iterator[Problem]:
         """Yield numbers that are written with a unit."""
-        for wiring in whole.root.walk():
-            for attribute in wiring.port_attributes():
-                port = wiring.type.ports.get(attribute.name)
+        for config in whole.root.walk():
+            for attribute in config.port_attributes():
+                port = config.type.ports.get(attribute.name)
                 match = _NUMBER_WITH_UNIT.fullmatch(attribute.value)
                 if port is not None and port.unit and match and match[1] in UNIT_IN_SI:
                     yield _wrong_unit(attribute, match[1], port.unit)
 
     def results(self, whole: Whole) -> Iterator[Problem]:
         """Yield results that the skill does not have, and those after which the mission just fails."""
-        for wiring in whole.root.walk():
-            skill = self.skills.of(wiring)
+        for config in whole.root.walk():
+            skill = self.skills.of(config)
             if skill is None:
                 continue
             known = [result.name for result in skill.results]
-            for name in sorted((named_results(wiring) or frozenset()) - set(known)):
+            for name in sorted((named_results(config) or frozenset()) - set(known)):
                 cure = nearest(name, known)
-                yield of_value("ALU618", wiring.element.attributes[SUCCESS_PORT], f"'{wiring.type.name}' has no result `{name}`", cure)
-            left = [name for name in known if name not in self.skills.successes(wiring)]
-            if left and not any(_deals(parent, child) for parent, child in wiring.above()) and not _is_asked(wiring, whole):
-                yield _ignored(wiring, left)
+                yield of_value("ALU618", config.element.attributes[SUCCESS_PORT], f"'{config.type.name}' has no result `{name}`", cure)
+            left = [name for name in known if name not in self.skills.successes(config)]
+            if left and not any(_deals(parent, child) for parent, child in config.above()) and not _is_asked(config, whole):
+                yield _ignored(config, left)
 
     def resources(self, whole: Whole) -> Iterator[Problem]:
         """Yield skills in two branches of a Parallel that can't run at once."""
-        for wiring in whole.root.walk():
-            if not is_parallel(wiring):
+        for config in whole.root.walk():
+            if not is_parallel(config):
                 continue
-            branches = [[(leaf, skill) for leaf in child.walk() if (skill := self.skills.of(leaf))] for child in wiring.children]
+            branches = [[(leaf, skill) for leaf in child.walk() if (skill := self.skills.of(leaf))] for child in config.children]
             for number, branch in enumerate(branches):
                 for leaf, skill in branch:
                     others = [one for later in branches[:number] for one in later]
-                    yield from _clashes(wiring, leaf, skill, others)
+                    yield from _clashes(config, leaf, skill, others)
 
 
 def _wrong_unit(attribute: Attribute, written: str, expected: str) -> Problem:
@@ -73,7 +73,7 @@ def _wrong_unit(attribute: Attribute, written: str, expected: str) -> Problem:
     return of_value("ALU606", attribute, f"`{attribute.name}` is in {expected}, and is written without its unit", cure)
 
 
-def _deals(parent: Wiring, child: Wiring) -> bool:
+def _deals(parent: NodeConfig, child: NodeConfig) -> bool:
     """Return whether a node does something about the failure of a child other than to fail, too."""
     place = parent.children.index(child)
     if "_onFailure" in child.element.attributes:
@@ -81,18 +81,18 @@ def _deals(parent: Wiring, child: Wiring) -> bool:
     return parent.ticking.heeds_failure(place, len(parent.children), parent.ports.get)
 
 
-def _is_asked(wiring: Wiring, whole: Whole) -> bool:
-    mine = wiring.element.attributes
+def _is_asked(config: NodeConfig, whole: Whole) -> bool:
+    mine = config.element.attributes
     return OUTCOME_PORT in mine or "_onFailure" in mine or "_onFailure" in whole.root.element.attributes
 
 
-def _ignored(wiring: Wiring, left: list[str]) -> Problem:
-    message = f"no branch deals with {quoted(left)} of '{wiring.name}': the mission fails"
+def _ignored(config: NodeConfig, left: list[str]) -> Problem:
+    message = f"no branch deals with {quoted(left)} of '{config.name}': the mission fails"
     cure = "put a Fallback around it with what is to be done then, or ForceFailure where that is meant"
-    return of_element("ALU609", wiring.element, message, cure, warning=True)
+    return of_element("ALU609", config.element, message, cure, warning=True)
 
 
-def _clashes(parallel: Wiring, leaf: Wiring, skill: Skill, others: list[tuple[Wiring, Skill]]) -> Iterator[Problem]:
+def _clashes(parallel: NodeConfig, leaf: NodeConfig, skill: Skill, others: list[tuple[NodeConfig, Skill]]) -> Iterator[Problem]:
     for other, known in others:
         if leaf.type.name.partition(".")[0] != other.type.name.partition(".")[0]:
             continue
@@ -105,7 +105,7 @@ def _clashes(parallel: Wiring, leaf: Wiring, skill: Skill, others: list[tuple[Wi
             return
 
 
-def _at_once(parallel: Wiring, leaf: Wiring) -> bool:
+def _at_once(parallel: NodeConfig, leaf: NodeConfig) -> bool:
     """Return whether nothing but sequences, of which it is the first, and no condition stands between the leaf and the Parallel."""
     guards = {"_skipIf", "_while", "_successIf", "_failureIf"}
     if guards & set(leaf.element.attributes):

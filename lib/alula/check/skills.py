@@ -8,7 +8,7 @@ from functools import cached_property
 from alula.language.messages import NO_MESSAGES, Messages
 from alula.missions.skill_types import SEPARATOR, SUCCESS_PORT
 from alula.model.model import ResultKind, Skill, Skillset
-from alula.trees.node import Wiring, pointer
+from alula.trees.node import NodeConfig, pointer
 
 
 class Skills:
@@ -24,9 +24,9 @@ class Skills:
         known = self.skillsets.get(skillset)
         return known.skill_index.get(skill) if known else None
 
-    def of(self, wiring: Wiring) -> Skill | None:
+    def of(self, config: NodeConfig) -> Skill | None:
         """Return the skill that a leaf is."""
-        return self.get(wiring.type.name)
+        return self.get(config.type.name)
 
     @cached_property
     def names(self) -> Mapping[str, frozenset[str]]:
@@ -48,10 +48,10 @@ class Skills:
         """The names of all states of all resources."""
         return frozenset(state for one in self.skillsets.values() for resource in one.resources for state in resource.states)
 
-    def successes(self, wiring: Wiring) -> frozenset[str]:
+    def successes(self, config: NodeConfig) -> frozenset[str]:
         """Return the results with which a leaf succeeds: what the file narrows them to, else those that the model calls a success."""
-        skill = self.of(wiring)
-        narrowed = named_results(wiring)
+        skill = self.of(config)
+        narrowed = named_results(config)
         if skill is None:
             return frozenset()
         known = frozenset(result.name for result in skill.results)
@@ -60,9 +60,9 @@ class Skills:
         return frozenset(name for name in known if skill.kind_of(name) is ResultKind.SUCCESS)
 
 
-def named_results(wiring: Wiring) -> frozenset[str] | None:
+def named_results(config: NodeConfig) -> frozenset[str] | None:
     """Return the results that the file says are a success, None where it says nothing, or names an entry."""
-    attribute = wiring.element.attributes.get(SUCCESS_PORT)
+    attribute = config.element.attributes.get(SUCCESS_PORT)
     if attribute is None or pointer(attribute.value, SUCCESS_PORT) is not None:
         return None
     return frozenset(attribute.value.split(SEPARATOR)) - {""}

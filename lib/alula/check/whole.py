@@ -9,7 +9,7 @@ from alula.check.entries import Writers
 from alula.check.scripts import Scripts
 from alula.trees.access import Accesses
 from alula.trees.errors import Problem
-from alula.trees.node import Wiring
+from alula.trees.node import NodeConfig
 from alula.trees.reach import Reach
 
 
@@ -17,7 +17,7 @@ from alula.trees.reach import Reach
 class Whole:
     """A tree as it will stand, and what is known of it: what rules are made of."""
 
-    root: Wiring
+    root: NodeConfig
     scripts: Scripts
     accesses: Accesses
     reach: Reach
@@ -30,7 +30,7 @@ class Whole:
     begins_late: bool = False
     """It may begin before or after the main tree has written them."""
     foreign: bool = False
-    beside: tuple[Wiring, ...] = ()
+    beside: tuple[NodeConfig, ...] = ()
     """Other trees on the same blackboard: the main one, and those that stand beside it."""
 
 

@@ -28,9 +28,10 @@ from alula.missions.skillset import Client, Clock
 from alula.missions.world import World, asked_data, states_of
 from alula.model.model import Skillset
 from alula.trees.blackboard import Blackboard as TreeBoard
+from alula.trees.configuration import configure
 from alula.trees.errors import Report, TreeError, refuse
 from alula.trees.factory import build_tree
-from alula.trees.node import Node, Shared, Wiring
+from alula.trees.node import Node, NodeConfig, Shared
 from alula.trees.node_type import Category, NodeType, node_type
 from alula.trees.palette import Palette
 from alula.trees.ports import Direction, Port
@@ -38,7 +39,6 @@ from alula.trees.reading import TreeFiles
 from alula.trees.source import TreeSource, source_of
 from alula.trees.structure import verify
 from alula.trees.tree import Tree
-from alula.trees.wiring import wire
 
 READY, STOP_HERE = "ready", "stop_here"
 DEGRADED, STOPPING = "degraded", "stopping"
@@ -94,14 +94,14 @@ class MissionFile:
         return palette_of(self.files, self.skillsets, self.part, more=self.source.types)
 
     @cached_property
-    def roots(self) -> tuple[Wiring, ...]:
+    def roots(self) -> tuple[NodeConfig, ...]:
         """The tops of its trees as they will stand, on one blackboard: the main one, `stop_here`, and `ready`; raises InputError."""
         self._verify()
-        shared, found = Shared(int), list[Wiring]()
+        shared, found = Shared(int), list[NodeConfig]()
         board = TreeBoard(shared.clock)
         for name in (self.files.main, *(one for one in (STOP_HERE, READY) if one in self.files.trees)):
             after = sum(1 for root in found for _ in root.walk())
-            found.append(wire(self.files, self.palette, name, shared, enums=self.source.enums, blackboard=board, after=after))
+            found.append(configure(self.files, self.palette, name, shared, enums=self.source.enums, blackboard=board, after=after))
         return tuple(found)
 
     @property
@@ -233,7 +233,7 @@ class Maker:
         tree = build_tree(files, palette, self._clock_ns, main=name, enums=self._enums, surroundings=world, blackboard=board, after=after)
         for node in tree.nodes:
             if isinstance(node, SkillNode):
-                world.leaves.setdefault(node.wiring.type.name, []).append(node)
+                world.leaves.setdefault(node.config.type.name, []).append(node)
         return tree
 
 

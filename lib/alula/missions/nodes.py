@@ -8,7 +8,7 @@ from collections.abc import Sequence
 from alula.missions.blackboard import Blackboard
 from alula.trees.ends import ENDS, FAILS, SUCCEEDS, Ends, Given, whole_number
 from alula.trees.errors import TickError
-from alula.trees.node import Action, Condition, Count, Decorator, Script, SyncAction, Wiring
+from alula.trees.node import Action, Condition, Count, Decorator, NodeConfig, Script, SyncAction
 from alula.trees.palette import Palette
 from alula.trees.ports import input_port, script_port
 from alula.trees.status import FAILURE, IDLE, RUNNING, SKIPPED, SUCCESS, Answer
@@ -23,7 +23,7 @@ FOR_EVER = -1
 
 def asked(node: Action | Condition | Decorator, port: str = "if") -> Script:
     """Return the script of a port."""
-    return node.wiring.compile(node.wiring.ports.get(port, "true"), port)
+    return node.config.compile(node.config.ports.get(port, "true"), port)
 
 
 def holds(node: Action, script: Script) -> bool:
@@ -40,8 +40,8 @@ class WaitFor(Action):
     answers_by = "if"
     ends = SUCCEEDS
 
-    def __init__(self, wiring: Wiring) -> None:
-        super().__init__(wiring)
+    def __init__(self, config: NodeConfig) -> None:
+        super().__init__(config)
         self._script = asked(self)
 
     def on_start(self) -> Answer:
@@ -62,8 +62,8 @@ class Stays(Action):
 
     remembers_running = ("_since_ns",)
 
-    def __init__(self, wiring: Wiring) -> None:
-        super().__init__(wiring)
+    def __init__(self, config: NodeConfig) -> None:
+        super().__init__(config)
         self._script = asked(self)
         self._since_ns = 0
 
@@ -92,8 +92,8 @@ class Awaits(Action):
 
     remembers_running = ("_since_ns", "_holds_since_ns")
 
-    def __init__(self, wiring: Wiring) -> None:
-        super().__init__(wiring)
+    def __init__(self, config: NodeConfig) -> None:
+        super().__init__(config)
         self._script = asked(self)
         self._since_ns = 0
         self._holds_since_ns: int | None = None
@@ -122,8 +122,8 @@ class Until(Decorator):
     may_run = True
     ticking = Ticking(Order.SINGLE, after={SUCCESS: frozenset({*SUCCEEDS, AGAIN})})
 
-    def __init__(self, wiring: Wiring) -> None:
-        super().__init__(wiring)
+    def __init__(self, config: NodeConfig) -> None:
+        super().__init__(config)
         self._script = asked(self)
 
     def update(self) -> Answer:
@@ -159,8 +159,8 @@ class RetryAfter(Decorator):
         attempts = whole_number(given, cls.ticking.rounds)
         return children[0] if attempts is not None and (attempts > 0 or attempts == FOR_EVER) else children[0] | FAILS
 
-    def __init__(self, wiring: Wiring) -> None:
-        super().__init__(wiring)
+    def __init__(self, config: NodeConfig) -> None:
+        super().__init__(config)
         self._script = asked(self)
         self._left = 0
         self._again_ns: int | None = None
@@ -196,8 +196,8 @@ class Needs(Condition):
     ports = (IF, script_port("otherwise", "a script of a text"))
     ends = ENDS
 
-    def __init__(self, wiring: Wiring) -> None:
-        super().__init__(wiring)
+    def __init__(self, config: NodeConfig) -> None:
+        super().__init__(config)
         self._script = asked(self)
         self._otherwise = asked(self, "otherwise")
 

@@ -13,7 +13,7 @@ from alula.missions.skillset import Client
 from alula.model.execution_state import ExecutionState
 from alula.model.model import Resource, Skill, Skillset
 from alula.trees.ends import ENDS, FAILS, Ends, Given
-from alula.trees.node import Action, Condition, Wiring, tickable
+from alula.trees.node import Action, Condition, NodeConfig, tickable
 from alula.trees.palette import Palette
 from alula.trees.status import FAILURE, IDLE, RUNNING, SUCCESS, Answer
 
@@ -43,8 +43,8 @@ class SkillNode(Action):
         """Fail at any time, as it may be refused, interrupted, or stopped by an invariant; succeed where a result is a success."""
         return cls.ends if given(SUCCESS_PORT) else FAILS
 
-    def __init__(self, wiring: Wiring, model: Skill, skillset: str, crew: Crew) -> None:
-        super().__init__(wiring)
+    def __init__(self, config: NodeConfig, model: Skill, skillset: str, crew: Crew) -> None:
+        super().__init__(config)
         self.crew = crew
         self.model = model
         self.skillset = skillset
@@ -108,8 +108,8 @@ class ResourceNode(Condition):
 
     ends = ENDS
 
-    def __init__(self, wiring: Wiring, model: Resource, skillset: str, crew: Crew) -> None:
-        super().__init__(wiring)
+    def __init__(self, config: NodeConfig, model: Resource, skillset: str, crew: Crew) -> None:
+        super().__init__(config)
         self.crew = crew
         self.model = model
         self.skillset = skillset

@@ -34,7 +34,7 @@ class Failing:
     @property
     def degrades(self) -> bool:
         """Return whether the author marks the mission as degraded once it has failed: an end other than giving up may be good then."""
-        return _DEGRADED.search(self.leaf.wiring.element.get("_onFailure")) is not None
+        return _DEGRADED.search(self.leaf.config.element.get("_onFailure")) is not None
 
     @property
     def situation(self) -> str:
@@ -69,7 +69,7 @@ def failing_by(fault: str, subject: Subject, system: System) -> list[Failing]:
         results = tuple(one for one in ends if any(fnmatchcase(f"{name} {one}", end) for end in effects.ends))
         if (broken or results) and leaf in system.trees[0].nodes:
             full = tuple((f"{leaf.skillset}.{at}", state) for at, state in broken)
-            found.setdefault(id(leaf.wiring.element), Failing(leaf, name, full, fault, results, _shown(full, texts)))
+            found.setdefault(id(leaf.config.element), Failing(leaf, name, full, fault, results, _shown(full, texts)))
     return list(found.values())
 
 

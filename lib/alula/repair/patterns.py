@@ -88,7 +88,7 @@ class Patterns:
         """Yield the nodes of the mission's own file that a branch may stand beside, from the leaf up."""
         at: Node | None = leaf
         while at is not None:
-            if at.wiring.element.place.path == self._subject.files.path and at.wiring.element.tag != "BehaviorTree":
+            if at.config.element.place.path == self._subject.files.path and at.config.element.tag != "BehaviorTree":
                 yield at
             at = at.parent
 
@@ -107,9 +107,9 @@ class Patterns:
 
     def _again(self, place: Node, failing: Failing) -> Iterator[Branch]:
         """Yield the node in a RetryAfter, with one chance more than faults may come; there are no more in one that is there."""
-        if failing.states or place.wiring.element.tag in RETRIES:
+        if failing.states or place.config.element.tag in RETRIES:
             return
-        element, attempts = place.wiring.element, self._most_faults + 1
+        element, attempts = place.config.element, self._most_faults + 1
         condition, name = self._worth_it(place, failing, attempts)
         if condition:
             again = node("RetryAfter", name=name, attempts=str(attempts), wait=AGAIN_S, if_=condition)
@@ -122,13 +122,13 @@ class Patterns:
 
         It is where it has ended as the fault ends it, or what it needs is there; empty: always.
         """
-        entry = pointer(failing.leaf.wiring.element.get(OUTCOME_PORT), OUTCOME_PORT)
+        entry = pointer(failing.leaf.config.element.get(OUTCOME_PORT), OUTCOME_PORT)
         if entry and place is failing.leaf:
             return " || ".join(f"{entry} == '{one}'" for one in failing.results), often_when(attempts, failing.results)
         purpose = self._purposes.known[failing.skill]
         needed = asked_of_others(purpose)
         condition = " && ".join(f"{purpose.skillset.name}.{resource.name} == {state}" for resource, state in needed)
-        return condition, chances(attempts, node_name(place.wiring.element) if place is failing.leaf else "")
+        return condition, chances(attempts, node_name(place.config.element) if place is failing.leaf else "")
 
     # --- what is there -----------------------------------------------------------------------------------------------
 
@@ -137,7 +137,7 @@ class Patterns:
         for name in self._trees:
             if name not in used and name not in BEYOND and name != self._subject.files.main:
                 use = node("SubTree", ID=name, name=plain(name), _autoremap="true")
-                yield Branch(use, None, place.wiring.element.place, (f"{failing.situation}.",))
+                yield Branch(use, None, place.config.element.place, (f"{failing.situation}.",))
 
     def _coming_to_rest(self, place: Node, failing: Failing) -> Iterator[Branch]:
         """Yield the end at rest, as a good one where the author calls the mission degraded once this has failed; and giving up."""
@@ -158,8 +158,8 @@ class Patterns:
 
     def _subtree(self, tree: str, top: Element, place: Node, why: tuple[str, ...], rank: Rank, name: str = "") -> Branch:
         use = node("SubTree", ID=another(tree, self._trees), name=name or plain(tree), _autoremap="true")
-        return Branch(use, top, place.wiring.element.place, why, rank=rank)
+        return Branch(use, top, place.config.element.place, why, rank=rank)
 
 
 def _in_fallback(place: Node) -> bool:
-    return place.parent is not None and place.parent.wiring.element.tag in FALLBACKS
+    return place.parent is not None and place.parent.config.element.tag in FALLBACKS

@@ -89,7 +89,7 @@ class Remedies:
     def other_ways(self, place: Node, failing: Failing, states: States) -> Iterator[Branch]:
         """Yield parts with a skill replaced by another of its role, with what that one needs beside it."""
         here = Here(self._at_rest(states))
-        acting = [one for one in place.wiring.element.iterate() if type_name(one) in self._purposes.known]
+        acting = [one for one in place.config.element.iterate() if type_name(one) in self._purposes.known]
         several = [one for one in acting if self._purposes.known[type_name(one)].achieves]
         if len(several) != 1 or not failing.states or not any(type_name(one) == failing.skill for one in acting):
             return
@@ -106,7 +106,7 @@ class Remedies:
         So one robot of two gives up its task, and the other one goes there.
         """
         above = place.parent
-        if above is None or above.wiring.element.tag != "Sequence":
+        if above is None or above.config.element.tag != "Sequence":
             return
         mine = self._in(place)
         roles = {role for one in mine if one.achieves for role in one.roles}
@@ -114,17 +114,17 @@ class Remedies:
         later = [one for other in above.children[above.children.index(place) + 1 :] for one in self._in(other)]
         instead = [one for one in later if one.achieves and one.roles & roles and one.skillset.name not in skillsets]
         if instead:
-            (first, *_), name = instead, node_name(place.wiring.element)
+            (first, *_), name = instead, node_name(place.config.element)
             role = listed(told_resource(one) for one in sorted(first.roles & roles))
             why = f"{failing.situation}: go on without '{name}'; {first.name} comes later, for the same {role}."
             script = node("Script", name=f"not done: {name}", code="@degraded := true")
-            yield Branch(script, None, place.wiring.element.place, (why,), rank=Rank.LEAVES_OUT)
+            yield Branch(script, None, place.config.element.place, (why,), rank=Rank.LEAVES_OUT)
 
     # --- parts -------------------------------------------------------------------------------------------------------
 
     def _in(self, place: Node) -> list[Purpose]:
         """Return the skills of a part of the mission, with those of the trees that it uses."""
-        names = dict.fromkeys(type_name(one.wiring.element) for one in place.iterate())
+        names = dict.fromkeys(type_name(one.config.element) for one in place.iterate())
         return [self._purposes.known[name] for name in names if name in self._purposes.known]
 
     def _at_rest(self, states: States) -> dict[str, str]:
@@ -146,7 +146,7 @@ class Remedies:
     def _before_the_next_round(self, place: Node, failing: Failing, course: Course, steps: list[Element]) -> Branch:
         """Return the course as another child of a Fallback that a loop ticks again when it has succeeded."""
         condition, name, after = "", "", list[Element]()
-        entry = pointer(failing.leaf.wiring.element.get(OUTCOME_PORT), OUTCOME_PORT)
+        entry = pointer(failing.leaf.config.element.get(OUTCOME_PORT), OUTCOME_PORT)
         if entry and failing.results:
             condition = " || ".join(f"{entry} == '{one}'" for one in failing.results)
             name = f"{plain(failing.skill)} has failed"
@@ -155,11 +155,11 @@ class Remedies:
         *asked, degraded = opening(condition, name, "@degraded := true")
         top = node("Sequence", *asked, *steps, degraded, *after, name=words)
         use = node("SubTree", ID=self._tree(words), name=words, _autoremap="true")
-        return Branch(use, top, place.wiring.element.place, _why(failing, course, steps, "then on with the work"))
+        return Branch(use, top, place.config.element.place, _why(failing, course, steps, "then on with the work"))
 
     def _again_after(self, place: Node, failing: Failing, course: Course, steps: list[Element]) -> Branch:
         """Return a retry around the node and the course, which is done after each failure."""
-        element = place.wiring.element
+        element = place.config.element
         last = course.steps[-1]
         words = plain(last.name)
         top = node("Sequence", *steps, *opening("", "", "@degraded := true"), name=words)
@@ -185,7 +185,7 @@ class Remedies:
         ends = "" if rank is Rank.GOES_ON else " to the safe place, and end there, degraded"
         why = (f"{failing.situation}: {plain(purpose.name)}{ends}.", *_beside([purpose], [step]))
         use = node("SubTree", ID=self._tree(name), name=name, _autoremap="true")
-        return Branch(use, top, place.wiring.element.place, why, rank=rank)
+        return Branch(use, top, place.config.element.place, why, rank=rank)
 
 
 def _needed(purpose: Purpose) -> str:
@@ -196,7 +196,7 @@ def _begins_again(place: Node) -> bool:
     """Return whether a node is in a Fallback that is ticked again when another of its children succeeds."""
     outer = place.parent
     loop = None if outer is None else outer.parent
-    return outer is not None and loop is not None and outer.wiring.element.tag in FALLBACKS and loop.wiring.element.tag == LOOP
+    return outer is not None and loop is not None and outer.config.element.tag in FALLBACKS and loop.config.element.tag == LOOP
 
 
 def _why(failing: Failing, course: Course, steps: Sequence[Element], then: str) -> tuple[str, ...]:

@@ -33,10 +33,10 @@ class StandIns:
 
     def beside(self, place: Node, failing: Failing) -> Iterator[Branch]:
         """Yield branches that may stand beside a node that contains the failure."""
-        element = place.wiring.element
+        element = place.config.element
         tree = self._trees.get(element.get("ID")) if element.tag == "SubTree" else None
         top = element if tree is None else tree.children[0]
-        mine = failing.leaf.wiring.element.place
+        mine = failing.leaf.config.element.place
         if not any(one.place == mine for one in top.iterate()):
             return
         others = dict.fromkeys(type_name(one) for one in top.iterate() if type_name(one) in self._purposes.known)
@@ -77,7 +77,7 @@ class StandIns:
         return all((one.robot, role.name) in filled for one in needing for role in one.skill.needs)
 
     def _as_branch(self, made: _Made, at: Node, instead: Mapping[str, Purpose], failing: Failing) -> Branch:
-        place = at.wiring.element
+        place = at.config.element
         renaming = Renaming(failing.skill.rpartition(".")[2], instead[failing.skill].skill.name, self._texts)
         name, old = renaming.name(node_name(place)), node_name(place)
         if name == old:
@@ -120,8 +120,8 @@ def _run_beside(place: Node) -> Iterator[str]:
     """Yield the skills that run beside a node."""
     at = place
     while at.parent is not None:
-        if at.parent.wiring.element.tag == "Parallel":
-            yield from (type_name(one.wiring.element) for child in at.parent.children if child is not at for one in child.iterate())
+        if at.parent.config.element.tag == "Parallel":
+            yield from (type_name(one.config.element) for child in at.parent.children if child is not at for one in child.iterate())
         at = at.parent
 
 

@@ -11,14 +11,14 @@ from typing import TypeAlias
 
 from alula.trees.attributes import POSTCONDITIONS, PRECONDITIONS
 from alula.trees.blackboard import Blackboard
+from alula.trees.configuration import plain_inside
 from alula.trees.document import Attribute, Element
-from alula.trees.node import Node, Wiring, pointer
+from alula.trees.node import Node, NodeConfig, pointer
 from alula.trees.node_type import NodeType
 from alula.trees.ports import Direction, Port
 from alula.trees.script.syntax import Assignment, Call, Chain, Comparison, Conditional, Literal, Name, Prefix, children, walk
 from alula.trees.script.syntax import Node as Part
 from alula.trees.values import ANY
-from alula.trees.wiring import plain_inside
 
 Key: TypeAlias = tuple[Blackboard, str]
 """An entry: the blackboard that it stands on, and its name there."""
@@ -61,14 +61,14 @@ class Accesses:
     def __init__(self, statements: Callable[[Attribute], Sequence[Part]], names: Collection[str] | None = ()) -> None:
         self._statements = statements
         self._names = names
-        self._before: dict[Wiring, list[Access]] = {}
-        self._after: dict[Wiring, list[Access]] = {}
-        self._scripts: dict[tuple[Wiring, str], list[Access]] = {}
-        self._read: dict[tuple[Wiring, str], Sequence[Part]] = {}
+        self._before: dict[NodeConfig, list[Access]] = {}
+        self._after: dict[NodeConfig, list[Access]] = {}
+        self._scripts: dict[tuple[NodeConfig, str], list[Access]] = {}
+        self._read: dict[tuple[NodeConfig, str], Sequence[Part]] = {}
 
-    def of(self, wiring: Wiring) -> Iterator[Access]:
+    def of(self, config: NodeConfig) -> Iterator[Access]:
         """Yield those of a node and all below it."""
-        left = [(wiring, False)]
+        left = [(config, False)]
         while left:
             one, is_over = left.pop()
             if is_over:
@@ -78,71 +78,71 @@ class Accesses:
             left.append((one, True))
             left.extend((child, False) for child in reversed(one.children))
 
-    def before(self, wiring: Wiring) -> list[Access]:
+    def before(self, config: NodeConfig) -> list[Access]:
         """Return those before its children are ticked, of a leaf those before it ends."""
-        if wiring not in self._before:
-            self._before[wiring] = list(self._first(wiring))
-        return self._before[wiring]
+        if config not in self._before:
+            self._before[config] = list(self._first(config))
+        return self._before[config]
 
-    def after(self, wiring: Wiring) -> list[Access]:
+    def after(self, config: NodeConfig) -> list[Access]:
         """Return those of its scripts after it has ended."""
-        if wiring not in self._after:
-            self._after[wiring] = [one for attribute in scripts_after(wiring.element) for one in self.in_script(wiring, attribute.name)]
-        return self._after[wiring]
+        if config not in self._after:
+            self._after[config] = [one for attribute in scripts_after(config.element) for one in self.in_script(config, attribute.name)]
+        return self._after[config]
 
-    def in_script(self, wiring: Wiring, attribute: str) -> list[Access]:
+    def in_script(self, config: NodeConfig, attribute: str) -> list[Access]:
         """Return those of the script in an attribute of a node, none where it has none."""
-        key = (wiring, attribute)
+        key = (config, attribute)
         if key not in self._scripts:
-            script = wiring.element.attributes.get(attribute)
-            self._scripts[key] = [] if script is None else list(self._in(wiring, script))
+            script = config.element.attributes.get(attribute)
+            self._scripts[key] = [] if script is None else list(self._in(config, script))
         return self._scripts[key]
 
-    def in_scripts(self, wiring: Wiring) -> Iterator[Access]:
+    def in_scripts(self, config: NodeConfig) -> Iterator[Access]:
         """Yield those of all scripts of a node, in the order in which these run."""
-        for attribute in scripts_of(wiring.element, wiring.type):
-            yield from self.in_script(wiring, attribute.name)
+        for attribute in scripts_of(config.element, config.type):
+            yield from self.in_script(config, attribute.name)
 
-    def statements(self, wiring: Wiring) -> list[Part]:
+    def statements(self, config: NodeConfig) -> list[Part]:
         """Return the statements of all scripts of a node, in the order in which these run."""
-        return [one for attribute in scripts_of(wiring.element, wiring.type) for one in self._statements_in(wiring, attribute)]
+        return [one for attribute in scripts_of(config.element, config.type) for one in self._statements_in(config, attribute)]
 
-    def parts(self, wiring: Wiring) -> Iterator[Part]:
+    def parts(self, config: NodeConfig) -> Iterator[Part]:
         """Yield the parts of all scripts of a node, in the order in which these run; each before what it is made of."""
-        for statement in self.statements(wiring):
+        for statement in self.statements(config):
             yield from walk(statement)
 
-    def calls(self, wiring: Wiring, attribute: str) -> Iterator[Call]:
+    def calls(self, config: NodeConfig, attribute: str) -> Iterator[Call]:
         """Yield the calls in the script in an attribute of a node."""
-        script = wiring.element.attributes.get(attribute)
-        for statement in () if script is None else self._statements_in(wiring, script):
+        script = config.element.attributes.get(attribute)
+        for statement in () if script is None else self._statements_in(config, script):
             yield from (one for one in walk(statement) if isinstance(one, Call))
 
-    def of_node(self, wiring: Wiring) -> Iterator[Access]:
+    def of_node(self, config: NodeConfig) -> Iterator[Access]:
         """Yield those of a node itself."""
-        yield from self.before(wiring)
-        yield from self.after(wiring)
+        yield from self.before(config)
+        yield from self.after(config)
 
-    def _first(self, wiring: Wiring) -> Iterator[Access]:
-        for attribute in scripts_before(wiring.element):
-            yield from self.in_script(wiring, attribute.name)
-        if wiring.is_subtree:
-            yield from _constants(wiring)
+    def _first(self, config: NodeConfig) -> Iterator[Access]:
+        for attribute in scripts_before(config.element):
+            yield from self.in_script(config, attribute.name)
+        if config.is_subtree:
+            yield from _constants(config)
             return
-        yield from _read_by_ports(wiring)
-        for attribute in scripts_within(wiring.element, wiring.type):
-            yield from self.in_script(wiring, attribute.name)
-        yield from _written_by_ports(wiring)
+        yield from _read_by_ports(config)
+        for attribute in scripts_within(config.element, config.type):
+            yield from self.in_script(config, attribute.name)
+        yield from _written_by_ports(config)
 
-    def _statements_in(self, wiring: Wiring, script: Attribute) -> Sequence[Part]:
-        key = (wiring, script.name)
+    def _statements_in(self, config: NodeConfig, script: Attribute) -> Sequence[Part]:
+        key = (config, script.name)
         if key not in self._read:
             self._read[key] = self._statements(script)
         return self._read[key]
 
-    def _in(self, wiring: Wiring, script: Attribute) -> Iterator[Access]:
-        for statement in self._statements_in(wiring, script):
-            yield from self._part(wiring.blackboard, script, statement, sure=True)
+    def _in(self, config: NodeConfig, script: Attribute) -> Iterator[Access]:
+        for statement in self._statements_in(config, script):
+            yield from self._part(config.blackboard, script, statement, sure=True)
 
     def _is_entry(self, name: str) -> bool:
         return self._names is None or (name not in self._names and "." not in name)
@@ -180,33 +180,33 @@ class Accesses:
                         yield from self._part(board, attribute, child, needed=not _may_be_state(part, child), among=texts)
 
 
-def _read_by_ports(wiring: Wiring) -> Iterator[Access]:
-    for attribute, port in _ports(wiring):
+def _read_by_ports(config: NodeConfig) -> Iterator[Access]:
+    for attribute, port in _ports(config):
         key = pointer(attribute.value, port.name)
         if key is not None and port.direction is not Direction.OUTPUT:
             # Of a port that is read and written, only a class is known to need what it reads.
-            needed = not port.optional and (port.direction is Direction.INPUT or wiring.type.is_tickable)
-            unchecked = wiring.type.name if port.unchecked else ""
-            yield Access(wiring.blackboard.where(key), key, False, attribute, None, _type_name(port), port.unit, unchecked, needed)
+            needed = not port.optional and (port.direction is Direction.INPUT or config.type.is_tickable)
+            unchecked = config.type.name if port.unchecked else ""
+            yield Access(config.blackboard.where(key), key, False, attribute, None, _type_name(port), port.unit, unchecked, needed)
 
 
-def _written_by_ports(wiring: Wiring) -> Iterator[Access]:
-    for attribute, port in _ports(wiring):
+def _written_by_ports(config: NodeConfig) -> Iterator[Access]:
+    for attribute, port in _ports(config):
         key = pointer(attribute.value, port.name)
         if port.written_from and key is None:
             name = attribute.value
-            yield Access(wiring.blackboard.where(name), name, True, attribute, None, _set_type(wiring, port.written_from))
+            yield Access(config.blackboard.where(name), name, True, attribute, None, _set_type(config, port.written_from))
         elif key is not None and not port.written_from and port.direction is not Direction.INPUT:
-            yield Access(wiring.blackboard.where(key), key, True, attribute, None, _type_name(port), port.unit)
+            yield Access(config.blackboard.where(key), key, True, attribute, None, _type_name(port), port.unit)
 
 
-def _ports(wiring: Wiring) -> Iterator[tuple[Attribute, Port]]:
+def _ports(config: NodeConfig) -> Iterator[tuple[Attribute, Port]]:
     """Yield the ports that its type has and its element gives, then outputs that it has an entry for by default."""
-    known = wiring.type.ports
-    yield from ((one, known[one.name]) for one in wiring.port_attributes() if one.name in known)
+    known = config.type.ports
+    yield from ((one, known[one.name]) for one in config.port_attributes() if one.name in known)
     for port in known.values():
-        if port.direction is not Direction.INPUT and port.default and port.name not in wiring.element.attributes:
-            yield Attribute(port.name, port.default, wiring.element.place), port
+        if port.direction is not Direction.INPUT and port.default and port.name not in config.element.attributes:
+            yield Attribute(port.name, port.default, config.element.place), port
 
 
 def scripts_before(element: Element) -> Iterator[Attribute]:
@@ -241,13 +241,13 @@ def takes_script_from_entry(element: Element, type_: NodeType | None) -> bool:
 
 def named_entries(node: Node) -> Mapping[str, str]:
     """Return the entries that a node's ports name, by port, as the file calls them: ``@entry`` is one of the main tree."""
-    keys = ((port, pointer(text, port)) for port, text in node.wiring.ports.items())
+    keys = ((port, pointer(text, port)) for port, text in node.config.ports.items())
     return {port: key for port, key in keys if key is not None}
 
 
 def written_entries(node: Node) -> Mapping[str, str]:
     """Return the entries that a node may write through its ports, by port; as `named_entries`."""
-    known = node.wiring.type.ports
+    known = node.config.type.ports
     return {port: key for port, key in named_entries(node).items() if port in known and known[port].direction is not Direction.INPUT}
 
 
@@ -295,8 +295,8 @@ def _written(value: Part) -> str:
             return UNKNOWN
 
 
-def _set_type(wiring: Wiring, source: str) -> str:
-    text = wiring.ports.get(source) or ""
+def _set_type(config: NodeConfig, source: str) -> str:
+    text = config.ports.get(source) or ""
     if pointer(text, source) is not None:
         return UNKNOWN
     try:
@@ -310,9 +310,9 @@ def _type_name(port: Port) -> str:
     return UNKNOWN if port.type is ANY else port.type.name
 
 
-def _constants(wiring: Wiring) -> Iterator[Access]:
+def _constants(config: NodeConfig) -> Iterator[Access]:
     """Yield what a subtree's use writes into the entries of the subtree: `<SubTree ID="leg" height="3"/>`."""
-    for child in wiring.children:
-        for name, text in plain_inside(wiring).items():
-            attribute = wiring.element.attributes.get(name) or Attribute(name, text, wiring.element.place)
+    for child in config.children:
+        for name, text in plain_inside(config).items():
+            attribute = config.element.attributes.get(name) or Attribute(name, text, config.element.place)
             yield Access((child.blackboard, name), name, True, attribute)

@@ -22,7 +22,7 @@ from alula.trees.enums import enums_of
 from alula.trees.errors import TickError, did_you_mean
 from alula.trees.factory import build_tree
 from alula.trees.guessing import category_of
-from alula.trees.node import Action, Control, Maker, Node, TickableType, Wiring, tickable
+from alula.trees.node import Action, Control, Maker, Node, NodeConfig, TickableType, tickable
 from alula.trees.node_type import CHILDREN, Category, NodeType, node_type
 from alula.trees.palette import Palette
 from alula.trees.ports import Direction, Port
@@ -144,7 +144,7 @@ class Answers:
         return step if step.answer is not None else replace(step, answer=self._any(leaf))
 
     def _any(self, leaf: Node) -> Answer:
-        is_condition = leaf.wiring.type.category is Category.CONDITION
+        is_condition = leaf.config.type.category is Category.CONDITION
         return self._chance.choice((SUCCESS, FAILURE) if is_condition else (RUNNING, SUCCESS, FAILURE))
 
 
@@ -194,16 +194,16 @@ def _step(said: object, where: str) -> Step:
 class ScriptedLeaf(Action):
     """A leaf that answers and writes what a script says."""
 
-    def __init__(self, wiring: Wiring, answers: Answers) -> None:
-        super().__init__(wiring)
+    def __init__(self, config: NodeConfig, answers: Answers) -> None:
+        super().__init__(config)
         self._answers = answers
 
     def setup(self) -> None:
         """Refuse outputs that the node has no port for."""
         for step in self._answers.of(self.name) or ():
             for port in step.outputs if isinstance(step, Step) else ():
-                known = self.wiring.type.ports.get(port)
-                outputs = [one.name for one in self.wiring.type.ports.values() if one.direction is not Direction.INPUT]
+                known = self.config.type.ports.get(port)
+                outputs = [one.name for one in self.config.type.ports.values() if one.direction is not Direction.INPUT]
                 if known is None or port not in outputs:
                     cure = did_you_mean(port, outputs) or f"its outputs are {', '.join(outputs) or 'none'}"
                     raise AnswersError(f"the answers have '{self.name}' write the port '{port}', which is no output of it; {cure}")
@@ -223,7 +223,7 @@ class ScriptedLeaf(Action):
     def _do(self, call: str) -> Answer:
         step = self._answers.next(self, call)
         for port, value in step.outputs.items():
-            type_ = self.wiring.type.ports[port].type
+            type_ = self.config.type.ports[port].type
             try:
                 self.put(port, type_.parse(value) if isinstance(value, str) else type_.read(value))
             except ValueError as error:
@@ -248,7 +248,7 @@ class UnknownNode(Control):
 
     def update(self) -> Answer:
         """Raise TickError."""
-        name = self.wiring.type.name
+        name = self.config.type.name
         stands = f'say in the answers what stands in: "stand_ins": {{"{name}": ...}} with {_stands()}'
         raise TickError(f"{self.place()}: nothing here ticks a '{name}'; {stands}")
 
@@ -290,7 +290,7 @@ def ticks(tree: Tree, answers: Answers, count: int, clock: StepClock) -> Iterato
 
     def note(node: Node, before: Answer, after: Answer) -> None:
         if after is not IDLE or before is RUNNING:  # what has ended is reset by its parent, which tells nothing
-            changes.append(Change(node.wiring.path, NAMES[before], NAMES[after]))
+            changes.append(Change(node.config.path, NAMES[before], NAMES[after]))
 
     unwatch = tree.watch(note)
     known = dict(tree.blackboard.values())
@@ -375,10 +375,10 @@ def _stand_in(said: str) -> TickableType | None:
 
 
 def _leaf_maker(known: NodeType, answers: Answers) -> Maker:
-    def leaf(wiring: Wiring) -> Node:
-        if isinstance(known, TickableType) and wiring.name not in answers.script:
-            return known.make(wiring)
-        return ScriptedLeaf(wiring, answers)
+    def leaf(config: NodeConfig) -> Node:
+        if isinstance(known, TickableType) and config.name not in answers.script:
+            return known.make(config)
+        return ScriptedLeaf(config, answers)
 
     return leaf
 

@@ -6,14 +6,14 @@ from collections.abc import Mapping, Sequence
 
 from alula.trees.attributes import POSTCONDITIONS, PRECONDITIONS, type_name
 from alula.trees.blackboard import Blackboard, Clock
+from alula.trees.configuration import Surroundings, configure, path_inside
 from alula.trees.errors import FileError, Problem
-from alula.trees.node import After, Before, Node, Script, Shared, TickableType, Wiring, pointer
+from alula.trees.node import After, Before, Node, NodeConfig, Script, Shared, TickableType, pointer
 from alula.trees.palette import Palette
 from alula.trees.reading import TreeFiles
 from alula.trees.structure import verify
 from alula.trees.tree import Subtree, Tree
 from alula.trees.values import ANY, STRING
-from alula.trees.wiring import Surroundings, path_inside, wire
 
 
 def make_tree(
@@ -61,35 +61,35 @@ def build_tree(
     """
     shared = Shared(clock)
     board = blackboard or Blackboard(clock)
-    wiring = wire(files, palette, main or files.main, shared, enums=enums, surroundings=surroundings, blackboard=board, after=after)
+    config = configure(files, palette, main or files.main, shared, enums=enums, surroundings=surroundings, blackboard=board, after=after)
     subtrees = [Subtree(main or files.main, "", board)]
-    return Tree(_made(wiring, subtrees[0], subtrees), subtrees, files, shared)
+    return Tree(_made(config, subtrees[0], subtrees), subtrees, files, shared)
 
 
-def _made(wiring: Wiring, subtree: Subtree, subtrees: list[Subtree]) -> Node:
+def _made(config: NodeConfig, subtree: Subtree, subtrees: list[Subtree]) -> Node:
     """Make a node with all below it; the limits on depth and number of nodes were verified."""
-    element, known = wiring.element, wiring.type
+    element, known = config.element, config.type
     if not isinstance(known, TickableType):
         raise FileError(Problem(element.place, f"'{type_name(element)}' is known from a model only", "nothing registers it"))
-    _declare(wiring)
-    node = known.wired(wiring)
-    before, after = (_conditions(names, wiring) for names in (PRECONDITIONS, POSTCONDITIONS))
+    _declare(config)
+    node = known.instantiate(config)
+    before, after = (_conditions(names, config) for names in (PRECONDITIONS, POSTCONDITIONS))
     node.before = Before(*before) if before else None
     node.after = After(*after) if after else None
     subtree.nodes.append(node)
-    if wiring.is_subtree:
-        subtree = Subtree(type_name(element), path_inside(wiring, subtree.path), wiring.children[0].blackboard)
+    if config.is_subtree:
+        subtree = Subtree(type_name(element), path_inside(config, subtree.path), config.children[0].blackboard)
         subtrees.append(subtree)
-    node.children = [_made(child, subtree, subtrees) for child in wiring.children]
+    node.children = [_made(child, subtree, subtrees) for child in config.children]
     for child in node.children:
         child.parent = node
     return node
 
 
-def _declare(wiring: Wiring) -> None:
+def _declare(config: NodeConfig) -> None:
     """Give the entries that ports name their types."""
-    element, board = wiring.element, wiring.blackboard
-    for port in wiring.type.ports.values():
+    element, board = config.element, config.blackboard
+    for port in config.type.ports.values():
         key = pointer(element.get(port.name), port.name) if port.name in element.attributes else None
         if key is None:
             continue
@@ -101,9 +101,9 @@ def _declare(wiring: Wiring) -> None:
             raise FileError(Problem(element.place_of(port.name), message, "use another entry"))
 
 
-def _conditions(names: Sequence[str], wiring: Wiring) -> list[Script | None]:
+def _conditions(names: Sequence[str], config: NodeConfig) -> list[Script | None]:
     """Return the scripts of these attributes, None where there is none; empty when there are none at all."""
-    element = wiring.element
+    element = config.element
     if not any(name in element.attributes for name in names):
         return []
-    return [wiring.compile(element.get(name), name) if name in element.attributes else None for name in names]
+    return [config.compile(element.get(name), name) if name in element.attributes else None for name in names]

@@ -57,8 +57,8 @@ class Shared:
 
 
 @dataclass(frozen=True, eq=False)
-class Wiring:
-    """A node where it stands in a tree: what the one that ticks is made of, and what the check and the search look at.
+class NodeConfig:
+    """The configuration of a node where it stands in a tree: the node that ticks is made of it; check and search read it.
 
     ``ports`` are those that the file gives or that have a default, as text; ``children`` of a subtree's use the top of that tree.
     """
@@ -74,8 +74,8 @@ class Wiring:
     compile: Callable[[str, str], Script]
     """Makes a script of text over this node's blackboard, for the attribute that it stands in; raises FileError."""
     enums: Mapping[str, float] = field(default_factory=dict)
-    parent: Wiring | None = None
-    children: list[Wiring] = field(default_factory=list)
+    parent: NodeConfig | None = None
+    children: list[NodeConfig] = field(default_factory=list)
 
     @property
     def is_subtree(self) -> bool:
@@ -107,7 +107,7 @@ class Wiring:
         """Yield the attributes of its element that are ports."""
         yield from (one for name, one in self.element.attributes.items() if is_port(name))
 
-    def walk(self) -> Iterator[Wiring]:
+    def walk(self) -> Iterator[NodeConfig]:
         """Yield the node and all below it, in the order of the file."""
         left = [self]
         while left:
@@ -115,7 +115,7 @@ class Wiring:
             yield one
             left.extend(reversed(one.children))
 
-    def above(self) -> Iterator[tuple[Wiring, Wiring]]:
+    def above(self) -> Iterator[tuple[NodeConfig, NodeConfig]]:
         """Yield each node above with its child on the way, from here up."""
         one = self
         while one.parent is not None:
@@ -198,13 +198,13 @@ class Node(Behaviour):  # type: ignore[misc]  # py_trees is seen untyped
     status: Status
     children: list[Node]
 
-    def __init__(self, wiring: Wiring) -> None:
-        super().__init__(wiring.name)
-        self.wiring = wiring
+    def __init__(self, config: NodeConfig) -> None:
+        super().__init__(config.name)
+        self.config = config
         self.before: Before | None = None
         self.after: After | None = None
-        self.uid = wiring.uid
-        self._shared = wiring.shared
+        self.uid = config.uid
+        self._shared = config.shared
         self._constants: dict[str, object] = {}
 
     def setup(self) -> None:
@@ -339,7 +339,7 @@ class Node(Behaviour):  # type: ignore[misc]  # py_trees is seen untyped
     @property
     def blackboard(self) -> Blackboard:
         """The blackboard of the tree or subtree that contains the node."""
-        return self.wiring.blackboard
+        return self.config.blackboard
 
     @property
     def now_ns(self) -> int:
@@ -348,18 +348,18 @@ class Node(Behaviour):  # type: ignore[misc]  # py_trees is seen untyped
 
     def given(self, port: str) -> bool:
         """Return whether a port has a text, from the file or by default."""
-        return port in self.wiring.ports
+        return port in self.config.ports
 
     def get(self, port: str) -> object:
         """Return the value of an input, of its port's type; raises TickError without one, or for one of another type."""
         constants = self._constants
         if port in constants:
             return constants[port]
-        text = self.wiring.ports.get(port)
+        text = self.config.ports.get(port)
         if text is None:
             raise TickError(f"{self.place()}: the port '{port}' is not given")
         key = pointer(text, port)
-        type_ = self.wiring.type.ports[port].type
+        type_ = self.config.type.ports[port].type
         try:
             if key is None:
                 constants[port] = type_.parse(text)
@@ -373,12 +373,12 @@ class Node(Behaviour):  # type: ignore[misc]  # py_trees is seen untyped
 
     def script(self, port: str, default: str | None = None) -> Script:
         """Compile the script of a port; call it in `setup`. Raises FileError where the script is wrong, TickError without one."""
-        text = self.wiring.ports.get(port, default)
+        text = self.config.ports.get(port, default)
         if text is None:
             raise TickError(f"{self.place()}: the port '{port}' is not given")
-        if port not in self.wiring.type.scripts:
+        if port not in self.config.type.scripts:
             raise TickError(f"{self.place()}: the port '{port}' holds a script, and does not say so: declare it with script_port('{port}')")
-        return self.wiring.compile(text, port)
+        return self.config.compile(text, port)
 
     def number(self, port: str) -> int:
         """Return the value of an input that is a whole number."""
@@ -396,31 +396,31 @@ class Node(Behaviour):  # type: ignore[misc]  # py_trees is seen untyped
 
     def put(self, port: str, value: object) -> None:
         """Write an output; nothing is written where the file gives no entry for it, or an empty text."""
-        text = self.wiring.ports.get(port)
+        text = self.config.ports.get(port)
         if not text:
             return
         key = pointer(text, port)
         if key is None:
             raise TickError(f"{self.place()}: the port '{port}' is written, so it has to name an entry, as {{{text}}}")
-        self.blackboard.set(key, value, self.wiring.type.ports[port].type)
+        self.blackboard.set(key, value, self.config.type.ports[port].type)
 
     def entry(self, port: str) -> Entry | None:
         """Return the entry that a port names, None when there is none."""
-        text = self.wiring.ports.get(port, "")
+        text = self.config.ports.get(port, "")
         return self.blackboard.entry(pointer(text, port) or text)
 
     def place(self) -> str:
         """Return the node's place in the file and its name, for messages."""
-        return f"{self.wiring.element.place} ({self.name})"
+        return f"{self.config.element.place} ({self.name})"
 
 
-Maker: TypeAlias = "Callable[[Wiring], Node]"
-"""Makes a node of its wiring, as its class does."""
+Maker: TypeAlias = "Callable[[NodeConfig], Node]"
+"""Makes a node of its config, as its class does."""
 
 
 @dataclass(frozen=True, kw_only=True)
 class TickableType(NodeType):
-    """A type of node that can be ticked: ``make`` makes a node of its wiring."""
+    """A type of node that can be ticked: ``make`` makes a node of its config."""
 
     is_tickable = True
     make: Maker
@@ -430,9 +430,9 @@ class TickableType(NodeType):
         """The class that describes its nodes: the one that makes them, unless another one does."""
         return self.tells or (self.make if _is_class(self.make) else None)
 
-    def wired(self, wiring: Wiring) -> Node:
+    def instantiate(self, config: NodeConfig) -> Node:
         """Make a node, ready to be ticked; raises FileError."""
-        node = self.make(wiring)
+        node = self.make(config)
         node.setup()
         return node
 

@@ -71,27 +71,27 @@ def kind_of(node: Node) -> str:
     """Return what a node is, in the words of the figures."""
     if skill_of(node):
         return "skill"
-    return node.known_ticking().figure or CATEGORIES[node.wiring.type.category]
+    return node.known_ticking().figure or CATEGORIES[node.config.type.category]
 
 
 def skill_of(node: Node) -> str:
     """Return the skill that a leaf runs, as navigation.goto; empty where it is none: a robot's own node is a class, as uav.NextWaypoint."""
-    kind = node.wiring.type
+    kind = node.config.type
     _, dot, name = kind.name.rpartition(".")
     return kind.name if kind.category is Category.ACTION and dot and name[:1].islower() else ""
 
 
 def conditions_of(node: Node) -> dict[str, str]:
     """Return the pre- and postconditions of a node as its file has them."""
-    element = node.wiring.element
+    element = node.config.element
     return {name: element.get(name) for name in (*PRECONDITIONS, *POSTCONDITIONS) if name in element.attributes}
 
 
 def source_of(node: Node) -> Source:
     """Return what the file says of a node, without what it leaves to a default."""
-    element, place = node.wiring.element, node.wiring.element.place
-    ports = {name: text for name, text in node.wiring.ports.items() if name in element.attributes}
-    type_ = element.get("ID") if node.wiring.type.category is Category.SUBTREE else node.wiring.type.name
+    element, place = node.config.element, node.config.element.place
+    ports = {name: text for name, text in node.config.ports.items() if name in element.attributes}
+    type_ = element.get("ID") if node.config.type.category is Category.SUBTREE else node.config.type.name
     return Source(type_, ports, conditions_of(node), f"{Path(place.path).name}:{place.line}")
 
 

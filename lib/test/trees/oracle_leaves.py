@@ -48,17 +48,17 @@ class Act(Action):
     """A leaf whose answers are given."""
 
     def on_start(self) -> Answer:
-        return ANSWERS[STORY[0].answer("start", self.wiring.path, self.name)]
+        return ANSWERS[STORY[0].answer("start", self.config.path, self.name)]
 
     def on_running(self) -> Answer:
-        return ANSWERS[STORY[0].answer("tick", self.wiring.path, self.name)]
+        return ANSWERS[STORY[0].answer("tick", self.config.path, self.name)]
 
     def on_halted(self) -> None:
-        STORY[0].halted(self.wiring.path)
+        STORY[0].halted(self.config.path)
 
 
 class Ask(Condition):
     """A condition whose answers are given."""
 
     def update(self) -> Answer:
-        return ANSWERS[STORY[0].answer("start", self.wiring.path, self.name)]
+        return ANSWERS[STORY[0].answer("start", self.config.path, self.name)]

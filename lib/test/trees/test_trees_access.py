@@ -14,6 +14,7 @@ from alula.trees.access import (
     takes_script_from_entry,
     written_entries,
 )
+from alula.trees.configuration import configure
 from alula.trees.document import Element
 from alula.trees.factory import build_tree
 from alula.trees.node import Shared
@@ -22,7 +23,6 @@ from alula.trees.reading import read_text
 from alula.trees.script import names_in, statements_of
 from alula.trees.script.syntax import Name
 from alula.trees.standard import standard_palette
-from alula.trees.wiring import wire
 
 
 def node(line: str) -> tuple[Element, NodeType]:
@@ -69,7 +69,7 @@ def test_accesses_come_in_their_order_and_say_what_is_needed() -> None:
         '<SetBlackboard value="{n}" output_key="m"/><SubTree ID="b" k="3" l="{m}"/></Sequence></BehaviorTree>'
         '<BehaviorTree ID="b"><ScriptCondition code="k == l &amp;&amp; x.y == k &amp;&amp; f(k)"/></BehaviorTree></root>'
     )
-    root = wire(files, standard_palette(), "a", Shared(int))
+    root = configure(files, standard_palette(), "a", Shared(int))
     inside = root.children[1].children[0].blackboard
     found = [(one.key, one.write, one.needed, one.in_passing) for one in Accesses(lambda one: statements_of(one.value), {"RED"}).of(root)]
     n, m, k = (root.blackboard, "n"), (root.blackboard, "m"), (inside, "k")
@@ -83,7 +83,7 @@ def test_accesses_come_in_their_order_and_say_what_is_needed() -> None:
 
 def accesses(code: str) -> list[tuple[str, bool, bool, frozenset[str] | None]]:
     files = read_text(f'<root BTCPP_format="4"><BehaviorTree ID="a"><Script code="{code}"/></BehaviorTree></root>')
-    root = wire(files, standard_palette(), "a", Shared(int))
+    root = configure(files, standard_palette(), "a", Shared(int))
     found = Accesses(lambda one: statements_of(one.value), None).in_script(root, "code")
     return [(one.name, one.write, one.sure, one.among) for one in found]
 
@@ -109,14 +109,14 @@ def test_a_script_says_which_writing_is_sure_and_which_texts_are_told_apart(
 
 def test_calls_name_what_they_ask_for() -> None:
     files = read_text('<root BTCPP_format="4"><BehaviorTree ID="a"><Script code="a := f(b.c) + g(\'d\', 1 + 2)"/></BehaviorTree></root>')
-    root = wire(files, standard_palette(), "a", Shared(int))
+    root = configure(files, standard_palette(), "a", Shared(int))
     calls = Accesses(lambda one: statements_of(one.value)).calls(root, "code")
     assert [(one.function, one.named) for one in calls] == [("f", ("b.c",)), ("g", ("d", ""))]
 
 
 def test_all_scripts_of_a_node_are_read_in_the_order_in_which_they_run() -> None:
     line = '<Script _post="d := 1" code="a := b == c" _skipIf="e"/>'
-    root = wire(
+    root = configure(
         read_text(f'<root BTCPP_format="4"><BehaviorTree ID="a">{line}</BehaviorTree></root>'), standard_palette(), "a", Shared(int)
     )
     accesses = Accesses(lambda one: statements_of(one.value), None)

@@ -134,8 +134,8 @@ class Double(SyncAction):
 class Twice(Decorator):
     """Needs its child to succeed twice."""
 
-    def __init__(self, wiring):
-        super().__init__(wiring)
+    def __init__(self, config):
+        super().__init__(config)
         self._left = 2
 
     def update(self):

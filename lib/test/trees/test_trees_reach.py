@@ -9,6 +9,7 @@ from random_trees import make_case
 
 from alula.check.checking import check
 from alula.check.reach import unreached
+from alula.trees.configuration import configure
 from alula.trees.ends import ANY_END, FAILS, SKIPS, SUCCEEDS
 from alula.trees.node import Decorator, Shared
 from alula.trees.nodes import leaves, sequences
@@ -16,7 +17,6 @@ from alula.trees.reach import Reach
 from alula.trees.reading import read_text
 from alula.trees.standard import standard_palette
 from alula.trees.status import ANSWERS, RUNNING, SKIPPED, SUCCESS
-from alula.trees.wiring import wire
 
 COUNT = 400
 """Trees in the suite; 20,000 were tried once."""
@@ -32,15 +32,15 @@ class Told(Reach):
         super().__init__()
         self._answers = answers
 
-    def own_ends(self, wiring):
-        given = self._answers.get(wiring.name)
-        return super().own_ends(wiring) if given is None else frozenset(ANSWERS[answer] for answer in given) - {RUNNING}
+    def own_ends(self, config):
+        given = self._answers.get(config.name)
+        return super().own_ends(config) if given is None else frozenset(ANSWERS[answer] for answer in given) - {RUNNING}
 
 
 def unreachable(text, palette, reach):
     """Return a file, and its elements that are never ticked wherever they stand, with all below them."""
     files = read_text(text)
-    root = wire(files, palette, files.main, Shared(int))
+    root = configure(files, palette, files.main, Shared(int))
     never = {one for child, _ in unreached(root, reach) for one in child.walk()}
     reached = {id(one.element) for one in root.walk() if one not in never}
     return files, {id(one.element) for one in root.walk()} - reached

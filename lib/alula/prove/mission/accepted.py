@@ -44,7 +44,7 @@ def acceptances(nodes: Sequence[Node]) -> list[Acceptance]:
 
 
 def _of(node: Node) -> Iterator[Acceptance]:
-    element = node.wiring.element
+    element = node.config.element
     for match in _ACCEPTED.finditer(element.get(DESCRIPTION)):
         yield Acceptance(element.place, match["code"], match["words"] or "", match["reason"].strip())
 

@@ -45,12 +45,12 @@ class Looking:
     def __init__(self, trees: Sequence[Tree], read: Read) -> None:
         self.read = read
         self._nodes = [node for tree in trees for node in tree.nodes]
-        self.ticking = [node.wiring.ticking for node in self._nodes]
+        self.ticking = [node.config.ticking for node in self._nodes]
         self.all = frozenset(range(len(self._nodes)))
         self._number = {id(node): number for number, node in enumerate(self._nodes)}
         self._roots = [tree.root for tree in trees]
         self._below = {number: frozenset(self._all(node)) for number, node in enumerate(self._nodes)}
-        self._asks = [read.asks(node.wiring) for node in self._nodes]
+        self._asks = [read.asks(node.config) for node in self._nodes]
         self._outcome = frozenset((root.blackboard, name) for root in self._roots for name in OUTCOME)
         self._reach = Reach()
         self._opaque = {number for number, node in enumerate(self._nodes) if not self._plain(node)}
@@ -58,11 +58,11 @@ class Looking:
 
     def _plain(self, node: Node) -> bool:
         """Return whether all that a node asks for stands in the file."""
-        of = node.wiring
+        of = node.config
         return of.type.name not in self.read.free and not takes_script_from_entry(of.element, of.type)
 
     def _may_skip(self, number: int) -> bool:
-        return SKIPPED in self._reach.ends(self._nodes[number].wiring) or number in self._opaque
+        return SKIPPED in self._reach.ends(self._nodes[number].config) or number in self._opaque
 
     def may_be_skipped(self, number: int) -> bool:
         """Return whether a node, or one below it, may be skipped, or depends on an unknown value."""

@@ -24,8 +24,8 @@ def answers_of(regions: Regions) -> Answers:
         for _, ticked in region.next:
             for outcome, _ in ticked.ways:
                 for number, status in outcome.touched:
-                    found.setdefault(id(nodes[number].wiring.element), set()).add(status)
-    return {number: frozenset(found.get(id(node.wiring.element), ())) for number, node in enumerate(nodes)}
+                    found.setdefault(id(nodes[number].config.element), set()).add(status)
+    return {number: frozenset(found.get(id(node.config.element), ())) for number, node in enumerate(nodes)}
 
 
 def never_deciding(system: System, answers: Answers) -> Iterator[tuple[Node, bool]]:
@@ -33,13 +33,13 @@ def never_deciding(system: System, answers: Answers) -> Iterator[tuple[Node, boo
     told: set[int] = set()
     number_of = {id(node): number for number, node in enumerate(system.nodes)}
     for number, node in enumerate(system.nodes):
-        if not node.answers_by or len(answers[number]) != 1 or id(node.wiring.element) in told:
+        if not node.answers_by or len(answers[number]) != 1 or id(node.config.element) in told:
             continue
         (answer,) = answers[number]
         siblings = node.parent.children if node.parent is not None else [node]
         after = siblings[siblings.index(node) + 1 :]
         if answer != Status.RUNNING.value and not (after and not answers[number_of[id(after[0])]]):
-            told.add(id(node.wiring.element))
+            told.add(id(node.config.element))
             yield node, answer == Status.SUCCESS.value
 
 
@@ -50,8 +50,8 @@ def never_coming(regions: Regions) -> Iterator[tuple[Node, str, str]]:
     told: set[tuple[int, str]] = set()
     for node in system.nodes:
         for asked, whose in _asked(system, node, ends):
-            if (id(node.wiring.element), asked) not in told:
-                told.add((id(node.wiring.element), asked))
+            if (id(node.config.element), asked) not in told:
+                told.add((id(node.config.element), asked))
                 yield node, asked, whose
 
 
@@ -68,7 +68,7 @@ def _ends(regions: Regions) -> Mapping[int, frozenset[str]]:
 
 
 def _asked(system: System, node: Node, ends: Mapping[int, frozenset[str]]) -> Iterator[tuple[str, str]]:
-    for part in system.reads.accesses.parts(node.wiring):
+    for part in system.reads.accesses.parts(node.config):
         match part:
             case Call(function="failed", arguments=(Literal(value=str(end)) | Name(name=end),)):
                 if not any(end in known for known in ends.values()):
@@ -83,7 +83,7 @@ def _writers(system: System, entry: Key) -> list[int]:
     """Return the leaves whose outcomes an entry has, none where it may have anything else."""
     names = system.reads.sources({entry})
     for node in system.nodes:
-        others = {node.blackboard.where(one) for one in written_entries(node).values()} | system.reads.asks(node.wiring).written
+        others = {node.blackboard.where(one) for one in written_entries(node).values()} | system.reads.asks(node.config).written
         if node not in system.leaves and names & others:
             return []
     return [leaf for leaf, node in enumerate(system.leaves) if _outcome(node) in names]

@@ -44,7 +44,7 @@ def taken_as(system: System, *, exactly: bool = True) -> Iterator[Diagnostic]:
     ``exactly``: also of those that it takes as they are.
     """
     for one in system.own.taken:
-        node = next((node for node in system.nodes if node.wiring.type.name == one.name), None)
+        node = next((node for node in system.nodes if node.config.type.name == one.name), None)
         if node is None or not (exactly or one.why_not):
             continue
         if not one.why_not:
@@ -59,7 +59,7 @@ def taken_as(system: System, *, exactly: bool = True) -> Iterator[Diagnostic]:
 
 def unless_held_up(system: System, one: Property) -> Iterator[Diagnostic]:
     """Yield ALU715 for a property of what must come that holds, where nodes may do anything: also nothing, for ever."""
-    names = sorted({f"'{node.wiring.type.name}'" for node in system.nodes} & {f"'{name}'" for name in system.own.names_of_any_order})
+    names = sorted({f"'{node.config.type.name}'" for node in system.nodes} & {f"'{name}'" for name in system.own.names_of_any_order})
     if names:
         message = f"the property `{one.name}` ({one.kind.value}) holds unless {' or '.join(names)} keeps it from coming for ever"
         yield Diagnostic(OWN, message, one.span, Severity.WARNING, "have the search run its class, or ask what must come `within N ticks`")
@@ -155,6 +155,6 @@ def waits(looked: Waits, system: System, deadline: Deadline) -> Iterator[Diagnos
 
 
 def _finding(code: str, message: str, node: Node, cure: str, lines: tuple[str, ...] = (), run: MissionRun | None = None) -> Diagnostic:
-    place = node.wiring.element.place
+    place = node.config.element.place
     span = Span(place.path, place.line, place.column, place.column + 1)
     return MissionFinding(code, message, span, Severity.WARNING, cure, example=lines, run=run)

@@ -87,7 +87,7 @@ class Liveness:
         self._leaves: dict[str, list[int]] = {}
         self._leaf_of: dict[int, int] = {}
         for leaf, one in enumerate(one for one in self._nodes if isinstance(one, SkillNode)):
-            self._leaves.setdefault(one.wiring.type.name, []).append(leaf)
+            self._leaves.setdefault(one.config.type.name, []).append(leaf)
             self._leaf_of[id(one)] = leaf
         self._below = [self._all_read(node) for node in self._nodes]
         self._begun: dict[tuple[int, Ends], Reads] = {}
@@ -161,8 +161,8 @@ class Liveness:
         """Return what is live where the turn of an only child comes, with what is live before the child."""
         ticking = self._ticking(node)
         if ticking.begins is Begin.PERHAPS:
-            return again | ends.any | self._asked(node, *node.wiring.type.scripts)
-        if ticking.rounds and not _at_least_once(node.wiring.ports.get(ticking.rounds, "")):
+            return again | ends.any | self._asked(node, *node.config.type.scripts)
+        if ticking.rounds and not _at_least_once(node.config.ports.get(ticking.rounds, "")):
             return again | ends.any  # perhaps the child is not ticked at all
         return again | ends.halted if ticking.begins is Begin.LATER else again
 
@@ -179,7 +179,7 @@ class Liveness:
         """Return what is live after an only child."""
         ticking = self._ticking(node)
         own = {SUCCESS: ends.success, FAILURE: ends.failure, SKIPPED: ends.skipped}
-        again |= ends.halted | self._ports(node) | self._asked(node, *node.wiring.type.scripts)
+        again |= ends.halted | self._ports(node) | self._asked(node, *node.config.type.scripts)
 
         def after(end: Answer) -> Reads:
             return NOTHING.union(*(again if step is AGAIN else own[step] for step in ticking.follows(end)))
@@ -189,8 +189,8 @@ class Liveness:
     def _leaf(self, node: Node, ends: Ends, *, begins: bool = True) -> Reads:
         if node.runs_script:
             return self._script(node, node.runs_script, ends.success)
-        own = node.wiring.type.name in self._unread
-        reads = NOTHING if own else self._ports(node) | self._asked(node, *node.wiring.type.scripts)
+        own = node.config.type.name in self._unread
+        reads = NOTHING if own else self._ports(node) | self._asked(node, *node.config.type.scripts)
         written = self._written(node) if own else frozenset()
         halted = frozenset({self._outcome(node)}) if isinstance(node, SkillNode) else frozenset()
         found = reads | _without(ends.success | ends.failure, written)
@@ -287,9 +287,9 @@ class Liveness:
     def _all_read(self, node: Node) -> Reads:
         found = NOTHING
         for one in (node, *_below(node)):
-            if one.wiring.type.name not in self._unread:
+            if one.config.type.name not in self._unread:
                 found |= self._ports(one)
-            for attribute in scripts_of(one.wiring.element, one.wiring.type):
+            for attribute in scripts_of(one.config.element, one.config.type):
                 found |= self._script(one, attribute.name, NOTHING)
         return found
 
@@ -311,7 +311,7 @@ class Liveness:
 
     def _script(self, node: Node, attribute: str, after: Reads) -> Reads:
         """Return what is live before a script; what is no script reads nothing here (``Looking`` says that it may ask for anything)."""
-        for one in reversed(self._accesses.in_script(node.wiring, attribute)):
+        for one in reversed(self._accesses.in_script(node.config, attribute)):
             if not one.write:
                 after |= {(one.key, one.among)}
             elif one.sure:
@@ -320,7 +320,7 @@ class Liveness:
 
     def _executions(self, node: Node, attribute: str) -> Reads:
         """Return the leaves whose executions a script asks for."""
-        names = (name for call in self._accesses.calls(node.wiring, attribute) for name in call.named)
+        names = (name for call in self._accesses.calls(node.config, attribute) for name in call.named)
         return frozenset((leaf_place(leaf), None) for name in names for leaf in self._leaves.get(name, ()))
 
 

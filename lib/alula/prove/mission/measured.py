@@ -20,7 +20,7 @@ from alula.prove.mission.oracle import Asked, Oracle, UndecidedError
 from alula.prove.mission.unknown import Distance, UnknownNumber, UnknownText
 from alula.trees.access import scripts_of
 from alula.trees.document import Attribute, Element
-from alula.trees.node import Wiring
+from alula.trees.node import NodeConfig
 from alula.trees.script import statements_of
 from alula.trees.script.compiler import EPSILON
 from alula.trees.script.syntax import Assignment, Call, Chain, Comparison, Conditional, Literal, Name, Node, Prefix, children
@@ -48,13 +48,13 @@ class Conditions:
     fresh: frozenset[str] = frozenset()
 
     @classmethod
-    def of(cls, roots: Iterable[Wiring], skillsets: Iterable[Skillset]) -> Conditions:
+    def of(cls, roots: Iterable[NodeConfig], skillsets: Iterable[Skillset]) -> Conditions:
         """Collect the conditions of a mission's trees; raises UndecidedError for scripts that compute with data, or copy them."""
         types = {f"{one.name}.{data.name}": data.type for one in skillsets for data in one.data}
         asking = _Asking(types)
-        for wiring in (wiring for root in roots for wiring in root.walk()):
-            for attribute in scripts_of(wiring.element, wiring.type):
-                asking.script(wiring.element, attribute)
+        for config in (config for root in roots for config in root.walk()):
+            for attribute in scripts_of(config.element, config.type):
+                asking.script(config.element, attribute)
         return cls(asking.kinds, frozenset(asking.fresh))
 
 

@@ -166,7 +166,7 @@ def _known_leaf(robot: Robot, real: type[Node]) -> type[Node]:
 
 
 def _reads_unknown(node: Node) -> bool:
-    ports = (port.name for port in node.wiring.type.ports.values() if port.direction is not Direction.OUTPUT)
+    ports = (port.name for port in node.config.type.ports.values() if port.direction is not Direction.OUTPUT)
     entries = (node.entry(port) for port in ports if node.given(port))
     return any(entry is not None and is_unknown(entry.value) for entry in entries)
 
@@ -199,7 +199,7 @@ def write(robot: Robot, node: Node) -> None:
 def outputs(node: Node) -> list[Port]:
     """Return the ports that a node may write, and that are connected to an entry."""
     written = written_entries(node)
-    return [port for port in node.wiring.type.ports.values() if port.name in written]
+    return [port for port in node.config.type.ports.values() if port.name in written]
 
 
 _ANSWERS: Mapping[str, Answer] = {one.value: one for one in (SUCCESS, FAILURE, RUNNING, SKIPPED)}

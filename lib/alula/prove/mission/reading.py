@@ -12,7 +12,7 @@ from alula.missions.world import FUNCTIONS
 from alula.prove.mission.oracle import Oracle
 from alula.prove.mission.unknown import Unknown, UnknownNumber, UnknownText
 from alula.trees.access import Accesses, Key
-from alula.trees.node import Wiring, pointer
+from alula.trees.node import NodeConfig, pointer
 from alula.trees.script import Names, names_in, statements_of
 from alula.trees.script.syntax import Assignment, Call, Chain, Comparison, Literal, Name, Node, walk
 
@@ -90,34 +90,34 @@ class Read(Reading):
     unread: frozenset[str] = frozenset()
     free: frozenset[str] = frozenset()
     accesses: Accesses = field(default_factory=lambda: Accesses(lambda script: statements_of(script.value), None))
-    _nodes: dict[Wiring, tuple[Reading, Asks]] = field(default_factory=dict)
+    _nodes: dict[NodeConfig, tuple[Reading, Asks]] = field(default_factory=dict)
 
-    def of_node(self, wiring: Wiring) -> Reading:
+    def of_node(self, config: NodeConfig) -> Reading:
         """Return what one node reads."""
-        return self._node(wiring)[0]
+        return self._node(config)[0]
 
-    def asks(self, wiring: Wiring) -> Asks:
+    def asks(self, config: NodeConfig) -> Asks:
         """Return what one node asks for."""
-        return self._node(wiring)[1]
+        return self._node(config)[1]
 
-    def _node(self, wiring: Wiring) -> tuple[Reading, Asks]:
-        if wiring not in self._nodes:
-            reading, statements = Reading(), self.accesses.statements(wiring)
+    def _node(self, config: NodeConfig) -> tuple[Reading, Asks]:
+        if config not in self._nodes:
+            reading, statements = Reading(), self.accesses.statements(config)
             for statement in statements:
-                _statement(reading, wiring, statement, self.constants)
-            decides = wiring.type.name not in self.unread and not wiring.is_subtree
+                _statement(reading, config, statement, self.constants)
+            decides = config.type.name not in self.unread and not config.is_subtree
             if decides:
-                _ports(reading, wiring)
-            self._nodes[wiring] = reading, self._asked(reading, wiring, names_in(statements), decides=decides)
-        return self._nodes[wiring]
+                _ports(reading, config)
+            self._nodes[config] = reading, self._asked(reading, config, names_in(statements), decides=decides)
+        return self._nodes[config]
 
-    def _asked(self, reading: Reading, wiring: Wiring, names: Names, *, decides: bool) -> Asks:
-        given = {pointer(one.value, one.name) or one.value for one in wiring.port_attributes()} if decides else set()
-        calls = (part for part in self.accesses.parts(wiring) if isinstance(part, Call))
+    def _asked(self, reading: Reading, config: NodeConfig, names: Names, *, decides: bool) -> Asks:
+        given = {pointer(one.value, one.name) or one.value for one in config.port_attributes()} if decides else set()
+        calls = (part for part in self.accesses.parts(config) if isinstance(part, Call))
         return Asks(
             frozenset(reading.names),
-            _keys(wiring, names.read | names.asked | given),
-            _keys(wiring, names.replaced),
+            _keys(config, names.read | names.asked | given),
+            _keys(config, names.replaced),
             frozenset(reading.ends),
             reading.asks_first,
             frozenset(name for call in calls if FUNCTIONS[call.function].kind == "skill" for name in call.named),
@@ -162,7 +162,7 @@ class Read(Reading):
 
 
 def what_is_read(
-    trees: Iterable[Wiring],
+    trees: Iterable[NodeConfig],
     opaque: Iterable[str],
     constants: Mapping[str, float],
     oracle: Oracle,
@@ -177,8 +177,8 @@ def what_is_read(
     read = Read(oracle=oracle, constants=constants, exactly=exactly, unread=frozenset(opaque), free=frozenset(free))
     for root in trees:
         read.names |= {(root.blackboard, name) for name in OUTCOME}
-        for wiring in root.walk():
-            read.add(read.of_node(wiring))
+        for config in root.walk():
+            read.add(read.of_node(config))
     read.names |= read.sources(read.names)
     for source, target in [(source, target) for target, sources in read.flows.items() for source in sources]:  # a copy of it
         for one, other in ((source, target), (target, source)):
@@ -190,31 +190,31 @@ def what_is_read(
     return read
 
 
-def _keys(wiring: Wiring, names: Iterable[str]) -> frozenset[Key]:
+def _keys(config: NodeConfig, names: Iterable[str]) -> frozenset[Key]:
     """Return the entries that a node may mean by names."""
-    return frozenset(key for name in names for key in wiring.blackboard.candidates(name))
+    return frozenset(key for name in names for key in config.blackboard.candidates(name))
 
 
-def _statement(read: Reading, wiring: Wiring, statement: Node, constants: Mapping[str, float]) -> None:
+def _statement(read: Reading, config: NodeConfig, statement: Node, constants: Mapping[str, float]) -> None:
     targets = [one for one in walk(statement) if isinstance(one, Assignment) and isinstance(one.target, Name)]
     for one in targets:
-        _assignment(read, wiring, one)
+        _assignment(read, config, one)
     inside = {id(part) for one in targets for part in walk(one)}
-    read.names |= _keys(wiring, (one.name for one in walk(statement) if isinstance(one, Name) and id(one) not in inside))
+    read.names |= _keys(config, (one.name for one in walk(statement) if isinstance(one, Name) and id(one) not in inside))
     for node in walk(statement):
-        _look(read, wiring, node, constants)
+        _look(read, config, node, constants)
 
 
-def _assignment(read: Reading, wiring: Wiring, node: Assignment) -> None:
-    sources = _keys(wiring, (one.name for one in walk(node.value) if isinstance(one, Name)))
-    for target in _keys(wiring, [node.target.name] if isinstance(node.target, Name) else ()):
+def _assignment(read: Reading, config: NodeConfig, node: Assignment) -> None:
+    sources = _keys(config, (one.name for one in walk(node.value) if isinstance(one, Name)))
+    for target in _keys(config, [node.target.name] if isinstance(node.target, Name) else ()):
         if sources or not node.replaces:
             read.flows.setdefault(target, set()).update(sources if node.replaces else {*sources, target})
         if not node.replaces or any(isinstance(one, Chain) for one in walk(node.value)):
             read.counted.add(target)
 
 
-def _look(read: Reading, wiring: Wiring, node: Node, constants: Mapping[str, float]) -> None:
+def _look(read: Reading, config: NodeConfig, node: Node, constants: Mapping[str, float]) -> None:
     if isinstance(node, Call):
         read.asks_first |= node.function == "failed_first"
         read.ends |= set(node.named) if node.function == "failed" else set()
@@ -222,14 +222,14 @@ def _look(read: Reading, wiring: Wiring, node: Node, constants: Mapping[str, flo
         literals = [one.value for one in node.operands if isinstance(one, Literal)]
         literals += [constants[one.name] for one in node.operands if isinstance(one, Name) and one.name in constants]
         simple = all(isinstance(one, Name | Literal) for one in node.operands)
-        for key in _keys(wiring, (one.name for operand in node.operands for one in walk(operand) if isinstance(one, Name))):
+        for key in _keys(config, (one.name for operand in node.operands for one in walk(operand) if isinstance(one, Name))):
             read.texts.setdefault(key, set()).update(str(one) for one in literals if isinstance(one, str))
             read.numbers.setdefault(key, set()).update(float(one) for one in literals if isinstance(one, int | float))
             if not simple or len(literals) < len(node.operands) - 1 or any(symbol not in {"==", "!="} for symbol in node.operators):
                 read.ordered.add(key)
 
 
-def _ports(read: Reading, wiring: Wiring) -> None:
-    keys = _keys(wiring, (key for one in wiring.port_attributes() if (key := pointer(one.value, one.name)) is not None))
+def _ports(read: Reading, config: NodeConfig) -> None:
+    keys = _keys(config, (key for one in config.port_attributes() if (key := pointer(one.value, one.name)) is not None))
     read.names |= keys
     read.whole |= keys

@@ -255,5 +255,5 @@ class _Code:
         raise _RefusedError(f"line {line} of its source {what}")
 
 
-_OF_EACH = frozenset({"wiring", "before", "after", "uid", "status", "children", "parent", "name", "id", "logger", "_shared", "_constants"})
+_OF_EACH = frozenset({"config", "before", "after", "uid", "status", "children", "parent", "name", "id", "logger", "_shared", "_constants"})
 """Attributes that each node has of its own."""

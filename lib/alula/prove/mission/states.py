@@ -17,7 +17,7 @@ from alula.model.model import Skillset
 from alula.prove.mission.oracle import Oracle
 from alula.prove.mission.unknown import Distance
 from alula.trees.access import Accesses, takes_script_from_entry
-from alula.trees.node import Wiring
+from alula.trees.node import NodeConfig
 from alula.trees.script import statements_of
 from alula.trees.script.syntax import Comparison, Name
 
@@ -36,19 +36,19 @@ class Compared:
     states: Mapping[float, str] = field(default_factory=dict)
 
     @classmethod
-    def of(cls, roots: Iterable[Wiring], skillsets: Iterable[Skillset]) -> Compared:
+    def of(cls, roots: Iterable[NodeConfig], skillsets: Iterable[Skillset]) -> Compared:
         """Read those of a mission's trees; none where a script comes from the blackboard, for then anything may be asked."""
         several = list(skillsets)
         states = {f"{one.name}.{resource.name}": frozenset(resource.states) for one in several for resource in one.resources}
-        nodes = [wiring for root in roots for wiring in root.walk()]
+        nodes = [config for root in roots for config in root.walk()]
         if any(takes_script_from_entry(one.element, one.type) for one in nodes):
             return cls()
         accesses = Accesses(lambda script: statements_of(script.value), None)
         named: Counter[str] = Counter(one.type.name for one in nodes)
         compared: Counter[str] = Counter()
-        for wiring in nodes:
-            named.update(one.name for one in accesses.in_scripts(wiring))
-            compared.update(name for one in accesses.parts(wiring) if isinstance(one, Comparison) for name in _compared(one, states))
+        for config in nodes:
+            named.update(one.name for one in accesses.in_scripts(config))
+            compared.update(name for one in accesses.parts(config) if isinstance(one, Comparison) for name in _compared(one, states))
         numbers = {number: name for name, number in states_of(several).items()}
         return cls(frozenset(name for name in states if named[name] == compared[name]), numbers)
 

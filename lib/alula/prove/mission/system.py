@@ -48,9 +48,9 @@ from alula.prove.mission.ticking import Outcome as Ticked
 from alula.prove.mission.unknown import any_value
 from alula.prove.mission.uses import Uses
 from alula.trees.attributes import type_name
+from alula.trees.configuration import configure
 from alula.trees.node import Node, Shared, name_in_files, pointer
 from alula.trees.reading import TreeFiles
-from alula.trees.wiring import wire
 
 T = TypeVar("T")
 TERMINATED, FAILED = ExecutionState.TERMINATED.value, ExecutionState.FAILED.value
@@ -112,9 +112,9 @@ class System:
         trees = (filed.tree, *([stop] if stop else []))
         director = Director(OneStop(filed, stop), board)
         unread = [*own.unread, *(f"{one.name}.{skill.name}" for one in skillsets for skill in one.skills)]
-        roots = [tree.root.wiring for tree in trees]
+        roots = [tree.root.config for tree in trees]
         if READY in files.trees:
-            roots.append(wire(files, file.palette, READY, Shared(robot.clock_ns), blackboard=filed.tree.blackboard))
+            roots.append(configure(files, file.palette, READY, Shared(robot.clock_ns), blackboard=filed.tree.blackboard))
         read = what_is_read(roots, unread, plan.parameters, oracle, own.free, counted)
         body = Body(robot, director, board, trees, {one.name: one for one in skillsets}, read, few)
         ticker = Ticker(body, oracle)
@@ -297,7 +297,7 @@ class System:
         node = self.leaves[leaf]
         state, result = end
         success = state == TERMINATED and result in node.leaf.success
-        outcome = pointer(node.wiring.ports.get(OUTCOME_PORT, ""), OUTCOME_PORT)
+        outcome = pointer(node.config.ports.get(OUTCOME_PORT, ""), OUTCOME_PORT)
         told = (result or state) if outcome is None else self.reads.value(node.blackboard.where(outcome), result or state)
         if success:
             return (state, result) if outcome is not None and told == result else (TERMINATED, min(node.leaf.success))

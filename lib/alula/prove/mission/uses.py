@@ -13,7 +13,7 @@ from dataclasses import dataclass, field
 from alula.common.graphs import reachable_from
 from alula.trees.access import Key, scripts_of
 from alula.trees.node import Node as TreeNode
-from alula.trees.node import Wiring, pointer
+from alula.trees.node import NodeConfig, pointer
 from alula.trees.ports import Port
 from alula.trees.script import statements_of
 from alula.trees.script.syntax import Assignment, Chain, Comparison, Conditional, Literal, Name, Node, Prefix, children
@@ -32,16 +32,16 @@ class Uses:
     ports: Mapping[tuple[int, str], PortType | None] = field(default_factory=dict)
 
     @classmethod
-    def of(cls, roots: Iterable[Wiring], declared: Collection[str], unread: Collection[str], numbers: Collection[str]) -> Uses:
+    def of(cls, roots: Iterable[NodeConfig], declared: Collection[str], unread: Collection[str], numbers: Collection[str]) -> Uses:
         """Collect the types from the trees of a mission, which share one blackboard.
 
         ``declared`` are types of node that have no class, ``unread`` those that decide by nothing that is known, ``numbers`` are names that
         scripts have for numbers.
         """
-        several = [wiring for root in roots for wiring in root.walk()]
+        several = [config for root in roots for config in root.walk()]
         seen = _Seen(frozenset(numbers))
-        for wiring in several:
-            seen.at(wiring, unread)
+        for config in several:
+            seen.at(config, unread)
         types = dict(seen.types())
         written = ((one, port, pointer(text, port)) for one in several if one.type.name in declared for port, text in one.ports.items())
         ports = {(one.uid, port): types.get(one.blackboard.where(name)) for one, port, name in written if name is not None}
@@ -66,13 +66,13 @@ class _Seen:
         """Entries that a port reads as text, which it can of numbers, too."""
         self._pairs: set[tuple[Key, Key]] = set()
 
-    def at(self, wiring: Wiring, unread: Collection[str]) -> None:
+    def at(self, config: NodeConfig, unread: Collection[str]) -> None:
         """Collect the types that a node needs; ``unread`` are types of node that decide by no known value."""
-        for attribute in scripts_of(wiring.element, wiring.type):
+        for attribute in scripts_of(config.element, config.type):
             for statement in statements_of(attribute.value):
-                _InScript(self, wiring).condition(statement)
-        if wiring.type.name not in unread and not wiring.is_subtree:
-            self._ports(wiring)
+                _InScript(self, config).condition(statement)
+        if config.type.name not in unread and not config.is_subtree:
+            self._ports(config)
 
     def same(self, one: Key, other: Key) -> None:
         """Record that two entries have one value, or that one is copied."""
@@ -86,10 +86,10 @@ class _Seen:
         """Return whether a name in a script is an entry's."""
         return "." not in name and name not in self.numbers
 
-    def _ports(self, wiring: Wiring) -> None:
-        known = wiring.type.ports
-        names = {port: pointer(text, port) for port, text in wiring.ports.items()}
-        keys = {port: wiring.blackboard.where(name) for port, name in names.items() if name is not None}
+    def _ports(self, config: NodeConfig) -> None:
+        known = config.type.ports
+        names = {port: pointer(text, port) for port, text in config.ports.items()}
+        keys = {port: config.blackboard.where(name) for port, name in names.items() if name is not None}
         copies = list(keys.values()) if any(one.written_from for one in known.values()) else []
         for key in copies:
             self.same(copies[0], key)
@@ -117,9 +117,9 @@ class _Seen:
 class _InScript:
     """Looks at a script of a node."""
 
-    def __init__(self, seen: _Seen, wiring: Wiring) -> None:
+    def __init__(self, seen: _Seen, config: NodeConfig) -> None:
         self._seen = seen
-        self._board = wiring.blackboard
+        self._board = config.blackboard
 
     def condition(self, node: Node) -> None:
         """Collect from a part of a script that is read as a truth value."""

@@ -44,7 +44,7 @@ def wanted(nodes: Sequence[Node], skillsets: Sequence[Skillset], faults: Collect
     wrong: dict[Span, Diagnostic] = {}
     names = {node.name for node in nodes}
     for node in nodes:
-        attribute = node.wiring.element.attributes.get(DESCRIPTION)
+        attribute = node.config.element.attributes.get(DESCRIPTION)
         if attribute is None:
             continue
         for almost in ALMOST.finditer(attribute.value):

@@ -26,7 +26,7 @@ def tree_xml(tree: Tree) -> str:
     for subtree in tree.subtrees:
         body = SubElement(root, "BehaviorTree", {"ID": subtree.tree_id, "_fullpath": subtree.path})
         _add_node(body, subtree.nodes[0], subtree)
-    types = {one.name: one for one in standard_palette()} | {node.wiring.type.name: node.wiring.type for node in tree.nodes}
+    types = {one.name: one for one in standard_palette()} | {node.config.type.name: node.config.type for node in tree.nodes}
     _add_model(root, types.values(), documented=False)
     return _text(root)
 
@@ -43,14 +43,14 @@ def _root() -> Element:
 
 
 def _add_node(above: Element, node: Node, subtree: Subtree) -> None:
-    kind = node.wiring.type
+    kind = node.config.type
     element = SubElement(above, kind.name)
     if kind.category is Category.SUBTREE:
-        source = node.wiring.element
-        element.attrib |= {"ID": source.get("ID"), "_fullpath": node.wiring.path, "_uid": str(node.uid)}
+        source = node.config.element
+        element.attrib |= {"ID": source.get("ID"), "_fullpath": node.config.path, "_uid": str(node.uid)}
         element.attrib |= {name: source.get(name) for name in source.attributes if name not in NO_PORTS and not name.startswith("_")}
     else:
-        element.attrib |= {"name": node.name, "_uid": str(node.uid), **node.wiring.ports}
+        element.attrib |= {"name": node.name, "_uid": str(node.uid), **node.config.ports}
     element.attrib |= conditions_of(node)
     for child in node.children:
         if child.blackboard is subtree.blackboard:

@@ -6,7 +6,7 @@ from collections.abc import Iterator, Sequence
 
 from alula.trees.ends import ENDS, FAILS, NO_END, SKIPS, SUCCEEDS, Ends, Given, stops_at, together
 from alula.trees.errors import TickError
-from alula.trees.node import Control, Count, Wiring
+from alula.trees.node import Control, Count, NodeConfig
 from alula.trees.ports import inout_port, input_port
 from alula.trees.status import FAILURE, RUNNING, SKIPPED, SUCCESS, Answer
 from alula.trees.ticking import Order, Ticking
@@ -27,8 +27,8 @@ class PipelineSequence(Control):
         failed = together(children[: None if last is None else last + 1]) & FAILS
         return failed if last is not None else failed | SUCCEEDS | (together(children) & SKIPS)
 
-    def __init__(self, wiring: Wiring) -> None:
-        super().__init__(wiring)
+    def __init__(self, config: NodeConfig) -> None:
+        super().__init__(config)
         self._reached = 0
 
     def update(self) -> Answer:
@@ -77,8 +77,8 @@ class RecoveryNode(Control):
         """End as the first child, or fail."""
         return children[0] | FAILS
 
-    def __init__(self, wiring: Wiring) -> None:
-        super().__init__(wiring)
+    def __init__(self, config: NodeConfig) -> None:
+        super().__init__(config)
         self._recovers = False
         self._retries = 0
 
@@ -137,8 +137,8 @@ class RoundRobin(Control):
         """Be skipped where all are, else succeed or fail."""
         return ENDS | (SKIPS if all(child & SKIPS for child in children) else NO_END)
 
-    def __init__(self, wiring: Wiring) -> None:
-        super().__init__(wiring)
+    def __init__(self, config: NodeConfig) -> None:
+        super().__init__(config)
         self._turn = self._failed = 0
 
     def update(self) -> Answer:

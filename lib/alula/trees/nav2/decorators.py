@@ -6,7 +6,7 @@ import math
 from collections.abc import Sequence
 
 from alula.trees.ends import FAILS, SUCCEEDS, Ends, Given
-from alula.trees.node import Decorator, Node, Wiring
+from alula.trees.node import Decorator, Node, NodeConfig
 from alula.trees.ports import input_port
 from alula.trees.status import FAILURE, IDLE, RUNNING, SUCCESS, Answer
 from alula.trees.values import DOUBLE
@@ -54,8 +54,8 @@ class RateController(_Gate):
 
     remembers = ("_since_ns",)
 
-    def __init__(self, wiring: Wiring) -> None:
-        super().__init__(wiring)
+    def __init__(self, config: NodeConfig) -> None:
+        super().__init__(config)
         self._since_ns = 0
 
     def begin(self) -> None:
@@ -81,8 +81,8 @@ class GoalUpdatedController(_Gate):
 
     remembers = ("_goals",)
 
-    def __init__(self, wiring: Wiring) -> None:
-        super().__init__(wiring)
+    def __init__(self, config: NodeConfig) -> None:
+        super().__init__(config)
         self._goals: tuple[object, object] = (None, None)
 
     def begin(self) -> None:
@@ -108,8 +108,8 @@ class SingleTrigger(Decorator):
         """End as the child, or fail."""
         return children[0] | FAILS
 
-    def __init__(self, wiring: Wiring) -> None:
-        super().__init__(wiring)
+    def __init__(self, config: NodeConfig) -> None:
+        super().__init__(config)
         self._over = False
 
     def update(self) -> Answer:
@@ -165,4 +165,4 @@ def read(node: Node, port: str, entry: str = "") -> object:
     if not node.given(port):
         return node.blackboard.get(entry) if entry else None
     known = node.entry(port)
-    return known.value if known is not None else node.wiring.ports[port]
+    return known.value if known is not None else node.config.ports[port]

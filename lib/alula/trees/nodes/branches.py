@@ -6,7 +6,7 @@ from collections.abc import Sequence
 
 from alula.trees.ends import FAILS, NO_END, Ends, Given, together
 from alula.trees.errors import TickError
-from alula.trees.node import Control, Wiring
+from alula.trees.node import Control, NodeConfig
 from alula.trees.ports import input_port
 from alula.trees.status import FAILURE, IDLE, RUNNING, SKIPPED, SUCCESS, Answer
 from alula.trees.ticking import Order, Ticking
@@ -36,8 +36,8 @@ class IfThenElse(_Chooses):
     ticking = Ticking(Order.CHOSEN)
     remembers = ("_chosen",)
 
-    def __init__(self, wiring: Wiring) -> None:
-        super().__init__(wiring)
+    def __init__(self, config: NodeConfig) -> None:
+        super().__init__(config)
         self._chosen = 0
 
     def update(self) -> Answer:
@@ -101,8 +101,8 @@ class Switch(Control):
         """End as any of them."""
         return together(children)
 
-    def __init__(self, wiring: Wiring) -> None:
-        super().__init__(wiring)
+    def __init__(self, config: NodeConfig) -> None:
+        super().__init__(config)
         self._running: int | None = None
 
     def update(self) -> Answer:
@@ -127,7 +127,7 @@ class Switch(Control):
         if variable is not None:
             for index in range(last):
                 case = self._text(f"case_{index + 1}")
-                if case is not None and equal(variable, case, self.wiring.enums):
+                if case is not None and equal(variable, case, self.config.enums):
                     return index
         return last
 
@@ -183,8 +183,8 @@ class TryCatch(Control):
 
     remembers = ("_index", "_skipped", "_cleans_up")
 
-    def __init__(self, wiring: Wiring) -> None:
-        super().__init__(wiring)
+    def __init__(self, config: NodeConfig) -> None:
+        super().__init__(config)
         self._index = 0
         self._skipped = 0
         self._cleans_up = False

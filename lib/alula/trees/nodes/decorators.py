@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Sequence
 
 from alula.trees.ends import FAILS, SKIPS, SUCCEEDS, Ends, Given, answer_in, whole_number
-from alula.trees.node import NANOSECONDS_PER_MS, Count, Decorator, Script, Wiring
+from alula.trees.node import NANOSECONDS_PER_MS, Count, Decorator, NodeConfig, Script
 from alula.trees.ports import input_port, script_port
 from alula.trees.status import FAILURE, IDLE, RUNNING, SKIPPED, SUCCESS, Answer, Status
 from alula.trees.ticking import AGAIN, Begin, Order, Steps, Ticking
@@ -82,8 +82,8 @@ class _Again(Decorator):
     remembers = ("_count",)
     counts = (Count("_count", "the rounds"),)
 
-    def __init__(self, wiring: Wiring) -> None:
-        super().__init__(wiring)
+    def __init__(self, config: NodeConfig) -> None:
+        super().__init__(config)
         self._count = 0
 
     @classmethod
@@ -153,8 +153,8 @@ class RunOnce(Decorator):
         """End as the child, or be skipped."""
         return children[0] | SKIPS
 
-    def __init__(self, wiring: Wiring) -> None:
-        super().__init__(wiring)
+    def __init__(self, config: NodeConfig) -> None:
+        super().__init__(config)
         self._answer: Answer | None = None
 
     def update(self) -> Answer:
@@ -183,8 +183,8 @@ class Precondition(Decorator):
         """End as the child, or as `else` says."""
         return children[0] | answer_in(given, "else")
 
-    def __init__(self, wiring: Wiring) -> None:
-        super().__init__(wiring)
+    def __init__(self, config: NodeConfig) -> None:
+        super().__init__(config)
         self._begun = False
         self._text = ""
         self._script: Script | None = None
@@ -203,7 +203,7 @@ class Precondition(Decorator):
     def _asked(self) -> Script:
         text = str(self.get("if"))
         if self._script is None or text != self._text:
-            self._script, self._text = self.wiring.compile(text, "if"), text
+            self._script, self._text = self.config.compile(text, "if"), text
         return self._script
 
 
@@ -223,8 +223,8 @@ class Delay(Decorator):
     ticking = Ticking(Order.SINGLE, begins=Begin.LATER)
     remembers = ("_until_ns",)
 
-    def __init__(self, wiring: Wiring) -> None:
-        super().__init__(wiring)
+    def __init__(self, config: NodeConfig) -> None:
+        super().__init__(config)
         self._until_ns: int | None = None
 
     def update(self) -> Answer:
@@ -260,8 +260,8 @@ class Timeout(Decorator):
         """End as the child, or fail after the time."""
         return children[0] if whole_number(given, "msec") == 0 else super().may_end(given, children)
 
-    def __init__(self, wiring: Wiring) -> None:
-        super().__init__(wiring)
+    def __init__(self, config: NodeConfig) -> None:
+        super().__init__(config)
         self._until_ns: int | None = None
 
     def update(self) -> Answer:

@@ -9,7 +9,7 @@ from typing import ClassVar
 from alula.trees.blackboard import type_of
 from alula.trees.ends import ENDS, SUCCEEDS, Ends, Given
 from alula.trees.errors import TickError
-from alula.trees.node import Decorator, SyncAction, Wiring, pointer
+from alula.trees.node import Decorator, NodeConfig, SyncAction, pointer
 from alula.trees.ports import inout_port, input_port
 from alula.trees.status import FAILURE, RUNNING, SKIPPED, SUCCESS, Answer
 from alula.trees.ticking import Begin, Order, Ticking
@@ -25,7 +25,7 @@ class SetBlackboard(SyncAction):
 
     def update(self) -> Answer:
         """Write."""
-        key, text = str(self.get("output_key")), self.wiring.ports.get("value", "")
+        key, text = str(self.get("output_key")), self.config.ports.get("value", "")
         known = self.blackboard.entry(key)
         source = pointer(text, "value")
         if source is None:
@@ -70,8 +70,8 @@ class WasEntryUpdated(SyncAction):
 
     ends = ENDS
 
-    def __init__(self, wiring: Wiring) -> None:
-        super().__init__(wiring)
+    def __init__(self, config: NodeConfig) -> None:
+        super().__init__(config)
         self._seen = 0
 
     def update(self) -> Answer:
@@ -99,8 +99,8 @@ class _IfUpdated(Decorator):
         """End as the child, or as it does without it."""
         return children[0] | (frozenset({cls.otherwise}) - {RUNNING})
 
-    def __init__(self, wiring: Wiring) -> None:
-        super().__init__(wiring)
+    def __init__(self, config: NodeConfig) -> None:
+        super().__init__(config)
         self._seen = 0
         self._running = False
 

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from alula.trees.ends import ENDS, FAILS, SUCCEEDS
-from alula.trees.node import NANOSECONDS_PER_MS, Action, Condition, Node, Script, SyncAction, Wiring
+from alula.trees.node import NANOSECONDS_PER_MS, Action, Condition, Node, NodeConfig, Script, SyncAction
 from alula.trees.ports import input_port, script_port
 from alula.trees.status import FAILURE, RUNNING, SUCCESS, Answer
 from alula.trees.values import UINT
@@ -36,19 +36,19 @@ class _Code:
         self._node = node
         self._text = ""
         self._script: Script | None = None
-        if not node.wiring.ports.get("code", "").lstrip().startswith("{") and not self.is_empty:
+        if not node.config.ports.get("code", "").lstrip().startswith("{") and not self.is_empty:
             self.script()  # what is wrong in it is told when the tree is made
 
     @property
     def is_empty(self) -> bool:
         """Whether the file gives it as an empty text, and that does nothing, as editors write a Script."""
-        return self._node.wiring.ports.get("code") == "" and self._node.wiring.type.ports["code"].may_be_empty
+        return self._node.config.ports.get("code") == "" and self._node.config.type.ports["code"].may_be_empty
 
     def script(self) -> Script:
         """Return it."""
         text = str(self._node.get("code"))
         if self._script is None or text != self._text:
-            self._script, self._text = self._node.wiring.compile(text, "code"), text
+            self._script, self._text = self._node.config.compile(text, "code"), text
         return self._script
 
 
@@ -60,8 +60,8 @@ class ScriptNode(SyncAction):
 
     ends = SUCCEEDS
 
-    def __init__(self, wiring: Wiring) -> None:
-        super().__init__(wiring)
+    def __init__(self, config: NodeConfig) -> None:
+        super().__init__(config)
         self._code = _Code(self)
 
     def update(self) -> Answer:
@@ -79,8 +79,8 @@ class ScriptCondition(Condition):
 
     ends = ENDS
 
-    def __init__(self, wiring: Wiring) -> None:
-        super().__init__(wiring)
+    def __init__(self, config: NodeConfig) -> None:
+        super().__init__(config)
         self._code = _Code(self)
 
     def update(self) -> Answer:
@@ -100,8 +100,8 @@ class Sleep(Action):
 
     ends = SUCCEEDS
 
-    def __init__(self, wiring: Wiring) -> None:
-        super().__init__(wiring)
+    def __init__(self, config: NodeConfig) -> None:
+        super().__init__(config)
         self._until_ns = 0
 
     def on_start(self) -> Answer:

@@ -7,7 +7,7 @@ from dataclasses import replace
 
 from alula.trees.ends import ANY_END, FAILS, Ends, Given, answer_in
 from alula.trees.errors import TickError
-from alula.trees.node import Decorator, Wiring, pointer
+from alula.trees.node import Decorator, NodeConfig, pointer
 from alula.trees.ports import inout_port, input_port, output_port
 from alula.trees.status import FAILURE, IDLE, RUNNING, SKIPPED, SUCCESS, Answer, Skipped, Status
 from alula.trees.ticking import AGAIN, Begin, Order, Ticking
@@ -29,13 +29,13 @@ class Loop(Decorator):
         """Fail with the child, or end as `if_empty` says."""
         return (children[0] & FAILS) | answer_in(given, "if_empty")
 
-    def __init__(self, wiring: Wiring) -> None:
-        super().__init__(wiring)
+    def __init__(self, config: NodeConfig) -> None:
+        super().__init__(config)
         self._running = False
         self._items: list[object] | None = None
         self._fixed: list[object] | None = None
-        if pointer(wiring.ports.get("queue", ""), "queue") is None:
-            self._fixed = self._list(wiring.ports.get("queue", ""))
+        if pointer(config.ports.get("queue", ""), "queue") is None:
+            self._fixed = self._list(config.ports.get("queue", ""))
 
     def update(self) -> Answer:
         """Follow the child while it runs, else take the next item."""
@@ -67,13 +67,13 @@ class Loop(Decorator):
         elif isinstance(value, tuple | str) and self._items is None:
             self._items = self._list(value)
         elif value is None and self._items is None:
-            raise TickError(f"{self.place()}: the port 'queue' reads '{self.wiring.ports['queue']}', which nothing has written")
+            raise TickError(f"{self.place()}: the port 'queue' reads '{self.config.ports['queue']}', which nothing has written")
         elif value is not None and not isinstance(value, tuple | str):
             raise TickError(f"{self.place()}: the port 'queue' reads no list")
 
     def _list(self, value: object) -> list[object]:
         try:
-            items = list_of(self.wiring.type.ports["value"].type).read(value)
+            items = list_of(self.config.type.ports["value"].type).read(value)
         except ValueError as error:
             raise TickError(f"{self.place()}: the port 'queue': {error}") from None
         return items if isinstance(items, list) else []

@@ -6,7 +6,7 @@ from collections.abc import Sequence
 
 from alula.trees.ends import ENDS, FAILS, NO_END, SKIPS, SUCCEEDS, Ends, Given, whole_number
 from alula.trees.errors import TickError
-from alula.trees.node import Control, Wiring
+from alula.trees.node import Control, NodeConfig
 from alula.trees.ports import input_port
 from alula.trees.status import FAILURE, RUNNING, SKIPPED, SUCCESS, Answer
 from alula.trees.ticking import Order, Ticking
@@ -17,8 +17,8 @@ class _AtOnce(Control):
     may_run = False
     remembers = ("_done", "_failed")
 
-    def __init__(self, wiring: Wiring) -> None:
-        super().__init__(wiring)
+    def __init__(self, config: NodeConfig) -> None:
+        super().__init__(config)
         self._done: set[int] = set()
         self._failed = 0
 

@@ -6,7 +6,7 @@ from collections.abc import Sequence as Listed
 from dataclasses import replace
 
 from alula.trees.ends import ENDS, NO_END, SKIPS, Ends, Given, stops_at, together
-from alula.trees.node import Control, Wiring
+from alula.trees.node import Control, NodeConfig
 from alula.trees.status import FAILURE, IDLE, RUNNING, SKIPPED, SUCCESS, Answer
 from alula.trees.ticking import Order, Ticking
 
@@ -21,8 +21,8 @@ class _InTurn(Control):
     may_run = False
     remembers = ("_index", "_skipped")
 
-    def __init__(self, wiring: Wiring) -> None:
-        super().__init__(wiring)
+    def __init__(self, config: NodeConfig) -> None:
+        super().__init__(config)
         self._index = 0
         self._skipped = 0
 

@@ -6,7 +6,7 @@ import random
 from typing import Any, ClassVar
 
 from alula.missions.part import MissionPart
-from alula.trees.node import Action, Control, Decorator, SyncAction, Wiring, register
+from alula.trees.node import Action, Control, Decorator, NodeConfig, SyncAction, register
 from alula.trees.ports import input_port, output_port
 from alula.trees.status import FAILURE, IDLE, RUNNING, SKIPPED, SUCCESS, Answer
 from alula.trees.values import ANY, DOUBLE, INT
@@ -27,8 +27,8 @@ class Guard(Decorator):
 class Limit(Decorator):
     """Begins its child once in a while only, and runs in between; declares nothing of what it remembers."""
 
-    def __init__(self, wiring: Wiring) -> None:
-        super().__init__(wiring)
+    def __init__(self, config: NodeConfig) -> None:
+        super().__init__(config)
         self._since_ns: int | None = None
 
     def update(self) -> Answer:
@@ -49,8 +49,8 @@ class Recovery(Control):
     ports = (input_port("tries", INT, "2"),)
     child_count = (2, 2)
 
-    def __init__(self, wiring: Wiring) -> None:
-        super().__init__(wiring)
+    def __init__(self, config: NodeConfig) -> None:
+        super().__init__(config)
         self._tried = 0
         self._mends = False
 
@@ -82,8 +82,8 @@ class Recovery(Control):
 class ByTurns(Control):
     """Ticks another child each time that it begins, through a function of its own that knows the last one."""
 
-    def __init__(self, wiring: Wiring) -> None:
-        super().__init__(wiring)
+    def __init__(self, config: NodeConfig) -> None:
+        super().__init__(config)
         self._done: list[int] = []
 
     @property
@@ -157,8 +157,8 @@ class Counted(Decorator):
 
     ports = (input_port("many", INT),)
 
-    def __init__(self, wiring: Wiring) -> None:
-        super().__init__(wiring)
+    def __init__(self, config: NodeConfig) -> None:
+        super().__init__(config)
         self._count = 0
 
     def update(self) -> Answer:
@@ -176,8 +176,8 @@ class Counted(Decorator):
 class Seldom(Decorator):
     """Ticks its child in each tick of a hundred, and counts all of them."""
 
-    def __init__(self, wiring: Wiring) -> None:
-        super().__init__(wiring)
+    def __init__(self, config: NodeConfig) -> None:
+        super().__init__(config)
         self.ticks = 0
 
     def update(self) -> Answer:

@@ -36,7 +36,7 @@ from alula.trees import (
     script_port,
 )
 from alula.trees.factory import make_tree
-from alula.trees.node import Wiring
+from alula.trees.node import NodeConfig
 from alula.trees.nodes.decorators import Inverter
 from alula.trees.reading import read_text
 from alula.trees.standard import standard_palette
@@ -56,8 +56,8 @@ class Either(Control):
     ends = frozenset({SUCCESS, FAILURE})
     may_run = False
 
-    def __init__(self, wiring: Wiring) -> None:
-        super().__init__(wiring)
+    def __init__(self, config: NodeConfig) -> None:
+        super().__init__(config)
         self._turn = 0
 
     def update(self) -> Answer:

@@ -1,6 +1,6 @@
-"""A tree as it will stand: every use of a subtree with its own nodes, each with its type, its ports and its view of the blackboard.
+"""Configure the nodes of a tree: every use of a subtree has nodes of its own, each with its type, its ports and its view of the blackboard.
 
-The factory makes the nodes of it that tick. The check looks at it as it is, so nothing here minds what is wrong in the files.
+The factory makes the nodes of them that tick. The check reads them as they are, so nothing here refuses what is wrong in the files.
 """
 
 from __future__ import annotations
@@ -13,7 +13,7 @@ from alula.trees.attributes import AUTOREMAP, is_port, node_name, type_name
 from alula.trees.blackboard import Blackboard
 from alula.trees.document import Element
 from alula.trees.errors import FileError, Problem, TickError
-from alula.trees.node import Script, Shared, TickableType, Wiring, pointer
+from alula.trees.node import NodeConfig, Script, Shared, TickableType, pointer
 from alula.trees.node_type import Category, unknown_type
 from alula.trees.nodes.subtree import SubTree
 from alula.trees.palette import Palette
@@ -105,7 +105,7 @@ class BoundScript:
         return answer is True
 
 
-def wire(
+def configure(
     files: TreeFiles,
     palette: Palette,
     main: str,
@@ -115,16 +115,16 @@ def wire(
     surroundings: Surroundings | None = None,
     blackboard: Blackboard | None = None,
     after: int = 0,
-) -> Wiring:
-    """Return the top of a tree that has one, with its subtrees put in; `structure.verify` has ruled out cycles and giants.
+) -> NodeConfig:
+    """Return the configuration of a tree's top node, with its subtrees put in; `structure.verify` has ruled out cycles and giants.
 
     Arguments are those of `factory.build_tree`. On the blackboards stands nothing yet but what uses of subtrees give these as plain text.
     """
-    wirer = _Wirer(files, palette, shared, enums or {}, surroundings or Nothing(), after)
-    return wirer.node(files.trees[main].children[0], blackboard or Blackboard(shared.clock), "", None)
+    configurer = _Configurer(files, palette, shared, enums or {}, surroundings or Nothing(), after)
+    return configurer.node(files.trees[main].children[0], blackboard or Blackboard(shared.clock), "", None)
 
 
-def path_inside(use: Wiring, path: str) -> str:
+def path_inside(use: NodeConfig, path: str) -> str:
     """Return the path of the tree that a node uses, which stands in the one with the path ``path``."""
     return _joined(path, use.element.get("name") or f"{type_name(use.element)}::{use.uid}")
 
@@ -133,7 +133,7 @@ def _joined(path: str, name: str) -> str:
     return f"{path}/{name}" if path else name
 
 
-class _Wirer:
+class _Configurer:
     def __init__(
         self, files: TreeFiles, palette: Palette, shared: Shared, enums: Mapping[str, float], surroundings: Surroundings, after: int
     ) -> None:
@@ -144,8 +144,8 @@ class _Wirer:
         self._surroundings = surroundings
         self._count = after
 
-    def node(self, element: Element, board: Blackboard, path: str, parent: Wiring | None) -> Wiring:
-        """Return a node with all below it; ``path`` is that of the tree that it stands in."""
+    def node(self, element: Element, board: Blackboard, path: str, parent: NodeConfig | None) -> NodeConfig:
+        """Return the configuration of a node with all below it; ``path`` is that of the tree that it stands in."""
         self._count += 1
         uid, name, tag = self._count, node_name(element), type_name(element)
         is_subtree = element.tag == SUBTREE.name
@@ -157,15 +157,15 @@ class _Wirer:
                 ports[port.name] = port.default
         whole = _joined(path, name if name != tag else f"{name}::{uid}")
         compiled = _compiler(element, Scope(board, self._enums, self._surroundings))
-        wiring = Wiring(known, name, uid, whole, element, ports, board, self._shared, compiled, self._enums, parent)
+        config = NodeConfig(known, name, uid, whole, element, ports, board, self._shared, compiled, self._enums, parent)
         inner: Sequence[Element] = element.children
         if is_subtree:
             tree = self._files.trees.get(tag)
-            inner, board, path = tree.children[:1] if tree is not None else (), self._inside(wiring), path_inside(wiring, path)
-        wiring.children.extend(self.node(child, board, path, wiring) for child in inner)
-        return wiring
+            inner, board, path = tree.children[:1] if tree is not None else (), self._inside(config), path_inside(config, path)
+        config.children.extend(self.node(child, board, path, config) for child in inner)
+        return config
 
-    def _inside(self, use: Wiring) -> Blackboard:
+    def _inside(self, use: NodeConfig) -> Blackboard:
         """Return the blackboard of the tree that a node uses."""
         board = Blackboard(self._shared.clock, above=use.blackboard)
         board.autoremap = _autoremaps(use.element)
@@ -175,7 +175,7 @@ class _Wirer:
         return board
 
 
-def plain_inside(use: Wiring) -> Mapping[str, str]:
+def plain_inside(use: NodeConfig) -> Mapping[str, str]:
     """Return what the use of a subtree writes into entries of its own, as text: all that names no entry above."""
     return {name: text for name, text in use.ports.items() if text == "=" or pointer(text, name) is None}
 
