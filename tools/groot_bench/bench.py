@@ -28,7 +28,7 @@ from alula.trees.groot.protocol import PROTOCOL, Request
 from alula.trees.groot.server import Server
 from alula.trees.groot.watching import Watch
 from alula.trees.reading import read_text
-from alula.trees.standard import standard_palette
+from alula.trees.standard import standard_registry
 from alula.trees.tree import Tree
 
 BRANCHES = 8
@@ -63,7 +63,7 @@ def made() -> Tree:
     branches = "".join(f'<SubTree ID="Branch" name="branch {number}"/>' for number in range(BRANCHES))
     script = {"a": ["RUNNING"] * 9 + ["SUCCESS"], "b": ["SUCCESS", *["RUNNING"] * 9, "SUCCESS"]}
     answers = Answers({leaf: [WORDS[word] for word in words] * MANY for leaf, words in script.items()})
-    return scripted_tree(read_text(TREE.format(branches=branches)), standard_palette(), answers, StepClock())
+    return scripted_tree(read_text(TREE.format(branches=branches)), standard_registry(), answers, StepClock())
 
 
 def view(address: Address, rate_hz: float, boards: str, watching: Event, over: Event) -> None:

@@ -15,9 +15,9 @@ from alula.trees.blackboard import Blackboard
 from alula.trees.configuration import configure
 from alula.trees.node import NodeConfig, Shared, pointer
 from alula.trees.node_type import Category, NodeType, node_type
-from alula.trees.palette import Palette
 from alula.trees.ports import Direction, Port
 from alula.trees.reading import TreeFiles
+from alula.trees.registry import NodeRegistry
 from alula.trees.values import ANY, DOUBLE, NUMBERS, STRING, TYPES, PortType, literal
 
 Slot = tuple[str, str]
@@ -51,11 +51,11 @@ class _MainTree:
     optional: frozenset[str]
 
     @classmethod
-    def of(cls, files: TreeFiles, palette: Palette) -> _MainTree:
+    def of(cls, files: TreeFiles, registry: NodeRegistry) -> _MainTree:
         board = Blackboard(int)
         if not files.trees[files.main].children:
             return cls(files, board, (), frozenset())
-        root = configure(files, palette, files.main, Shared(int), blackboard=board)
+        root = configure(files, registry, files.main, Shared(int), blackboard=board)
         accesses = Accesses(Scripts().statements)
         configs = {id(one): config for config in root.walk() for one in accesses.of_node(config)}
         several = [(configs[id(one)], one) for one in accesses.of(root) if one.write or one.needed]
@@ -91,11 +91,11 @@ def _optional(root: NodeConfig) -> Iterator[str]:
 class Entries:
     """The types and uses of entries in main trees, whose nodes already have the robot's names."""
 
-    def __init__(self, mains: Sequence[TreeFiles], vocabulary: Vocabulary, known: Palette) -> None:
+    def __init__(self, mains: Sequence[TreeFiles], vocabulary: Vocabulary, known: NodeRegistry) -> None:
         self._skills = {f"{vocabulary.robot}.{one.name}": one for one in vocabulary.skills.values()}
         self._types: dict[Slot, PortType] = dict(_declared(vocabulary))
-        palette = known | Palette(_types(vocabulary))
-        self._mains = {id(files): _MainTree.of(files, palette) for files in mains}
+        registry = known | NodeRegistry(_types(vocabulary))
+        self._mains = {id(files): _MainTree.of(files, registry) for files in mains}
         self._refuse_literals()
         self._spread()
 

@@ -11,10 +11,10 @@ from alula.trees.document import Element
 from alula.trees.guessing import guessed_types
 from alula.trees.node import pointer
 from alula.trees.node_type import Category, NodeType
-from alula.trees.palette import Palette
 from alula.trees.ports import Direction, Port
 from alula.trees.reading import TreeFiles
-from alula.trees.standard import standard_palette
+from alula.trees.registry import NodeRegistry
+from alula.trees.standard import standard_registry
 from alula.trees.values import ANY, DOUBLE, INT
 
 Given = Mapping[tuple[str, str], Sequence[str]]
@@ -50,27 +50,29 @@ def nodes_of(tree: Element) -> Iterator[Element]:
     yield from (one for top in tree.children for one in top.iterate() if one.tag != Category.SUBTREE.value)
 
 
-def known_palette(mains: Sequence[TreeFiles]) -> Palette:
+def known_registry(mains: Sequence[TreeFiles]) -> NodeRegistry:
     """Return the types that need no robot: BehaviorTree.CPP's, and those of Nav2 with children, unless a file declares others."""
     declared = {name: one for files in mains for name, one in files.models.items()}
-    palette = standard_palette()
-    for one in nav2.palette():
+    registry = standard_registry()
+    for one in nav2.registry():
         if one.is_tickable and one.children != (0, 0) and declared.get(one.name, one).category is one.category:
-            palette.add(one)
-    return palette
+            registry.add(one)
+    return registry
 
 
 def foreign_types(mains: Sequence[TreeFiles]) -> dict[str, NodeType]:
     """Return by their IDs the types of all nodes that trees use and that need a robot; what is not declared is guessed from the uses."""
-    trees, known = elements_of(mains), known_palette(mains)
+    trees, known = elements_of(mains), known_registry(mains)
     given: dict[tuple[str, str], list[str]] = {}
     for node in (node for tree in trees for node in nodes_of(tree)):
         for attribute in filter(is_port, node.attributes):
             given.setdefault((type_name(node), attribute), []).append(node.get(attribute))
     used = {type_name(node) for tree in trees for node in nodes_of(tree)}
-    models = {one.name: one for one in nav2.palette() if all(port in one.ports for name, port in given if name == one.name)}
+    models = {one.name: one for one in nav2.registry() if all(port in one.ports for name, port in given if name == one.name)}
     models.update((name, one) for files in reversed(mains) for name, one in files.models.items())
-    declared = Palette(replace(one, category=_category(one)) for name, one in models.items() if name in used and known.get(name) is None)
+    declared = NodeRegistry(
+        replace(one, category=_category(one)) for name, one in models.items() if name in used and known.get(name) is None
+    )
     guessed = [_widened(one, given) for one in guessed_types(trees, known)]
     undeclared = [_widened(one, given) for one in guessed_types(trees, known | declared)]
     both = [_merged(model, one, given) for one in guessed if (model := declared.get(one.name)) is not None]

@@ -16,9 +16,9 @@ from alula.adopt.vocabulary import Vocabulary
 from alula.trees.document import Element, quoted, read_document
 from alula.trees.format3 import DECLARED, FORMAT
 from alula.trees.node_type import Category, NodeType
-from alula.trees.palette import Palette
 from alula.trees.ports import Port
 from alula.trees.reading import LIBRARY, TreeFiles
+from alula.trees.registry import NodeRegistry
 
 SHARED = "shared"
 """The file of the trees that several missions use."""
@@ -43,7 +43,7 @@ class MissionOf:
 class Missions:
     """All missions of a robot, and their files."""
 
-    def __init__(self, mains: Sequence[TreeFiles], vocabulary: Vocabulary, known: Palette, folder: Path) -> None:
+    def __init__(self, mains: Sequence[TreeFiles], vocabulary: Vocabulary, known: NodeRegistry, folder: Path) -> None:
         self._comments = _comments(elements_of(mains))
         names = _names(mains)
         new = {id(tree): converted(tree, name, vocabulary) for files in mains for name, tree in files.trees.items()}

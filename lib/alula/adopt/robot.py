@@ -10,7 +10,7 @@ from pathlib import Path
 from alula.adopt.code import module_text
 from alula.adopt.entries import GivenEntry
 from alula.adopt.expected import expected_states
-from alula.adopt.foreign import elements_of, foreign_types, known_palette, make_actions_of_missing_trees, needed
+from alula.adopt.foreign import elements_of, foreign_types, known_registry, make_actions_of_missing_trees, needed
 from alula.adopt.missions import MissionOf, Missions
 from alula.adopt.skillset import faults_text, mocks_text, model_text, types_text
 from alula.adopt.telling import decisions, names_of_nodes
@@ -59,7 +59,7 @@ def robot_from_trees(name: str, mains: Sequence[TreeFiles], folder: Path, wrong:
     vocabulary = Vocabulary.of(name, types, subtrees, trees)
     if not vocabulary.skills:
         raise TreeError(f"{folder}: its trees have no action of their own, so there is no skill to make; name a folder whose trees have")
-    missions = Missions(mains, vocabulary, known_palette(mains), folder)
+    missions = Missions(mains, vocabulary, known_registry(mains), folder)
     unused = every - {tree for files in mains for tree in files.trees}
     to_decide = list(decisions(vocabulary, missions, missing=missing, unused=unused))
     states = expected_states(trees, vocabulary)
@@ -89,7 +89,7 @@ def robot_from_trees(name: str, mains: Sequence[TreeFiles], folder: Path, wrong:
 def _is_sound(files: TreeFiles, wrong: Callable[[TreeError], object]) -> bool:
     """Return whether a main tree can be put together with its subtrees: none of them contains itself, and it is no giant."""
     found: list[Problem] = []
-    verify(files, known_palette([files]), found.append, of_others=True)
+    verify(files, known_registry([files]), found.append, of_others=True)
     endless = [FileError(one) for one in found if one.code in ENDLESS]
     for error in endless[:1]:
         wrong(error)

@@ -23,10 +23,10 @@ from alula.trees.configuration import configure
 from alula.trees.errors import Problem
 from alula.trees.library import Library
 from alula.trees.node import Shared
-from alula.trees.palette import Palette
 from alula.trees.ports import Direction
 from alula.trees.reach import Reach
 from alula.trees.reading import TreeFiles
+from alula.trees.registry import NodeRegistry
 from alula.trees.structure import verify
 
 ENDLESS = frozenset({"ALU007", "ALU009"})
@@ -51,7 +51,7 @@ class Beside:
 
 def check(
     files: TreeFiles,
-    palette: Palette,
+    registry: NodeRegistry,
     names: Collection[str] = (),
     rules: Iterable[Rule] = (),
     *,
@@ -75,10 +75,10 @@ def check(
         found.append(problem)
 
     with suppress(_Enough):
-        verify(files, palette, report, of_others=of_others, others=() if checked is None else checked.documents)
+        verify(files, registry, report, of_others=of_others, others=() if checked is None else checked.documents)
     is_told = checked is not None and files.is_part and files.main in files.trees and checked.has_user(files.trees[files.main])
     if files.trees and not is_told and not any(problem.code in ENDLESS for problem in found):
-        wholes = list(_wholes(files, palette, names, beside, foreign=foreign))
+        wholes = list(_wholes(files, registry, names, beside, foreign=foreign))
         found += _problems(wholes, (*RULES, *rules))
         if all(problem.warning for problem in found):  # else what is to be mended may be what reads it
             found += _problems(wholes, [never_read])
@@ -88,7 +88,7 @@ def check(
     return sorted(places.values(), key=lambda one: (one.place.path != files.path, one.place.path, one.place.line, one.place.column))
 
 
-def _wholes(files: TreeFiles, palette: Palette, names: Collection[str], beside: Beside, *, foreign: bool) -> Iterator[Whole]:
+def _wholes(files: TreeFiles, registry: NodeRegistry, names: Collection[str], beside: Beside, *, foreign: bool) -> Iterator[Whole]:
     model = files.models.get(files.main)
     scripts, reach, shared = Scripts(), Reach(), Shared(int)
     accesses = Accesses(scripts.statements, names)
@@ -99,7 +99,7 @@ def _wholes(files: TreeFiles, palette: Palette, names: Collection[str], beside: 
     several = dict.fromkeys((*mains, *started, *_others(files)))
     board = Blackboard(shared.clock)
     boards = dict.fromkeys((*mains, *started), board)
-    roots = {one: configure(files, palette, one, shared, blackboard=boards.get(one)) for one in several if files.trees[one].children}
+    roots = {one: configure(files, registry, one, shared, blackboard=boards.get(one)) for one in several if files.trees[one].children}
     for name, root in roots.items():
         known = given if name in started or (name == files.main and not files.is_part) else None
         around = tuple(roots[one] for one in boards if one in roots and one != name) if name in boards else ()

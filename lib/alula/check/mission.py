@@ -14,7 +14,7 @@ from alula.check.rules import SkillRules
 from alula.check.skills import Skills
 from alula.language.messages import NO_MESSAGES, Messages
 from alula.missions.mission_file import READY, STOP_HERE, MissionFile
-from alula.missions.palette import no_class
+from alula.missions.registry import no_class
 from alula.trees.errors import FileError, Problem
 from alula.trees.library import Library
 
@@ -39,7 +39,7 @@ def check_mission(
     Raises:
         FileError: the tree can't be put together.
     """
-    files, known = mission.files, mission.palette
+    files, known = mission.files, mission.registry
     skills = Skills(mission.skillsets, messages)
     rules = SkillRules(skills)
     own = (rules.units, rules.results, rules.resources, NameRules(skills).names, OutcomeRules(skills).asked)

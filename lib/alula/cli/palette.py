@@ -21,16 +21,16 @@ from alula.common.robots import RobotError, RobotFolder, find_robot
 from alula.language.errors import LanguageError, has_errors
 from alula.language.fleet import load_models
 from alula.language.models import ModelFile, check_files, models_in
-from alula.missions.palette import mission_palette
 from alula.missions.part import NO_PART
+from alula.missions.registry import mission_registry
 from alula.trees import nav2
 from alula.trees.errors import FileError, TreeError
 from alula.trees.groot.tree_xml import model_xml
 from alula.trees.guessing import guessed_types
 from alula.trees.library import Library
 from alula.trees.node_type import Category, NodeType
-from alula.trees.palette import Palette
-from alula.trees.standard import standard_palette
+from alula.trees.registry import NodeRegistry
+from alula.trees.standard import standard_registry
 
 COMMAND = "alula palette"
 WRONG = 2
@@ -55,7 +55,7 @@ def asked_types(places: Sequence[str], release: str | None, *, guess: bool) -> I
     """Yield what is asked for: Nav2's nodes, as a release declares them, or those of folders; raises LanguageError, TreeError."""
     if (release is None) != bool(places) or (release is not None and guess):
         raise TreeError("takes a FOLDER of a robot's models or of trees, or --nav2 RELEASE by itself")
-    return tree_types(places, guess=guess) if release is None else iter(nav2.palette(release))
+    return tree_types(places, guess=guess) if release is None else iter(nav2.registry(release))
 
 
 def tree_types(places: Sequence[str], *, guess: bool) -> Iterator[NodeType]:
@@ -81,7 +81,7 @@ def tree_types(places: Sequence[str], *, guess: bool) -> Iterator[NodeType]:
         yield from declared
         return
     trees = list(library.elements())
-    known = Palette({one.name: one for one in (*declared, *nav2.palette_for(trees), *mission_palette((), NO_PART))}.values())
+    known = NodeRegistry({one.name: one for one in (*declared, *nav2.registry_for(trees), *mission_registry((), NO_PART))}.values())
     found = [one for one in guessed_types(trees, known) if one.name not in library.trees]
     warner(COMMAND)(f"nodes that are guessed from their uses: {len(found)}; look at categories, directions and types first")
     yield from found
@@ -109,8 +109,8 @@ def robot_types(folder: str) -> Iterator[NodeType]:
         for skillset in file.skillsets
         for skill in skillset.skills
     }
-    known = standard_palette().names()  # Groot2 has these itself
-    for one in mission_palette(skillsets, part):
+    known = standard_registry().names()  # Groot2 has these itself
+    for one in mission_registry(skillsets, part):
         if one.name not in known:
             yield replace(one, doc=told.get(one.name, one.doc))
 

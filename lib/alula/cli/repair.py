@@ -75,7 +75,7 @@ def run(given: argparse.Namespace) -> int:
 def _drawn(subject: Subject, branch: Branch, changed: Path) -> str:
     """Return a drawing of the mission with the branch."""
     mission = subject.changed(changed)
-    tree = scripted_tree(mission.files, mission.palette, Answers({}), StepClock())
+    tree = scripted_tree(mission.files, mission.registry, Answers({}), StepClock())
     view = view_of(tree.root)
     return draw(view, f"{subject.path.name}: {mission.files.main}, with '{branch.name}'", added(view, branch))
 

@@ -19,16 +19,16 @@ from alula.cli.tree_page import TreePage
 from alula.common.files import write_text
 from alula.common.robots import RobotError, find_robot
 from alula.missions.drawing import draw, drawn_as_text
-from alula.missions.palette import palette_of
 from alula.missions.part import NO_PART
+from alula.missions.registry import registry_of
 from alula.trees.answers import Answers, AnswersError, StepClock, read_answers, scripted_tree, ticks
 from alula.trees.document import read_document
 from alula.trees.enums import read_enums
 from alula.trees.errors import TreeError, did_you_mean
 from alula.trees.format3 import DECLARED, OLD, convert
 from alula.trees.library import Library
-from alula.trees.palette import Palette
 from alula.trees.reading import TreeFiles, read_files, read_models
+from alula.trees.registry import NodeRegistry
 from alula.trees.structure import missing_trees
 from alula.trees.tree import Tree
 from alula.trees.view import view_of
@@ -67,7 +67,7 @@ def run(given: argparse.Namespace) -> int:
         clock = StepClock()
         tell_missing(files)
         try:
-            tree = scripted_tree(files, palette(files, given.palette), answers, clock, enums)
+            tree = scripted_tree(files, registry(files, given.palette), answers, clock, enums)
         except TreeError as error:
             wrong.append(error)
             continue
@@ -154,14 +154,14 @@ def mains(places: Sequence[Path], main: str, packages: Mapping[str, Path], wrong
         yield from found
 
 
-def palette(files: TreeFiles, more: Sequence[Path]) -> Palette:
+def registry(files: TreeFiles, more: Sequence[Path]) -> NodeRegistry:
     """Return the types of node that there are: a mission's of the robot around, of the file, of palettes; raises TreeError."""
     types = [one for place in more for one in read_models(place)]
     try:
         robot = find_robot()
     except RobotError:
-        return palette_of(files, (), NO_PART, more=types)  # a tree of others needs none
-    return palette_of(files, models_of(robot, warner(COMMAND)), part_of(robot, warner(COMMAND)), more=types)
+        return registry_of(files, (), NO_PART, more=types)  # a tree of others needs none
+    return registry_of(files, models_of(robot, warner(COMMAND)), part_of(robot, warner(COMMAND)), more=types)
 
 
 if __name__ == "__main__":

@@ -16,14 +16,14 @@ from alula.editor.tree_names import TreeFolder
 from alula.language.errors import Diagnostic, Severity
 from alula.language.messages import FieldError, messages_of
 from alula.language.models import ModelFile, check_files, models_in
-from alula.missions.palette import mission_palette
 from alula.missions.part import NO_PART, MissionPart
+from alula.missions.registry import mission_registry
 from alula.missions.skill_types import SUCCESS_PORT
 from alula.missions.world import FUNCTIONS
 from alula.model.model import ResultKind, Skill, Skillset
 from alula.trees.attributes import POSTCONDITIONS, PRECONDITIONS
 from alula.trees.node_type import Category, NodeType
-from alula.trees.palette import Palette
+from alula.trees.registry import NodeRegistry
 
 SUFFIX = ".xml"
 UNKNOWN_NODE = "ALU601"
@@ -131,9 +131,9 @@ def _perhaps_own(finding: Diagnostic) -> Diagnostic:
 
 
 def _candidates(before: str, skills: Skills, part: MissionPart, folder: TreeFolder) -> Iterator[Completion]:
-    types = mission_palette(tuple(skills.skillsets.values()), part)
+    types = mission_registry(tuple(skills.skillsets.values()), part)
     declared = [one for one in folder.models.values() if one.category is not Category.SUBTREE and types.get(one.name) is None]
-    types = types | Palette(declared)
+    types = types | NodeRegistry(declared)
     if _TAG.search(before):
         yield from (Completion(one.name, "skill" if skills.get(one.name) else "keyword", one.doc) for one in types)
         return

@@ -19,10 +19,10 @@ from py_trees.behaviours import Success
 from alula.missions.blackboard import Blackboard
 from alula.missions.conditions import Condition, answers
 from alula.missions.nodes import Needs
-from alula.missions.palette import no_class, palette_of, without_class
 from alula.missions.part import MissionPart
 from alula.missions.pending import PendingInterrupts
 from alula.missions.plan import InputError, Inputs, MissionPlan
+from alula.missions.registry import no_class, registry_of, without_class
 from alula.missions.skills import Crew, SkillNode
 from alula.missions.skillset import Client, Clock
 from alula.missions.world import World, asked_data, states_of
@@ -33,9 +33,9 @@ from alula.trees.errors import Report, TreeError, refuse
 from alula.trees.factory import build_tree
 from alula.trees.node import Node, NodeConfig, Shared
 from alula.trees.node_type import Category, NodeType, node_type
-from alula.trees.palette import Palette
 from alula.trees.ports import Direction, Port
 from alula.trees.reading import TreeFiles
+from alula.trees.registry import NodeRegistry
 from alula.trees.source import TreeSource, source_of
 from alula.trees.structure import verify
 from alula.trees.tree import Tree
@@ -89,9 +89,9 @@ class MissionFile:
         return replace(self, source=replace(self.source, types=()), files=files)
 
     @cached_property
-    def palette(self) -> Palette:
+    def registry(self) -> NodeRegistry:
         """The types of node that its trees may have."""
-        return palette_of(self.files, self.skillsets, self.part, more=self.source.types)
+        return registry_of(self.files, self.skillsets, self.part, more=self.source.types)
 
     @cached_property
     def roots(self) -> tuple[NodeConfig, ...]:
@@ -101,14 +101,14 @@ class MissionFile:
         board = TreeBoard(shared.clock)
         for name in (self.files.main, *(one for one in (STOP_HERE, READY) if one in self.files.trees)):
             after = sum(1 for root in found for _ in root.walk())
-            found.append(configure(self.files, self.palette, name, shared, enums=self.source.enums, blackboard=board, after=after))
+            found.append(configure(self.files, self.registry, name, shared, enums=self.source.enums, blackboard=board, after=after))
         return tuple(found)
 
     @property
     def nowhere_made(self) -> list[NodeType]:
         """The types of node that its trees use and that are only declared, by its files or by Nav2."""
-        names = without_class(self.files, self.palette)
-        return [known for name in names if (known := self.palette.get(name)) is not None]
+        names = without_class(self.files, self.registry)
+        return [known for name in names if (known := self.registry.get(name)) is not None]
 
     @property
     def model(self) -> NodeType:
@@ -123,7 +123,7 @@ class MissionFile:
     def plan(self, name: str, inputs: Inputs) -> MissionPlan:
         """Return its plan; raises InputError where the file, or an input, can't be used."""
         self._verify()
-        if (problem := no_class(self.files, self.palette)) is not None:
+        if (problem := no_class(self.files, self.registry)) is not None:
             raise InputError(str(problem))
         parameters = {port.name: _number(port) for port in self.given if port.default is not None}
         own = self._inputs(inputs)
@@ -149,7 +149,7 @@ class MissionFile:
 
     def _verify(self) -> None:
         try:
-            verify(self.files, self.palette)
+            verify(self.files, self.registry)
         except TreeError as error:
             raise InputError(str(error)) from error
 
@@ -221,7 +221,7 @@ class Maker:
         self._enums = {**file.source.enums, **states_of(skillsets)}
         self._resources = frozenset(f"{one.name}.{resource}" for one in skillsets for resource in one.resource_index)
         self._data = frozenset(f"{one.name}.{data}" for one in skillsets for data in one.data_index)
-        self._palette = palette_of(file.files, skillsets, file.part, crew)
+        self._registry = registry_of(file.files, skillsets, file.part, crew)
         for skillset, data in asked_data(file.files, skillsets).items():
             if data:
                 crew.clients[skillset].follow(data)
@@ -229,8 +229,8 @@ class Maker:
     def tree(self, name: str, after: int = 0) -> Tree:
         """Make one; that of the file where no name is given. Its nodes have the uids behind ``after``."""
         world = World(self.crew.clients, self.crew.memory, self._resources, self._data)
-        files, palette, board = self.files, self._palette, self.board
-        tree = build_tree(files, palette, self._clock_ns, main=name, enums=self._enums, surroundings=world, blackboard=board, after=after)
+        files, registry, board = self.files, self._registry, self.board
+        tree = build_tree(files, registry, self._clock_ns, main=name, enums=self._enums, surroundings=world, blackboard=board, after=after)
         for node in tree.nodes:
             if isinstance(node, SkillNode):
                 world.leaves.setdefault(node.config.type.name, []).append(node)

@@ -9,8 +9,8 @@ from alula.missions.blackboard import Blackboard
 from alula.trees.ends import ENDS, FAILS, SUCCEEDS, Ends, Given, whole_number
 from alula.trees.errors import TickError
 from alula.trees.node import Action, Condition, Count, Decorator, NodeConfig, Script, SyncAction
-from alula.trees.palette import Palette
 from alula.trees.ports import input_port, script_port
+from alula.trees.registry import NodeRegistry
 from alula.trees.status import FAILURE, IDLE, RUNNING, SKIPPED, SUCCESS, Answer
 from alula.trees.ticking import AGAIN, Order, Ticking
 from alula.trees.values import DOUBLE, INT, STRING
@@ -237,11 +237,11 @@ def seconds_ns(node: Action | Decorator, port: str) -> int:
     return int(value * SECOND_NS)
 
 
-def mission_nodes(memory: Blackboard) -> Palette:
+def mission_nodes(memory: Blackboard) -> NodeRegistry:
     """Return them."""
-    palette = Palette()
+    registry = NodeRegistry()
     for node in (WaitFor, Stays, Awaits, Until, RetryAfter, Needs):
-        palette.register(node)
+        registry.register(node)
     noting: type[NoteReason] = type("NoteReason", (NoteReason,), {"memory": memory, "__doc__": NoteReason.__doc__})
-    palette.register(noting)
-    return palette
+    registry.register(noting)
+    return registry

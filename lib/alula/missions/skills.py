@@ -14,7 +14,7 @@ from alula.model.execution_state import ExecutionState
 from alula.model.model import Resource, Skill, Skillset
 from alula.trees.ends import ENDS, FAILS, Ends, Given
 from alula.trees.node import Action, Condition, NodeConfig, tickable
-from alula.trees.palette import Palette
+from alula.trees.registry import NodeRegistry
 from alula.trees.status import FAILURE, IDLE, RUNNING, SUCCESS, Answer
 
 
@@ -120,15 +120,15 @@ class ResourceNode(Condition):
         return SUCCESS if state == self.get(STATE_PORT) else FAILURE
 
 
-def robot_nodes(skillsets: Sequence[Skillset], crew: Crew | None = None) -> Palette:
+def robot_nodes(skillsets: Sequence[Skillset], crew: Crew | None = None) -> NodeRegistry:
     """Return skills as actions, and resources as conditions; without a crew they can be checked and drawn, and not be ticked."""
-    palette = Palette()
+    registry = NodeRegistry()
     for one in skillsets:
         # No class for each: isinstance asks every subclass of a base that there is, and a campaign makes missions by the thousand.
         for skill in one.skills:
             known = replace(skill_type(one.name, skill), tells=SkillNode)
-            palette.add(known if crew is None else tickable(known, partial(SkillNode, model=skill, skillset=one.name, crew=crew)))
+            registry.add(known if crew is None else tickable(known, partial(SkillNode, model=skill, skillset=one.name, crew=crew)))
         for resource in one.resources:
             known = replace(resource_type(one.name, resource), tells=ResourceNode)
-            palette.add(known if crew is None else tickable(known, partial(ResourceNode, model=resource, skillset=one.name, crew=crew)))
-    return palette
+            registry.add(known if crew is None else tickable(known, partial(ResourceNode, model=resource, skillset=one.name, crew=crew)))
+    return registry

@@ -15,9 +15,9 @@ from alula.repair.purposes import Purpose
 from alula.trees.attributes import node_name, type_name
 from alula.trees.document import Element
 from alula.trees.node import pointer
-from alula.trees.palette import Palette
 from alula.trees.ports import Direction
 from alula.trees.reading import TreeFiles
+from alula.trees.registry import NodeRegistry
 from alula.trees.values import ANY
 
 WAITING = frozenset({"WaitFor", "Awaits", "Stays"})
@@ -32,13 +32,13 @@ class Sources:
 
     Attributes:
         files: the mission's trees.
-        palette: of its nodes.
+        registry: of its nodes.
         words: what the author calls things.
         asks: whether an input that comes from nowhere becomes one of the tree's own, of its name.
     """
 
     files: TreeFiles
-    palette: Palette
+    registry: NodeRegistry
     words: Vocabulary
     asks: bool = False
 
@@ -89,7 +89,7 @@ class Sources:
         kind, unit = type_of(parameter.type), told_unit(parameter.comment)
         found: list[str] = []
         for one in within.iterate() if within is not None else ():
-            known = self.palette.get(type_name(one))
+            known = self.registry.get(type_name(one))
             for port in known.ports.values() if known else ():
                 alike = port.type.name == kind.name and port.type is not ANY and port.unit == unit
                 entry = pointer(one.get(port.name), port.name)

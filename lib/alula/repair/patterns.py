@@ -45,7 +45,7 @@ class Patterns:
         self._purposes = Purposes(subject.skillsets, subject.brought, subject.robot.robots)
         self._using = frozenset(using)
         self._trees = subject.files.trees
-        sources = Sources(subject.files, subject.mission.palette, subject.vocabulary())
+        sources = Sources(subject.files, subject.mission.registry, subject.vocabulary())
         self._stand_ins = StandIns(subject, self._purposes, sources, self._using)
         self._remedies = Remedies(subject, self._purposes, sources, Courses(self._purposes, self._using), most_faults + 1)
 

@@ -130,7 +130,7 @@ class Planner:
             raise RepairError(f"--using {wrong[0]}: there is no such skill; there are {', '.join(sorted(self._purposes.known))}")
         self._stages = [self._stage(one.strip()) for one in re.split(r"\bthen\b", aim.goal)]
         self._courses = Courses(self._purposes, aim.using)
-        sources = Sources(self._subject.files, self._subject.mission.palette, self._subject.vocabulary(), asks=True)
+        sources = Sources(self._subject.files, self._subject.mission.registry, self._subject.vocabulary(), asks=True)
         self._composer = Composer(sources, self._courses)
 
     def _stage(self, text: str) -> Stage:

@@ -24,10 +24,10 @@ from alula.trees.factory import build_tree
 from alula.trees.guessing import category_of
 from alula.trees.node import Action, Control, Maker, Node, NodeConfig, TickableType, tickable
 from alula.trees.node_type import CHILDREN, Category, NodeType, node_type
-from alula.trees.palette import Palette
 from alula.trees.ports import Direction, Port
 from alula.trees.reading import TreeFiles
-from alula.trees.standard import standard_palette
+from alula.trees.registry import NodeRegistry
+from alula.trees.standard import standard_registry
 from alula.trees.status import ANSWERS, FAILURE, IDLE, NAMES, RUNNING, SUCCESS, Answer, Status
 from alula.trees.structure import is_slip, missing_trees, verify
 from alula.trees.tree import Tree
@@ -253,8 +253,10 @@ class UnknownNode(Control):
         raise TickError(f"{self.place()}: nothing here ticks a '{name}'; {stands}")
 
 
-def scripted_tree(files: TreeFiles, palette: Palette, answers: Answers, clock: Clock, enums: Mapping[str, float] | None = None) -> Tree:
-    """Build a tree of any file: what the palette does not know is an action, or with children what stands in for it, or can be drawn.
+def scripted_tree(
+    files: TreeFiles, registry: NodeRegistry, answers: Answers, clock: Clock, enums: Mapping[str, float] | None = None
+) -> Tree:
+    """Build a tree of any file: what the registry does not know is an action, or with children what stands in for it, or can be drawn.
 
     A tree that is in none of the files is one leaf of its name (`structure.missing_trees` tells them), unless that name is a slip.
     By the script answer the leaves that it names, and all that only a robot could make. ``enums`` are the numbers of names in scripts.
@@ -273,8 +275,8 @@ def scripted_tree(files: TreeFiles, palette: Palette, answers: Answers, clock: C
     for name, value in answers.entries.items():
         board.set(name, value)
     known = {**(enums or {}), **answers.enums}
-    scripted = _scripted(files, palette, answers)
-    verify(files, Palette({**{one.name: one for one in scripted}, **{one.name: one for one in palette}}.values()), of_others=True)
+    scripted = _scripted(files, registry, answers)
+    verify(files, NodeRegistry({**{one.name: one for one in scripted}, **{one.name: one for one in registry}}.values()), of_others=True)
     tree = build_tree(files, scripted, clock, enums=known, blackboard=board)
     leaves = {node.name for node in tree.nodes if not node.children}
     for name in answers.script:
@@ -323,8 +325,8 @@ class StepClock:
         self._now_ns += TICK_NS
 
 
-def _scripted(files: TreeFiles, palette: Palette, answers: Answers) -> Palette:
-    types = {one.name: one for one in palette}
+def _scripted(files: TreeFiles, registry: NodeRegistry, answers: Answers) -> NodeRegistry:
+    types = {one.name: one for one in registry}
     for name, uses in _uses(files).items():
         if name in files.trees and name not in types:
             continue  # a mistake, told when the tree is made
@@ -342,7 +344,7 @@ def _scripted(files: TreeFiles, palette: Palette, answers: Answers) -> Palette:
             ]
             cure = did_you_mean(name, having) or f"those that nothing ticks are {', '.join(sorted(having)) or 'none'}"
             raise AnswersError(f"stand_ins: the tree has no node with children of the type '{name}'; {cure}")
-    return Palette(types.values())
+    return NodeRegistry(types.values())
 
 
 def _standing_in(known: NodeType, uses: Collection[Element], answers: Answers) -> NodeType:
@@ -367,7 +369,7 @@ def _stand_in(said: str) -> TickableType | None:
     if said == PASS_THROUGH:
         return TickableType(PASS_THROUGH, Category.DECORATOR, {}, "", (1, 1), make=PassThrough)
     retry = re.fullmatch(rf"{RETRY} ([1-9]\d*|-1)", said)
-    other = standard_palette().get("RetryUntilSuccessful" if retry else said)
+    other = standard_registry().get("RetryUntilSuccessful" if retry else said)
     if not isinstance(other, TickableType) or other.children == NO_CHILDREN:
         return None
     ports = {one.name: replace(one, default=retry[1]) if retry and one.name == "num_attempts" else one for one in other.ports.values()}

@@ -16,8 +16,8 @@ from alula.trees.errors import FileError, Problem, TickError
 from alula.trees.node import NodeConfig, Script, Shared, TickableType, pointer
 from alula.trees.node_type import Category, unknown_type
 from alula.trees.nodes.subtree import SubTree
-from alula.trees.palette import Palette
 from alula.trees.reading import TreeFiles
+from alula.trees.registry import NodeRegistry
 from alula.trees.script import Program, ScriptError, parse
 from alula.trees.script.scope import Unknown
 from alula.trees.values import literal
@@ -107,7 +107,7 @@ class BoundScript:
 
 def configure(
     files: TreeFiles,
-    palette: Palette,
+    registry: NodeRegistry,
     main: str,
     shared: Shared,
     *,
@@ -120,7 +120,7 @@ def configure(
 
     Arguments are those of `factory.build_tree`. On the blackboards stands nothing yet but what uses of subtrees give these as plain text.
     """
-    configurer = _Configurer(files, palette, shared, enums or {}, surroundings or Nothing(), after)
+    configurer = _Configurer(files, registry, shared, enums or {}, surroundings or Nothing(), after)
     return configurer.node(files.trees[main].children[0], blackboard or Blackboard(shared.clock), "", None)
 
 
@@ -135,10 +135,10 @@ def _joined(path: str, name: str) -> str:
 
 class _Configurer:
     def __init__(
-        self, files: TreeFiles, palette: Palette, shared: Shared, enums: Mapping[str, float], surroundings: Surroundings, after: int
+        self, files: TreeFiles, registry: NodeRegistry, shared: Shared, enums: Mapping[str, float], surroundings: Surroundings, after: int
     ) -> None:
         self._files = files
-        self._palette = palette
+        self._registry = registry
         self._shared = shared
         self._enums = enums
         self._surroundings = surroundings
@@ -149,7 +149,7 @@ class _Configurer:
         self._count += 1
         uid, name, tag = self._count, node_name(element), type_name(element)
         is_subtree = element.tag == SUBTREE.name
-        known = SUBTREE if is_subtree else self._palette.get(tag) or unknown_type(tag)
+        known = SUBTREE if is_subtree else self._registry.get(tag) or unknown_type(tag)
         ports = {name: one.value for name, one in element.attributes.items() if is_port(name)}
         model = self._files.models.get(tag) if is_subtree and not _autoremaps(element) else known
         for port in () if model is None else model.ports.values():

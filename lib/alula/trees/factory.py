@@ -1,4 +1,4 @@
-"""Makes a tree of files and a palette."""
+"""Makes a tree of files and a registry of nodes."""
 
 from __future__ import annotations
 
@@ -9,8 +9,8 @@ from alula.trees.blackboard import Blackboard, Clock
 from alula.trees.configuration import Surroundings, configure, path_inside
 from alula.trees.errors import FileError, Problem
 from alula.trees.node import After, Before, Node, NodeConfig, Script, Shared, TickableType, pointer
-from alula.trees.palette import Palette
 from alula.trees.reading import TreeFiles
+from alula.trees.registry import NodeRegistry
 from alula.trees.structure import verify
 from alula.trees.tree import Subtree, Tree
 from alula.trees.values import ANY, STRING
@@ -18,7 +18,7 @@ from alula.trees.values import ANY, STRING
 
 def make_tree(
     files: TreeFiles,
-    palette: Palette,
+    registry: NodeRegistry,
     clock: Clock,
     *,
     main: str = "",
@@ -30,7 +30,7 @@ def make_tree(
 
     Args:
         files: what was read.
-        palette: the types of node that it may have.
+        registry: the types of node that it may have.
         clock: mission clock, nanoseconds.
         main: the tree to build, that of the files unless it is given.
         enums: names of numbers for scripts and switches.
@@ -40,13 +40,13 @@ def make_tree(
     Raises:
         FileError: something is wrong in a file.
     """
-    verify(files, palette)
-    return build_tree(files, palette, clock, main=main, enums=enums, surroundings=surroundings, blackboard=blackboard)
+    verify(files, registry)
+    return build_tree(files, registry, clock, main=main, enums=enums, surroundings=surroundings, blackboard=blackboard)
 
 
 def build_tree(
     files: TreeFiles,
-    palette: Palette,
+    registry: NodeRegistry,
     clock: Clock,
     *,
     main: str = "",
@@ -61,7 +61,7 @@ def build_tree(
     """
     shared = Shared(clock)
     board = blackboard or Blackboard(clock)
-    config = configure(files, palette, main or files.main, shared, enums=enums, surroundings=surroundings, blackboard=board, after=after)
+    config = configure(files, registry, main or files.main, shared, enums=enums, surroundings=surroundings, blackboard=board, after=after)
     subtrees = [Subtree(main or files.main, "", board)]
     return Tree(_made(config, subtrees[0], subtrees), subtrees, files, shared)
 

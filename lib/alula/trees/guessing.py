@@ -10,8 +10,8 @@ from alula.trees.attributes import is_port, type_name
 from alula.trees.document import Element
 from alula.trees.node import pointer
 from alula.trees.node_type import CATEGORIES, Category, NodeType, node_type
-from alula.trees.palette import Palette
 from alula.trees.ports import Direction, Port
+from alula.trees.registry import NodeRegistry
 from alula.trees.values import ANY, BOOL, DOUBLE, INT, STRING, PortType
 
 ASKING = re.compile(r"(?:Is|Are|Has|Have|Can|Check|Was|Should)(?=[A-Z_\d])")
@@ -35,7 +35,7 @@ def category_of(name: str, uses: Collection[Element]) -> Category:
     return (leaf, Category.DECORATOR)[most] if most < 2 else Category.CONTROL
 
 
-def guessed_types(trees: Iterable[Element], known: Palette) -> list[NodeType]:
+def guessed_types(trees: Iterable[Element], known: NodeRegistry) -> list[NodeType]:
     """Return the types of all nodes of trees that are not known, in the order of their names, each with where it was guessed from."""
     places = [_Entries.of(tree, known) for tree in trees]
     uses: dict[str, list[tuple[Element, _Entries]]] = {}
@@ -52,10 +52,10 @@ class _Entries:
 
     elements: Sequence[Element]
     users: Mapping[str, Sequence[tuple[Element, str]]]
-    known: Palette
+    known: NodeRegistry
 
     @classmethod
-    def of(cls, tree: Element, known: Palette) -> _Entries:
+    def of(cls, tree: Element, known: NodeRegistry) -> _Entries:
         elements = [one for top in tree.children for one in top.iterate()]
         users: dict[str, list[tuple[Element, str]]] = {}
         for element in elements:

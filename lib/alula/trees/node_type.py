@@ -42,7 +42,7 @@ class NodeClass(Protocol):
 
 @dataclass(frozen=True)
 class NodeType:
-    """A type of node as a palette has it; of one that only a model tells of nothing can be ticked, so it can be drawn and checked."""
+    """A type of node as a registry has it; of one that only a model tells of nothing can be ticked, so it can be drawn and checked."""
 
     is_tickable: ClassVar[bool] = False
     """Whether nodes can be made of it, as of a `node.TickableType`."""
@@ -60,7 +60,7 @@ class NodeType:
     assumed: bool = False
     """Nobody has declared it: it is taken for a node that many programs have."""
     unknown: bool = False
-    """No palette has it: it may do anything, and read and write any entry."""
+    """No registry has it: it may do anything, and read and write any entry."""
 
     @cached_property
     def scripts(self) -> tuple[str, ...]:
@@ -108,5 +108,5 @@ def node_type(
 
 
 def unknown_type(name: str) -> NodeType:
-    """Return the type of a node that no palette has."""
+    """Return the type of a node that no registry has."""
     return NodeType(name, Category.ACTION, children=(0, None), unknown=True)

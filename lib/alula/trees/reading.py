@@ -13,7 +13,7 @@ from alula.trees.errors import FileError, Problem, Report, did_you_mean, refuse
 from alula.trees.format3 import FORMAT, modernised
 from alula.trees.library import MODELS, PROJECT, Library, models_of
 from alula.trees.node_type import Category, NodeType
-from alula.trees.palette import Palette
+from alula.trees.registry import NodeRegistry
 
 FORBIDDEN = re.compile(r"""[\x00-\x20\x7f<>&"'/\\:*?|.]""")
 """What the ID of a tree must not have in it since BehaviorTree.CPP 4.8.4."""
@@ -51,9 +51,9 @@ class TreeFiles:
         own = {document.path for document in self.documents}
         return {name: tree for name, tree in self.trees.items() if tree.place.path in own or Path(tree.place.path).resolve() not in others}
 
-    def declared(self) -> Palette:
+    def declared(self) -> NodeRegistry:
         """Return the types of node that a model declares, without what makes them; subtrees are none."""
-        return Palette(one for one in self.models.values() if one.category is not Category.SUBTREE)
+        return NodeRegistry(one for one in self.models.values() if one.category is not Category.SUBTREE)
 
     def uses(self, name: str) -> Iterator[Element]:
         """Yield the uses of subtrees in a tree."""
@@ -77,7 +77,7 @@ def read_files(path: Path, report: Report = refuse, *, main: str = "", library: 
     return _read(library.document(path), path, report, main, library, whole=whole)
 
 
-def read_models(path: Path) -> Palette:
+def read_models(path: Path) -> NodeRegistry:
     """Return the types of node that a file declares in its TreeNodesModel; it may have no trees. Raises FileError."""
     files = TreeFiles()
     _Reader(files, refuse, Library()).add(modernised(read_document(path)), (path.resolve(),))

@@ -1,10 +1,10 @@
-"""The palette of BehaviorTree.CPP 4's own nodes."""
+"""The registry of BehaviorTree.CPP 4's own nodes."""
 
 from __future__ import annotations
 
 from alula.trees.node import Node
 from alula.trees.nodes import branches, decorators, entries, leaves, loops, parallel, sequences
-from alula.trees.palette import Palette
+from alula.trees.registry import NodeRegistry
 
 NODES: tuple[type[Node], ...] = (
     sequences.Sequence,
@@ -43,10 +43,10 @@ NODES: tuple[type[Node], ...] = (
 )
 
 
-def standard_palette() -> Palette:
+def standard_registry() -> NodeRegistry:
     """Return them; to be added to by a robot's own."""
-    palette = Palette()
+    registry = NodeRegistry()
     for node in NODES:
-        palette.register(node)
-    palette.register(leaves.ScriptNode, "Script")
-    return palette
+        registry.register(node)
+    registry.register(leaves.ScriptNode, "Script")
+    return registry

@@ -13,9 +13,9 @@ from alula.trees.errors import Problem, Report, did_you_mean, refuse
 from alula.trees.guessing import guessed_types
 from alula.trees.node import pointer
 from alula.trees.node_type import CATEGORIES, NodeType
-from alula.trees.palette import Palette
 from alula.trees.ports import Direction
 from alula.trees.reading import TreeFiles
+from alula.trees.registry import NodeRegistry
 from alula.trees.status import ANSWERS
 from alula.trees.values import PortType
 
@@ -31,7 +31,9 @@ _WRITTEN = {"double": "write a number, such as 0.5", "bool": "write true or fals
 """How a value is written, by its type's name."""
 
 
-def verify(files: TreeFiles, palette: Palette, report: Report = refuse, *, of_others: bool = False, others: Collection[Path] = ()) -> None:
+def verify(
+    files: TreeFiles, registry: NodeRegistry, report: Report = refuse, *, of_others: bool = False, others: Collection[Path] = ()
+) -> None:
     """Report what is wrong with any tree of the files; of trees ``of_others``, what nobody has declared is one warning.
 
     Trees that they take of these ``others`` are not looked at: each of those files is verified by itself.
@@ -40,17 +42,17 @@ def verify(files: TreeFiles, palette: Palette, report: Report = refuse, *, of_ot
     _verify_uses(files, trees, report)
     declared: set[str] = set()
     if of_others:
-        declared = {one.name for one in palette if one.assumed or files.models.get(one.name) is one}
-        palette = Palette([*palette, *_undeclared(files, trees, palette, report)])
+        declared = {one.name for one in registry if one.assumed or files.models.get(one.name) is one}
+        registry = NodeRegistry([*registry, *_undeclared(files, trees, registry, report)])
     for name, tree in trees.items():
-        if palette.get(name) is not None:
+        if registry.get(name) is not None:
             report(Problem(tree.place_of("ID"), f"the tree '{name}' has the name of a node", "call it otherwise"))
     differing = _Differing()
     for tree in trees.values():
         for top in tree.children:
             for element in top.iterate():
                 differs = element.tag != "SubTree" and type_name(element) in declared
-                _verify_node(element, files, palette, differing.of(type_name(element)) if differs else report)
+                _verify_node(element, files, registry, differing.of(type_name(element)) if differs else report)
     differing.tell(report)
     _Sizes(files, report).verify()
 
@@ -79,16 +81,16 @@ class _Differing:
         report(replace(first, message=f"{which}; here {first.message}", cure=cure, warning=True))
 
 
-def _verify_node(element: Element, files: TreeFiles, palette: Palette, report: Report) -> None:
+def _verify_node(element: Element, files: TreeFiles, registry: NodeRegistry, report: Report) -> None:
     name = type_name(element)
     if not name:
         report(Problem(element.place, f"<{element.tag}> has no ID", "it names the type of the node"))
     elif element.tag == "SubTree":
         _verify_subtree(element, files, report)
     else:
-        known = palette.get(name)
+        known = registry.get(name)
         if known is None:
-            cure = did_you_mean(name, [*palette.names()]) or "see `alula palette`"
+            cure = did_you_mean(name, [*registry.names()]) or "see `alula palette`"
             if name in files.trees:
                 cure = f'it is a tree: write <SubTree ID="{name}"/>'
             place = element.place_of("ID") if element.tag in CATEGORIES else element.place
@@ -145,15 +147,15 @@ def _first(names: Sequence[str]) -> str:
     return ", ".join(names[:SHOWN]) + (", ..." if names[SHOWN:] else "")
 
 
-def _undeclared(files: TreeFiles, trees: Mapping[str, Element], palette: Palette, report: Report) -> list[NodeType]:
+def _undeclared(files: TreeFiles, trees: Mapping[str, Element], registry: NodeRegistry, report: Report) -> list[NodeType]:
     """Report the nodes of the files that nobody has declared, and return what their uses show; names that are slips are left out."""
     own = {document.path for document in files.documents}
-    guessed = guessed_types(trees.values(), palette)
+    guessed = guessed_types(trees.values(), registry)
     first: dict[str, Element] = {}
     for tree in trees.values():
         for element in tree.iterate():
             first.setdefault(type_name(element), element)
-    declared = [one.name for one in palette if not one.assumed]
+    declared = [one.name for one in registry if not one.assumed]
     guessed = [one for one in guessed if one.name not in files.trees and not is_slip(one.name, declared)]
     told = sorted((one for one in guessed if first[one.name].place.path in own), key=lambda one: first[one.name].place.line)
     if told:

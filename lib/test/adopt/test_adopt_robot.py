@@ -14,12 +14,12 @@ from alula.adopt.robot import robot_from_trees
 from alula.cli import check, generate, new, odds, palette, run
 from alula.generate.scaffold.skeleton import write
 from alula.language.load import load_robot
-from alula.missions.palette import palette_of
 from alula.missions.part import NO_PART
+from alula.missions.registry import registry_of
 from alula.model.model import ResultKind
 from alula.trees.answers import Answers, Step, StepClock, scripted_tree, ticks
 from alula.trees.reading import read_files
-from alula.trees.standard import standard_palette
+from alula.trees.standard import standard_registry
 
 SKILLS = {
     "grasp": ({"object": "string", "force": "int32", "if_port": "string"}, {"pose": "string"}),
@@ -87,7 +87,7 @@ def test_the_mission_ticks_as_the_tree_does(tmp_path):
     before = mains_of(tmp_path / "trees")[0]
     after = read_files(robot / "missions/deliver.xml")
     entries = yaml.safe_load((robot / "worlds/deliver.yaml").read_text())
-    known = palette_of(after, [skillset_of(robot)], NO_PART)
+    known = registry_of(after, [skillset_of(robot)], NO_PART)
 
     def told(files, types, decorator, seed):
         answers = Answers({"*": [Step(None)]}, entries=entries, stand_ins={decorator: "pass-through"}, seed=seed)
@@ -96,7 +96,7 @@ def test_the_mission_ticks_as_the_tree_does(tmp_path):
 
     roots = set()
     for seed in range(20):
-        ticked = told(before, standard_palette(), "Careful", seed)
+        ticked = told(before, standard_registry(), "Careful", seed)
         assert told(after, known, "rover.Careful", seed) == ticked
         roots |= {root for root, _ in ticked}
     assert roots == {"SUCCESS", "FAILURE", "RUNNING"}

@@ -8,9 +8,9 @@ pytest.importorskip("py_trees")
 
 from alula.language.models import ModelFile, check_texts
 from alula.missions.blackboard import Blackboard
-from alula.missions.palette import mission_palette
 from alula.missions.part import NO_PART
 from alula.missions.pending import PendingInterrupts
+from alula.missions.registry import mission_registry
 from alula.missions.skills import Crew
 from alula.missions.world import World
 from alula.model.execution_state import ExecutionState
@@ -52,7 +52,7 @@ def tree_of(body, arm):
     assert [one for one in file.findings if one.severity.value == "error"] == []
     crew = Crew({"arm": arm}, Blackboard(clock_ns=int, pending=PendingInterrupts(int)))
     files = read_text(f'<root BTCPP_format="4"><BehaviorTree ID="m">{body}</BehaviorTree></root>', "m.xml")
-    return make_tree(files, mission_palette(file.skillsets, NO_PART, crew), int)
+    return make_tree(files, mission_registry(file.skillsets, NO_PART, crew), int)
 
 
 @pytest.mark.parametrize(("success", "result", "answer"), [("", "HELD", SUCCESS), ("", "DROPPED", FAILURE),
@@ -117,7 +117,7 @@ def test_after_a_halt_a_start_in_its_skillset_waits_and_in_another_one_where_the
     halted = f'<arm.grip tries="1" {"halt_waits=" + chr(34) + "true" + chr(34) if waits else ""}/>'
     body = f'<Sequence><Parallel success_count="1">{halted}<AlwaysSuccess/></Parallel><leg.walk/><arm.grip tries="2"/></Sequence>'
     text = f'<root BTCPP_format="4"><BehaviorTree ID="m">{body}</BehaviorTree></root>'
-    tree = make_tree(read_text(text, "m.xml"), mission_palette(models, NO_PART, crew), int)
+    tree = make_tree(read_text(text, "m.xml"), mission_registry(models, NO_PART, crew), int)
     assert tree.tick() is RUNNING
     assert len(leg.started) == (0 if waits else 1)
     if not waits:

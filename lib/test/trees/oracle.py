@@ -11,9 +11,9 @@ from oracle_leaves import Act, Answers, Ask, Story, tell
 from alula.trees.errors import TreeError
 from alula.trees.factory import make_tree
 from alula.trees.nodes import entries
-from alula.trees.palette import Palette
 from alula.trees.reading import read_text
-from alula.trees.standard import standard_palette
+from alula.trees.registry import NodeRegistry
+from alula.trees.standard import standard_registry
 from alula.trees.status import NAMES
 
 RAISED = "raised"
@@ -88,7 +88,7 @@ class WaitValueUpdate(entries.WaitValueUpdate):
 
 
 AS_OF_4_8 = (SkipUnlessUpdated, WaitValueUpdate)
-PALETTE = Palette(one for one in standard_palette() if one.name not in {node.__name__ for node in AS_OF_4_8})
+PALETTE = NodeRegistry(one for one in standard_registry() if one.name not in {node.__name__ for node in AS_OF_4_8})
 for node in AS_OF_4_8:
     PALETTE.register(node)
 PALETTE.register(Act)

@@ -22,12 +22,12 @@ from alula.trees.node_type import NodeType
 from alula.trees.reading import read_text
 from alula.trees.script import names_in, statements_of
 from alula.trees.script.syntax import Name
-from alula.trees.standard import standard_palette
+from alula.trees.standard import standard_registry
 
 
 def node(line: str) -> tuple[Element, NodeType]:
     element = read_text(f'<root BTCPP_format="4"><BehaviorTree ID="a">{line}</BehaviorTree></root>').trees["a"].children[0]
-    type_ = standard_palette().get(element.tag)
+    type_ = standard_registry().get(element.tag)
     assert type_ is not None
     return element, type_
 
@@ -53,7 +53,7 @@ def test_what_ports_name_is_told_apart_by_whether_it_is_written() -> None:
         '<root BTCPP_format="4"><BehaviorTree ID="a"><Sequence><Script code="n := 1"/>'
         '<LoopDouble queue="{all}" value="{=}"><AlwaysSuccess/></LoopDouble></Sequence></BehaviorTree></root>'
     )
-    loop = build_tree(files, standard_palette(), lambda: 0).root.children[1]
+    loop = build_tree(files, standard_registry(), lambda: 0).root.children[1]
     assert named_entries(loop) == {"queue": "all", "value": "value"}
     assert written_entries(loop)["value"] == "value"
 
@@ -69,7 +69,7 @@ def test_accesses_come_in_their_order_and_say_what_is_needed() -> None:
         '<SetBlackboard value="{n}" output_key="m"/><SubTree ID="b" k="3" l="{m}"/></Sequence></BehaviorTree>'
         '<BehaviorTree ID="b"><ScriptCondition code="k == l &amp;&amp; x.y == k &amp;&amp; f(k)"/></BehaviorTree></root>'
     )
-    root = configure(files, standard_palette(), "a", Shared(int))
+    root = configure(files, standard_registry(), "a", Shared(int))
     inside = root.children[1].children[0].blackboard
     found = [(one.key, one.write, one.needed, one.in_passing) for one in Accesses(lambda one: statements_of(one.value), {"RED"}).of(root)]
     n, m, k = (root.blackboard, "n"), (root.blackboard, "m"), (inside, "k")
@@ -83,7 +83,7 @@ def test_accesses_come_in_their_order_and_say_what_is_needed() -> None:
 
 def accesses(code: str) -> list[tuple[str, bool, bool, frozenset[str] | None]]:
     files = read_text(f'<root BTCPP_format="4"><BehaviorTree ID="a"><Script code="{code}"/></BehaviorTree></root>')
-    root = configure(files, standard_palette(), "a", Shared(int))
+    root = configure(files, standard_registry(), "a", Shared(int))
     found = Accesses(lambda one: statements_of(one.value), None).in_script(root, "code")
     return [(one.name, one.write, one.sure, one.among) for one in found]
 
@@ -109,7 +109,7 @@ def test_a_script_says_which_writing_is_sure_and_which_texts_are_told_apart(
 
 def test_calls_name_what_they_ask_for() -> None:
     files = read_text('<root BTCPP_format="4"><BehaviorTree ID="a"><Script code="a := f(b.c) + g(\'d\', 1 + 2)"/></BehaviorTree></root>')
-    root = configure(files, standard_palette(), "a", Shared(int))
+    root = configure(files, standard_registry(), "a", Shared(int))
     calls = Accesses(lambda one: statements_of(one.value)).calls(root, "code")
     assert [(one.function, one.named) for one in calls] == [("f", ("b.c",)), ("g", ("d", ""))]
 
@@ -117,7 +117,7 @@ def test_calls_name_what_they_ask_for() -> None:
 def test_all_scripts_of_a_node_are_read_in_the_order_in_which_they_run() -> None:
     line = '<Script _post="d := 1" code="a := b == c" _skipIf="e"/>'
     root = configure(
-        read_text(f'<root BTCPP_format="4"><BehaviorTree ID="a">{line}</BehaviorTree></root>'), standard_palette(), "a", Shared(int)
+        read_text(f'<root BTCPP_format="4"><BehaviorTree ID="a">{line}</BehaviorTree></root>'), standard_registry(), "a", Shared(int)
     )
     accesses = Accesses(lambda one: statements_of(one.value), None)
     assert [(one.name, one.write) for one in accesses.in_scripts(root)] == [(name, name in {"a", "d"}) for name in "ebcad"]

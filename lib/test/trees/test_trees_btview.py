@@ -17,7 +17,7 @@ from alula.trees.groot.address import Address
 from alula.trees.groot.server import Server
 from alula.trees.groot.watching import Watch
 from alula.trees.reading import read_text
-from alula.trees.standard import standard_palette
+from alula.trees.standard import standard_registry
 
 TICKS_HZ = 20.0
 MANY = 10_000
@@ -32,7 +32,7 @@ class Rig:
     def __init__(self) -> None:
         self.clock = StepClock()
         answers = Answers({"a": [WORDS["RUNNING"], WORDS["SUCCESS"]] * MANY, "the b": [WORDS["RUNNING"], WORDS["FAILURE"]] * MANY})
-        self.tree = scripted_tree(read_text(TREE), standard_palette(), answers, self.clock)
+        self.tree = scripted_tree(read_text(TREE), standard_registry(), answers, self.clock)
         self.watch = Watch(self.tree, lambda: self.clock() // 1000)
         self.server = Server(self.watch.shown, Address(port=0))
 

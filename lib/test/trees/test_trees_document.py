@@ -11,7 +11,7 @@ from alula.trees.document import DEEPEST, parse_document
 from alula.trees.errors import FileError, Problem, TreeError
 from alula.trees.factory import make_tree
 from alula.trees.reading import read_files, read_text
-from alula.trees.standard import standard_palette
+from alula.trees.standard import standard_registry
 
 GROOT = """\ufeff<?xml version="1.0" encoding="UTF-8"?>
 <!-- made by an editor -->
@@ -139,7 +139,7 @@ def test_a_file_with_anything_changed_is_read_or_refused_in_one_line():
             at, length = rng.randrange(len(text)), rng.choice([0, 1, 1, 5, 30])
             text = text[:at] + rng.choice([*pieces, "", text[at : at + 20]]) + text[at + length :]
         try:
-            make_tree(read_text(text), standard_palette(), lambda: 0).tick()
+            make_tree(read_text(text), standard_registry(), lambda: 0).tick()
             read += 1
         except TreeError as error:
             assert "\n" not in str(error), text  # noqa: PT017 - either is right
@@ -223,7 +223,7 @@ def loads(node):
     answers = []
     for make in (
         lambda: behaviortreepy.BehaviorTreeFactory().create_tree_from_text(text),
-        lambda: make_tree(read_text(text), standard_palette(), lambda: 0),
+        lambda: make_tree(read_text(text), standard_registry(), lambda: 0),
     ):
         try:
             make()

@@ -9,7 +9,7 @@ from alula.cli.tree import main
 from alula.trees.errors import Problem
 from alula.trees.factory import make_tree
 from alula.trees.reading import read_text
-from alula.trees.standard import standard_palette
+from alula.trees.standard import standard_registry
 from alula.trees.status import FAILURE, RUNNING, SUCCESS, Answer
 
 TREES = '<BehaviorTree ID="Main">{}</BehaviorTree><BehaviorTree ID="Leg"><AlwaysSuccess/></BehaviorTree>'
@@ -94,7 +94,7 @@ def test_a_file_is_read_as_its_conversion_and_told_once():
 
 
 def ticked(text: str) -> Answer:
-    tree = make_tree(read_text(text), standard_palette(), lambda: 0)
+    tree = make_tree(read_text(text), standard_registry(), lambda: 0)
     while tree.tick() is RUNNING:
         pass
     return tree.answer

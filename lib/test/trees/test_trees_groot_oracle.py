@@ -21,7 +21,7 @@ from alula.trees.groot.btlog import LogError, read_log
 from alula.trees.groot.server import Server
 from alula.trees.groot.watching import Watch
 from alula.trees.reading import read_text
-from alula.trees.standard import standard_palette
+from alula.trees.standard import standard_registry
 from alula.trees.status import NAMES
 from alula_testing.waits import until
 
@@ -103,7 +103,7 @@ class Ours:
         answers = Answers(
             {name: [WORDS[word] for word in script] for name, script in names.items() if f'"{name}"' in text or f"<{name}" in text}
         )
-        self.tree = scripted_tree(read_text(text), standard_palette(), answers, self.clock)
+        self.tree = scripted_tree(read_text(text), standard_registry(), answers, self.clock)
         self.path = folder / "ours.btlog"
         self.watch = Watch(self.tree, clock_us)
         self.watch.log(self.path)

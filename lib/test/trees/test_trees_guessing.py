@@ -8,7 +8,7 @@ from alula.trees.guessing import guessed_types
 from alula.trees.node_type import Category
 from alula.trees.ports import Direction
 from alula.trees.reading import read_models, read_text
-from alula.trees.standard import standard_palette
+from alula.trees.standard import standard_registry
 from alula.trees.values import ANY, BOOL, DOUBLE, INT, STRING
 
 TEXT = """<root BTCPP_format="4">
@@ -44,13 +44,13 @@ GUESSED = {
     ),
     "Choose": (Category.CONTROL, {}),
     "Seen": (Category.CONDITION, {"object": (Direction.INPUT, STRING)}),
-    "Pause": (Category.ACTION, {"msec": (Direction.INPUT, standard_palette().get("Sleep").ports["msec"].type)}),
+    "Pause": (Category.ACTION, {"msec": (Direction.INPUT, standard_registry().get("Sleep").ports["msec"].type)}),
 }
 
 
 def test_types_are_guessed_from_uses():
     files = read_text(TEXT)
-    found = {one.name: one for one in guessed_types(files.trees.values(), standard_palette())}
+    found = {one.name: one for one in guessed_types(files.trees.values(), standard_registry())}
     assert {
         name: (one.category, {port.name: (port.direction, port.type) for port in one.ports.values()}) for name, one in found.items()
     } == GUESSED
@@ -110,7 +110,7 @@ def test_a_folder_without_trees_has_nothing_to_guess(tmp_path, capsys):
 def test_types_of_literals(literals, type_):
     nodes = "".join(f'<Go to="{one}"/>' for one in literals)
     files = read_text(f'<root BTCPP_format="4"><BehaviorTree ID="M"><Sequence>{nodes}</Sequence></BehaviorTree></root>')
-    (found,) = guessed_types(files.trees.values(), standard_palette())
+    (found,) = guessed_types(files.trees.values(), standard_registry())
     assert found.ports["to"].type is type_
 
 

@@ -12,7 +12,7 @@ from alula.trees.errors import FileError, Problem
 from alula.trees.factory import make_tree
 from alula.trees.library import Library, ignore
 from alula.trees.reading import read_files
-from alula.trees.standard import standard_palette
+from alula.trees.standard import standard_registry
 
 FILE = '<root BTCPP_format="4">{}</root>'
 TREE = '<BehaviorTree ID="{}">{}</BehaviorTree>'
@@ -40,7 +40,7 @@ def test_a_file_uses_trees_of_other_files(tmp_path):
     assert (list(files.trees), files.main, files.is_part) == (["Main", "Dock", "Turn"], "Main", False)
     assert read_files(tmp_path / "parts/dock.xml", library=library).is_part
     with pytest.raises(FileError, match="there is no tree 'Dock'"):
-        make_tree(read_files(tmp_path / "main.xml"), standard_palette(), lambda: 0)
+        make_tree(read_files(tmp_path / "main.xml"), standard_registry(), lambda: 0)
 
 
 def test_a_files_own_tree_comes_first_then_the_nearest_one(tmp_path):

@@ -17,7 +17,7 @@ from alula.trees.errors import TreeError
 from alula.trees.nav2.plugin import TICKED, TOLD
 from alula.trees.node_type import Category
 from alula.trees.reading import read_text
-from alula.trees.standard import standard_palette
+from alula.trees.standard import standard_registry
 
 SHORT = {"R": "RUNNING", "S": "SUCCESS", "F": "FAILURE", "K": "SKIPPED"}
 
@@ -30,7 +30,7 @@ class Rig:
         self.answers = Answers(answers, stand_ins=stand_ins or {})
         self.clock = StepClock()
         files = read_text(f'<root BTCPP_format="4"><BehaviorTree ID="Main">{body}</BehaviorTree></root>')
-        self.tree = scripted_tree(files, standard_palette() | nav2.palette(), self.answers, self.clock)
+        self.tree = scripted_tree(files, standard_registry() | nav2.registry(), self.answers, self.clock)
 
     def tick(self, count: int = 1) -> list[str]:
         """Return a line a tick: the root's answer, and what the leaves were asked (s, t, h and the name)."""
@@ -166,7 +166,7 @@ def told_of(body: str) -> list[tuple[str, str, str]]:
 
 @pytest.mark.parametrize("node", [*TICKED, *TOLD])
 def test_a_class_has_the_ports_and_the_category_that_nav2_declares(node):
-    known = nav2.palette("lyrical").get(node.__name__)
+    known = nav2.registry("lyrical").get(node.__name__)
     assert known.category is node.category
     if node in TICKED:
         mine = {port.name: (port.direction, port.type, port.default) for port in node.ports}
@@ -175,20 +175,20 @@ def test_a_class_has_the_ports_and_the_category_that_nav2_declares(node):
 
 def test_releases_declare_what_they_have():
     assert nav2.RELEASES == NAV2_RELEASES
-    by_release = {release: nav2.palette(release) for release in nav2.RELEASES}
+    by_release = {release: nav2.registry(release) for release in nav2.RELEASES}
     assert [len(one.names()) for one in by_release.values()] == [53, 65, 70, 81]
     spins = [list(known.get("Spin").ports) for known in by_release.values()]
     assert ["disable_collision_checks" in ports for ports in spins] == [False, False, True, True]
     assert ["error_code_id" in ports for ports in spins] == [False, True, True, True]
     waits = [known.get("Wait").ports["wait_duration"].type.name for known in by_release.values()]
     assert waits == ["int", "double", "double", "double"]
-    assert nav2.palette().get("Wait").ports["wait_duration"].type.name == "double"
+    assert nav2.registry().get("Wait").ports["wait_duration"].type.name == "double"
     assert [known.get("IsStopped") is not None for known in by_release.values()] == [False, False, True, False]
 
 
 def test_nothing_ticks_what_asks_a_robot():
     kinds: dict[bool, set[str]] = {True: set(), False: set()}
-    for one in nav2.palette():
+    for one in nav2.registry():
         kinds[one.is_tickable].add(one.name)
     assert kinds[True] == {node.__name__ for node in TICKED}
     body = '<Sequence><DistanceController distance="1"><Spin spin_dist="1"/></DistanceController></Sequence>'
@@ -199,8 +199,8 @@ def test_nothing_ticks_what_asks_a_robot():
 
 
 def test_conditions_and_quick_actions_never_run_and_actions_of_servers_may():
-    runs = {one.name: one.may_run for one in nav2.palette()}
-    assert not any(runs[one.name] for one in nav2.palette() if one.category is Category.CONDITION)
+    runs = {one.name: one.may_run for one in nav2.registry()}
+    assert not any(runs[one.name] for one in nav2.registry() if one.category is Category.CONDITION)
     assert [runs[name] for name in ("Spin", "ClearEntireCostmap", "TruncatePath", "PlannerSelector")] == [True, True, False, False]
     body = "<ReactiveSequence><{}/><{}/></ReactiveSequence>"
     assert told_of(body.format('GoalReached goal="{goal}"', 'TruncatePath input_path="{path}" output_path="{path}"')) == []

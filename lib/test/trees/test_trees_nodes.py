@@ -3,13 +3,13 @@
 from __future__ import annotations
 
 import pytest
-from trees_clock import Played, palette
+from trees_clock import Played, registry
 
 from alula.trees.blackboard import Blackboard
 from alula.trees.errors import FileError, TickError
 from alula.trees.node import Decorator, SyncAction
 from alula.trees.ports import input_port, output_port
-from alula.trees.standard import standard_palette
+from alula.trees.standard import standard_registry
 from alula.trees.status import FAILURE, RUNNING, SUCCESS
 from alula.trees.values import DOUBLE, INT, UINT
 
@@ -148,7 +148,7 @@ class Twice(Decorator):
 
 
 def test_a_robot_registers_its_own_nodes_with_their_ports():
-    nodes = standard_palette()
+    nodes = standard_registry()
     nodes.register(Double, "uav.Double")
     nodes.register(Twice)
     known = nodes.get("uav.Double")
@@ -160,7 +160,7 @@ def test_a_robot_registers_its_own_nodes_with_their_ports():
 
 
 def test_a_port_without_a_value_says_so_when_it_is_read():
-    nodes = standard_palette()
+    nodes = standard_registry()
     nodes.register(Double)
     for attributes, message in {
         'of="{y}" to="{x}"': r"<text>:1:\d+ \(Double\): the port 'of' reads 'y', which nothing has written",
@@ -225,6 +225,6 @@ def test_text_is_written_over_what_has_no_type():
     assert (tree.tick(), tree.tree.blackboard.get("y")) == ("SUCCESS", "7")
 
 
-def test_the_palette_of_the_field_is_complete():
-    names = set(palette().names())
+def test_the_registry_of_the_field_is_complete():
+    names = set(registry().names())
     assert names >= {f"Switch{count}" for count in range(2, 7)} | {"LoopInt", "LoopBool", "LoopDouble", "LoopString", "Script", "TryCatch"}

@@ -9,10 +9,10 @@ from alula.trees.errors import FileError
 from alula.trees.factory import make_tree
 from alula.trees.node import SyncAction
 from alula.trees.node_type import Category, node_type
-from alula.trees.palette import Palette
 from alula.trees.ports import Direction, Port, inout_port
 from alula.trees.reading import read_text
-from alula.trees.standard import standard_palette
+from alula.trees.registry import NodeRegistry
+from alula.trees.standard import standard_registry
 from alula.trees.status import SUCCESS
 
 ROOT = '<root BTCPP_format="4"><BehaviorTree ID="m">{}</BehaviorTree></root>'
@@ -53,9 +53,9 @@ class Counts(SyncAction):
 
 
 def found(node, *types):
-    palette = standard_palette() | Palette(types)
-    palette.register(Counts)
-    return [(one.code, one.warning) for one in check(read_text(ROOT.format(node)), palette)]
+    registry = standard_registry() | NodeRegistry(types)
+    registry.register(Counts)
+    return [(one.code, one.warning) for one in check(read_text(ROOT.format(node)), registry)]
 
 
 def test_an_empty_output_and_an_empty_script_are_no_findings():
@@ -86,7 +86,7 @@ def test_of_a_port_that_only_a_model_tells_of_nobody_knows_whether_it_is_read_fi
 def test_a_copy_of_an_entry_that_was_written_as_text_is_made():
     """BehaviorTree.CPP 4.8 fails in the first tick, and raises in the next (docs/concepts/trees.md)."""
     copy = '<Sequence><SetBlackboard value="7" output_key="a"/><SetBlackboard value="{a}" output_key="b"/></Sequence>'
-    tree = make_tree(read_text(ROOT.format(copy)), standard_palette(), lambda: 0)
+    tree = make_tree(read_text(ROOT.format(copy)), standard_registry(), lambda: 0)
     assert [tree.tick() for _ in range(2)] == [SUCCESS, SUCCESS]
     assert tree.subtrees[0].blackboard.get("b") == "7"
 
@@ -94,7 +94,7 @@ def test_a_copy_of_an_entry_that_was_written_as_text_is_made():
 def test_an_output_that_is_a_plain_text_is_refused():
     """BehaviorTree.CPP writes nothing then: an entry without its braces is a slip (docs/concepts/trees.md)."""
     with pytest.raises(FileError, match="names an entry"):
-        make_tree(read_text(ROOT.format('<LoopInt queue="1" value="x"><AlwaysSuccess/></LoopInt>')), standard_palette(), lambda: 0)
+        make_tree(read_text(ROOT.format('<LoopInt queue="1" value="x"><AlwaysSuccess/></LoopInt>')), standard_registry(), lambda: 0)
 
 
 UNSET = '<Sequence><Script code="a := 1"/>{}<Script code="b := a"/></Sequence>'
@@ -114,7 +114,7 @@ TAKEN = '<UnsetBlackboard key="a"/>'
     ],
 )
 def test_an_entry_that_was_taken_away_is_not_read(between, wrong):
-    problems = check(read_text(ROOT.format(UNSET.format(between))), standard_palette())
+    problems = check(read_text(ROOT.format(UNSET.format(between))), standard_registry())
     told = [one.message for one in problems if one.code != "ALU624"]  # `b` is never read
     assert ["UnsetBlackboard in line 1 has taken it away" in one for one in told] == [True] * wrong
 
@@ -130,13 +130,13 @@ INNER = """
 @pytest.mark.parametrize(("use", "default"), [("", ' default="3"'), (' height="3"', ""), (' height="3" _autoremap="true"', "")])
 def test_what_a_subtree_is_given_as_plain_text_is_written(use, default):
     text = INNER.format(use, default)
-    assert [one.code for one in check(read_text(text), standard_palette())] == []
-    assert make_tree(read_text(text), standard_palette(), int).tick() is SUCCESS
+    assert [one.code for one in check(read_text(text), standard_registry())] == []
+    assert make_tree(read_text(text), standard_registry(), int).tick() is SUCCESS
     oracle = pytest.importorskip("oracle")
     assert oracle.Theirs().play(text, {}, 1, []).ticks == oracle.ours(text, {}, 1, []).ticks
 
 
 def test_a_condition_that_says_what_is_written_is_read_and_what_is_written_is_not():
     either = "<Sequence><Script code=\"a := 1; b := ''\"/><Script code=\"a == 1 ? b := 'x' : b := ''\"/></Sequence>"
-    (told,) = check(read_text(ROOT.format(either).replace("<root", '<root main_tree_to_execute="m"')), standard_palette())
+    (told,) = check(read_text(ROOT.format(either).replace("<root", '<root main_tree_to_execute="m"')), standard_registry())
     assert (told.code, told.message) == ("ALU624", "`b` is written, and nothing reads it")

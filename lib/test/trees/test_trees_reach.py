@@ -15,7 +15,7 @@ from alula.trees.node import Decorator, Shared
 from alula.trees.nodes import leaves, sequences
 from alula.trees.reach import Reach
 from alula.trees.reading import read_text
-from alula.trees.standard import standard_palette
+from alula.trees.standard import standard_registry
 from alula.trees.status import ANSWERS, RUNNING, SKIPPED, SUCCESS
 
 COUNT = 400
@@ -37,10 +37,10 @@ class Told(Reach):
         return super().own_ends(config) if given is None else frozenset(ANSWERS[answer] for answer in given) - {RUNNING}
 
 
-def unreachable(text, palette, reach):
+def unreachable(text, registry, reach):
     """Return a file, and its elements that are never ticked wherever they stand, with all below them."""
     files = read_text(text)
-    root = configure(files, palette, files.main, Shared(int))
+    root = configure(files, registry, files.main, Shared(int))
     never = {one for child, _ in unreached(root, reach) for one in child.walk()}
     reached = {id(one.element) for one in root.walk() if one not in never}
     return files, {id(one.element) for one in root.walk()} - reached
@@ -70,9 +70,9 @@ def test_no_child_that_the_field_reaches_is_called_unreachable():
     assert found["never"] > COUNT / 4  # and something is called unreachable
 
 
-def codes(node, palette=None):
+def codes(node, registry=None):
     """Return what is found, but for entries that nothing reads, which these trees write to have conditions."""
-    found = check(read_text(ROOT.format(node)), palette or standard_palette())
+    found = check(read_text(ROOT.format(node)), registry or standard_registry())
     return [one.code for one in found if one.code != "ALU624"]
 
 
@@ -129,17 +129,17 @@ def test_a_class_that_answers_otherwise_than_the_one_that_it_derives_from_may_do
         """Does anything."""
 
     assert [one.is_described() for one in (Mine, Slow, Named, Told, Own)] == [False, False, True, True, True]
-    palette = standard_palette()
+    registry = standard_registry()
     for node in (Mine, Slow, Named, Own):
-        palette.register(node)
-    assert codes("<Sequence><Mine><AlwaysFailure/><AlwaysSuccess/></Mine><AlwaysSuccess/></Sequence>", palette) == []
-    assert codes("<Fallback><Slow msec='1'/><AlwaysSuccess/></Fallback>", palette) == []
-    assert codes("<Named><AlwaysSuccess/><AlwaysSuccess/></Named>", palette) == ["ALU610"]
-    assert codes("<Fallback><Own><AlwaysSuccess/></Own><AlwaysSuccess/></Fallback>", palette) == []
+        registry.register(node)
+    assert codes("<Sequence><Mine><AlwaysFailure/><AlwaysSuccess/></Mine><AlwaysSuccess/></Sequence>", registry) == []
+    assert codes("<Fallback><Slow msec='1'/><AlwaysSuccess/></Fallback>", registry) == []
+    assert codes("<Named><AlwaysSuccess/><AlwaysSuccess/></Named>", registry) == ["ALU610"]
+    assert codes("<Fallback><Own><AlwaysSuccess/></Own><AlwaysSuccess/></Fallback>", registry) == []
 
 
 def test_ends_that_a_parallel_may_have():
-    parallel = standard_palette().get("Parallel").described
+    parallel = standard_registry().get("Parallel").described
     given = {"success_count": "-1", "failure_count": "1"}.get
     assert parallel.may_end(given, [SUCCEEDS, SUCCEEDS | SKIPS]) == SUCCEEDS
     assert parallel.may_end(given, [SUCCEEDS, FAILS]) == FAILS
@@ -179,6 +179,6 @@ def test_conditions_that_exclude_each_other_let_two_children_run(one, other):
 
 @pytest.mark.parametrize(("one", "other"), TOGETHER)
 def test_two_children_that_may_run_are_a_warning(one, other):
-    problems = check(read_text(TWO.format(one, other).join(ROOT.split("{}"))), standard_palette())
+    problems = check(read_text(TWO.format(one, other).join(ROOT.split("{}"))), standard_registry())
     (found,) = (one for one in problems if one.code != "ALU624")
     assert (found.code, found.warning) == ("ALU611", True)

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import pytest
-from trees_clock import Played, frame, palette
+from trees_clock import Played, frame, registry
 
 from alula.trees.errors import FileError, Problem
 from alula.trees.factory import make_tree
@@ -54,7 +54,7 @@ def test_an_entry_has_one_type():
 def test_all_that_is_wrong_is_reported_without_a_tree():
     problems: list[Problem] = []
     body = "<Sequence><Sequenc/><SubTree ID='b'><Foo/></SubTree><Sleep mse='1'/></Sequence>"
-    verify(read_text(f"<root><BehaviorTree ID='Sequence'>{body}</BehaviorTree></root>"), palette(), problems.append)
+    verify(read_text(f"<root><BehaviorTree ID='Sequence'>{body}</BehaviorTree></root>"), registry(), problems.append)
     assert [problem.message for problem in problems] == [
         "there is no tree 'b'",
         "the tree 'Sequence' has the name of a node",
@@ -68,7 +68,7 @@ def test_all_that_is_wrong_is_reported_without_a_tree():
 def test_trees_that_contain_one_another_are_found():
     trees = "".join(f"<BehaviorTree ID='{one}'><SubTree ID='{other}'/></BehaviorTree>" for one, other in ("ab", "bc", "ca"))
     with pytest.raises(FileError, match="a tree contains itself: 'a' in 'c' in 'b' in 'a'"):
-        make_tree(read_text(f"<root main_tree_to_execute='a'>{trees}</root>"), palette(), lambda: 0)
+        make_tree(read_text(f"<root main_tree_to_execute='a'>{trees}</root>"), registry(), lambda: 0)
 
 
 def test_a_tree_that_grows_beyond_all_bounds_is_refused():
@@ -78,7 +78,7 @@ def test_a_tree_that_grows_beyond_all_bounds_is_refused():
     )
     text = f"<root main_tree_to_execute='t0'>{trees}<BehaviorTree ID='t16'><AlwaysSuccess/></BehaviorTree></root>"
     with pytest.raises(FileError, match="the tree 't11' has with its subtrees 222221 nodes, more than 65535"):
-        make_tree(read_text(text), palette(), lambda: 0)
+        make_tree(read_text(text), registry(), lambda: 0)
 
 
 def test_the_deepest_tree_is_ticked_and_halted_and_a_deeper_one_is_refused():
@@ -86,12 +86,12 @@ def test_the_deepest_tree_is_ticked_and_halted_and_a_deeper_one_is_refused():
         trees = "".join(f"<BehaviorTree ID='t{n}'><SubTree ID='t{n + 1}'/></BehaviorTree>" for n in range(levels - 1))
         return f"<root main_tree_to_execute='t0'>{trees}<BehaviorTree ID='t{levels - 1}'><Sleep msec='9'/></BehaviorTree></root>"
 
-    tree = make_tree(read_text(chain(256)), palette(), lambda: 0)
+    tree = make_tree(read_text(chain(256)), registry(), lambda: 0)
     assert tree.tick().name == "RUNNING"
     tree.halt()
     assert {node.status.name for node in tree.nodes} == {"INVALID"}
     with pytest.raises(FileError, match="the tree 't0' is with its subtrees 257 levels deep, more than 256"):
-        make_tree(read_text(chain(257)), palette(), lambda: 0)
+        make_tree(read_text(chain(257)), registry(), lambda: 0)
 
 
 def test_a_subtree_has_what_its_model_gives_it():

@@ -6,13 +6,13 @@ from oracle_leaves import Act, Ask, Story, tell
 
 from alula.trees.factory import make_tree
 from alula.trees.reading import read_text
-from alula.trees.standard import standard_palette
+from alula.trees.standard import standard_registry
 from alula.trees.status import NAMES
 
 
-def palette():
-    """Return the standard palette with leaves whose answers are given."""
-    made = standard_palette()
+def registry():
+    """Return the standard registry with leaves whose answers are given."""
+    made = standard_registry()
     made.register(Act)
     made.register(Ask)
     return made
@@ -29,7 +29,7 @@ class Played:
     def __init__(self, body: str, answers: dict[str, list[str]] | None = None, *, more: str = "", nodes=None, **kwargs) -> None:
         self.now_ns = 0
         self.story = Story(answers or {})
-        self.tree = make_tree(read_text(frame(body, more)), nodes or palette(), lambda: self.now_ns, **kwargs)
+        self.tree = make_tree(read_text(frame(body, more)), nodes or registry(), lambda: self.now_ns, **kwargs)
 
     def tick(self, at_ms: int | None = None) -> str:
         if at_ms is not None:

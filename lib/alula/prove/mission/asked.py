@@ -16,8 +16,8 @@ from alula.model.model import Skillset
 from alula.prove.mission.conditions import Faults
 from alula.trees.access import takes_script_from_entry
 from alula.trees.attributes import type_name
-from alula.trees.palette import Palette
 from alula.trees.reading import TreeFiles
+from alula.trees.registry import NodeRegistry
 
 WORD = re.compile(r"\w+")
 ANYTHING = "*"
@@ -26,10 +26,10 @@ ANYTHING = "*"
 
 def with_asked_resources(file: MissionFile, faults: Faults) -> tuple[Skillset, ...]:
     """Return the models of a mission without the resources that nothing names; a state that the trees name keeps a resource that has it."""
-    files, models, palette = file.files, file.skillsets, file.palette
-    if any(takes_script_from_entry(one, palette.get(type_name(one))) for tree in files.trees.values() for one in tree.iterate()):
+    files, models, registry = file.files, file.skillsets, file.registry
+    if any(takes_script_from_entry(one, registry.get(type_name(one))) for tree in files.trees.values() for one in tree.iterate()):
         return models  # the script may come from outside, and name any of them
-    words = {word for text in _texts(files, palette) for word in WORD.findall(text)}
+    words = {word for text in _texts(files, registry) for word in WORD.findall(text)}
     shown = [state for name, states in faults.items() if name in words for state in states]
     if any(ANYTHING in state for state in shown):
         return models
@@ -50,11 +50,11 @@ def _steps_of(model: Skillset) -> Skillset:
     return replace(model, resources=(), skills=tuple(replace(one, provides=(), needs=(), achieves=TRUE) for one in model.skills))
 
 
-def _texts(files: TreeFiles, palette: Palette) -> Iterator[str]:
+def _texts(files: TreeFiles, registry: NodeRegistry) -> Iterator[str]:
     """Yield all texts in which a mission can name a resource."""
     for tree in files.trees.values():
         for element in tree.iterate():
             yield type_name(element)
             yield from (one.value for one in element.attributes.values())
-    for kind in palette:
+    for kind in registry:
         yield from (port.default for port in kind.ports.values() if port.default)

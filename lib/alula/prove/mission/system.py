@@ -114,7 +114,7 @@ class System:
         unread = [*own.unread, *(f"{one.name}.{skill.name}" for one in skillsets for skill in one.skills)]
         roots = [tree.root.config for tree in trees]
         if READY in files.trees:
-            roots.append(configure(files, file.palette, READY, Shared(robot.clock_ns), blackboard=filed.tree.blackboard))
+            roots.append(configure(files, file.registry, READY, Shared(robot.clock_ns), blackboard=filed.tree.blackboard))
         read = what_is_read(roots, unread, plan.parameters, oracle, own.free, counted)
         body = Body(robot, director, board, trees, {one.name: one for one in skillsets}, read, few)
         ticker = Ticker(body, oracle)

@@ -11,7 +11,7 @@ from xml.sax.saxutils import escape
 
 from alula.trees.node import Node
 from alula.trees.node_type import Category, NodeType
-from alula.trees.standard import standard_palette
+from alula.trees.standard import standard_registry
 from alula.trees.tree import Subtree, Tree
 from alula.trees.view import conditions_of
 
@@ -26,7 +26,7 @@ def tree_xml(tree: Tree) -> str:
     for subtree in tree.subtrees:
         body = SubElement(root, "BehaviorTree", {"ID": subtree.tree_id, "_fullpath": subtree.path})
         _add_node(body, subtree.nodes[0], subtree)
-    types = {one.name: one for one in standard_palette()} | {node.config.type.name: node.config.type for node in tree.nodes}
+    types = {one.name: one for one in standard_registry()} | {node.config.type.name: node.config.type for node in tree.nodes}
     _add_model(root, types.values(), documented=False)
     return _text(root)
 

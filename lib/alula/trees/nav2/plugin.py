@@ -1,4 +1,4 @@
-"""The palette of Nav2's own nodes."""
+"""The registry of Nav2's own nodes."""
 
 from __future__ import annotations
 
@@ -11,7 +11,7 @@ from alula.trees.nav2 import controls, decorators
 from alula.trees.nav2.declared import declared
 from alula.trees.node import Node
 from alula.trees.node_type import CHILDREN, NodeType
-from alula.trees.palette import Palette
+from alula.trees.registry import NodeRegistry
 
 TICKED: tuple[type[Node], ...] = (
     controls.PipelineSequence,
@@ -34,22 +34,22 @@ TOLD: tuple[type[Node], ...] = (
 """Those that ask a robot or a program, with what their classes tell of them; nothing here ticks them."""
 
 
-def palette(release: str = "") -> Palette:
+def registry(release: str = "") -> NodeRegistry:
     """Return Nav2's nodes: of a release, as it declares them; else of all, with classes for those that can be ticked here."""
     types = dict(declared(release))
     if not release:
-        ticked = Palette()
+        ticked = NodeRegistry()
         types.update({one.name: one for one in map(ticked.register, TICKED)})
         types.update({node.__name__: replace(types[node.__name__], tells=node, children=_children(node)) for node in TOLD})
-    return Palette(types.values())
+    return NodeRegistry(types.values())
 
 
-def palette_for(trees: Iterable[Element]) -> Palette:
+def registry_for(trees: Iterable[Element]) -> NodeRegistry:
     """Return those of Nav2's nodes that trees may mean.
 
     A leaf is another node of that name where a use gives it ports and none of them is Nav2's.
     """
-    known = palette()
+    known = registry()
     leaves = {one.name: one for one in known if one.children == (0, 0)}
     others: set[str] = set()
     for tree in trees:
@@ -57,7 +57,7 @@ def palette_for(trees: Iterable[Element]) -> Palette:
             leaf = leaves.get(type_name(element))
             if leaf is not None and _is_another(element, leaf):
                 others.add(leaf.name)
-    return Palette(one for one in known if one.name not in others)
+    return NodeRegistry(one for one in known if one.name not in others)
 
 
 def told_of(declared: NodeType, known: NodeType) -> NodeType:

@@ -39,7 +39,7 @@ from alula.trees.factory import make_tree
 from alula.trees.node import NodeConfig
 from alula.trees.nodes.decorators import Inverter
 from alula.trees.reading import read_text
-from alula.trees.standard import standard_palette
+from alula.trees.standard import standard_registry
 from alula.trees.ticking import ANY_TICKING
 from alula.trees.view import view_of
 from finding_pages.mission_checks import whole
@@ -113,12 +113,12 @@ def memories(folder: Path, tag: str, *nodes: type[Node]) -> int:
     return len(system.ticker.memories)
 
 
-def test_the_palette_and_the_drawing_know_it() -> None:
+def test_the_registry_and_the_drawing_know_it() -> None:
     text = '<root BTCPP_format="4"><BehaviorTree ID="m"><robot.Either><AlwaysFailure/><AlwaysSuccess/></robot.Either></BehaviorTree></root>'
     for node, figure in ((Either, "selector"), (Silent, "control"), (Restless, "control")):
-        palette = standard_palette()
-        assert palette.register(node).described is (None if node is Restless else node)
-        assert view_of(make_tree(read_text(text), palette, int).root).kind == figure
+        registry = standard_registry()
+        assert registry.register(node).described is (None if node is Restless else node)
+        assert view_of(make_tree(read_text(text), registry, int).root).kind == figure
 
 
 def test_check_knows_which_children_it_does_not_tick_and_what_it_does_about_a_failure() -> None:
@@ -190,7 +190,7 @@ def test_what_a_script_of_a_port_reads_is_known() -> None:
 
 def test_a_script_of_a_port_that_does_not_say_so_is_refused() -> None:
     text = '<root BTCPP_format="4"><BehaviorTree ID="m"><robot.Asked that="1"/></BehaviorTree></root>'
-    palette = standard_palette()
-    palette.register(Undeclared)
+    registry = standard_registry()
+    registry.register(Undeclared)
     with pytest.raises(TickError, match=r"the port 'that' holds a script, and does not say so: declare it with script_port\('that'\)"):
-        make_tree(read_text(text), palette, int)
+        make_tree(read_text(text), registry, int)

@@ -7,7 +7,7 @@ from collections.abc import Iterable, Iterator
 from alula.trees.node_type import NodeClass, NodeType
 
 
-class Palette:
+class NodeRegistry:
     """Types of node by their names."""
 
     def __init__(self, types: Iterable[NodeType] = ()) -> None:
@@ -40,6 +40,6 @@ class Palette:
     def __iter__(self) -> Iterator[NodeType]:
         return iter(self._types.values())
 
-    def __or__(self, other: Palette) -> Palette:
+    def __or__(self, other: NodeRegistry) -> NodeRegistry:
         """Return one with the types of both."""
-        return Palette([*self, *other])
+        return NodeRegistry([*self, *other])
