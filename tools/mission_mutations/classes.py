@@ -38,7 +38,7 @@ class Altered:
     def within(self, part: MissionPart) -> MissionPart:
         """Return a robot's part with the altered class in the place of its own."""
         nodes = tuple(self._made() if (one.__module__, one.__name__) == (self.module, self.name) else one for one in part.nodes)
-        return MissionPart(nodes, part.memory, part.check_inputs)
+        return MissionPart(nodes, part.context, part.check_inputs)
 
     def _made(self) -> type[Node]:
         file = f"<{self.module}.{self.name} altered, {hash(self.source)}>"

@@ -11,7 +11,7 @@ from alula.check.skills import Skills
 from alula.check.whole import Whole
 from alula.common.suggestions import nearest, quoted
 from alula.language.messages import FieldError
-from alula.missions.world import FUNCTIONS
+from alula.missions.environment import FUNCTIONS
 from alula.model.ros_types import PRIMITIVES
 from alula.trees.access import scripts_of
 from alula.trees.document import Attribute

@@ -16,10 +16,10 @@ from alula.editor.tree_names import TreeFolder
 from alula.language.errors import Diagnostic, Severity
 from alula.language.messages import FieldError, messages_of
 from alula.language.models import ModelFile, check_files, models_in
+from alula.missions.environment import FUNCTIONS
 from alula.missions.part import NO_PART, MissionPart
 from alula.missions.registry import mission_registry
 from alula.missions.skill_types import SUCCESS_PORT
-from alula.missions.world import FUNCTIONS
 from alula.model.model import ResultKind, Skill, Skillset
 from alula.trees.attributes import POSTCONDITIONS, PRECONDITIONS
 from alula.trees.node_type import Category, NodeType

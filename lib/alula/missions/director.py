@@ -12,8 +12,8 @@ from py_trees.behaviours import Failure
 from py_trees.common import Status
 
 from alula.common.public import public
-from alula.missions.blackboard import Blackboard
 from alula.missions.conditions import Condition
+from alula.missions.context import MissionContext
 from alula.missions.pausing import Pause, PauseRefusedError
 from alula.missions.treeview import TreeWatch
 from alula.trees.view import NodeView
@@ -85,7 +85,7 @@ class Mission(Protocol):
 
 @dataclass(frozen=True)
 class DirectorMemory:
-    """The state of a director, without its trees; times as ``Blackboard.now_s``, seconds."""
+    """The state of a director, without its trees; times as ``MissionContext.now_s``, seconds."""
 
     phase: str
     end: End | None
@@ -114,11 +114,13 @@ class Director:
     ``serves``: there is no mission; to be told to end is how the run ends well.
     """
 
-    def __init__(self, mission: Mission, blackboard: Blackboard, *, start_timeout_s: float = START_TIMEOUT_S, serves: bool = False) -> None:
+    def __init__(
+        self, mission: Mission, context: MissionContext, *, start_timeout_s: float = START_TIMEOUT_S, serves: bool = False
+    ) -> None:
         self.end: End | None = None
         self.start_s: float | None = None
         self._mission = mission
-        self.blackboard = blackboard
+        self.context = context
         self._start_timeout_s = start_timeout_s
         self._serves = serves
         self._wait_until_s: float | None = None
@@ -159,7 +161,7 @@ class Director:
         if self._pause is None:
             self._phase()
         else:
-            self._held = self._pause.step(self.blackboard.now_s) or self._held
+            self._held = self._pause.step(self.context.now_s) or self._held
 
     def refusal(self, *, paused: bool) -> str:
         """Return why the mission can't be paused, or can't go on, now; empty when it can."""
@@ -183,7 +185,7 @@ class Director:
         if refusal:
             raise PauseRefusedError(refusal)
         if self._pause is None:
-            self._pause = Pause(self._mission.root, self.blackboard.now_s)
+            self._pause = Pause(self._mission.root, self.context.now_s)
         return self._pause.words()
 
     def resume(self) -> None:
@@ -266,7 +268,7 @@ class Director:
     # --- phases ------------------------------------------------------------------------------------------------------
 
     def _wait(self) -> None:
-        unmet, now_s = [one.unmet for one in self._mission.conditions() if one.unmet], self.blackboard.now_s
+        unmet, now_s = [one.unmet for one in self._mission.conditions() if one.unmet], self.context.now_s
         if self._wait_until_s is None and now_s > 0.0:  # zero: the mission clock was not heard yet
             self._wait_until_s = now_s + self._start_timeout_s
         if not unmet:
@@ -288,14 +290,14 @@ class Director:
 
     def _settle(self) -> None:
         """Wait until what was interrupted has ended; the registry bounds this."""
-        if not self.blackboard.pending.names():
+        if not self.context.pending.names():
             self.end = self._judge()
 
     def _judge(self) -> End:
         if self._stop is not None:
             return End(Outcome.SERVED if self._serves else Outcome.ABORTED, self._abort_reason)
         if self._mission.root.status is not Status.SUCCESS:
-            return End(Outcome.GIVEN_UP, self.blackboard.reason)
+            return End(Outcome.GIVEN_UP, self.context.reason)
         if self._mission.degraded:
-            return End(Outcome.DEGRADED, self.blackboard.what_went_wrong)
+            return End(Outcome.DEGRADED, self.context.what_went_wrong)
         return End(Outcome.ACCOMPLISHED)

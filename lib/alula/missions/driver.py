@@ -75,14 +75,14 @@ class MissionDriver:
         self._problems: list[str] = []
         clients = {name: client(name, self.wake) for name in plan.skillsets}
         try:
-            mission, self.blackboard = plan.make(clients, clock_ns, parameters)
+            mission, self.context = plan.make(clients, clock_ns, parameters)
         except InputError:
             raise
         except Exception as error:  # also a robot's own nodes are made here
             raise InputError(f"the mission can't be made: {type(error).__name__}: {error}") from error
         self.leaves = [(leaf, path_of(node)) for node in mission.root.iterate() if (leaf := skill_leaf(node)) is not None]
         self._watched = watched(mission, clock_ns, record, groot)
-        self.director = Director(mission, self.blackboard, start_timeout_s=start_timeout_s, serves=plan.serves)
+        self.director = Director(mission, self.context, start_timeout_s=start_timeout_s, serves=plan.serves)
 
     @property
     def end(self) -> End | None:

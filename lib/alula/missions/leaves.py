@@ -11,25 +11,25 @@ from typing import Generic, TypeVar
 from py_trees.behaviour import Behaviour
 from py_trees.common import Status
 
-from alula.missions.blackboard import Blackboard, Failure
+from alula.missions.context import Failure, MissionContext
 from alula.missions.skillset import Client
 from alula.model.execution_state import ExecutionState
 from alula.runtime.handle import SkillHandle
 
-Board = TypeVar("Board", bound=Blackboard)
-Inputs = Mapping[str, object] | Callable[[Board], Mapping[str, object]]
+Context = TypeVar("Context", bound=MissionContext)
+Inputs = Mapping[str, object] | Callable[[Context], Mapping[str, object]]
 
 
-def nothing_more(_blackboard: Blackboard) -> None:
+def nothing_more(_context: MissionContext) -> None:
     """Do nothing after a success."""
 
 
-class SkillLeaf(Behaviour, Generic[Board]):  # type: ignore[misc]  # py_trees is seen untyped
+class SkillLeaf(Behaviour, Generic[Context]):  # type: ignore[misc]  # py_trees is seen untyped
     """One skill: started when the leaf is first ticked, watched, interrupted when the tree leaves it.
 
     RUNNING until the execution has ended; SUCCESS when it TERMINATED with a result in ``success``; else FAILURE, with a
-    `Failure` on the blackboard and its sentence as ``feedback_message``. A skill with an empty ``success`` is meant to run
-    until it is interrupted, and fails when it ends by itself. ``inputs`` may be a function of the blackboard, called at the
+    `Failure` in the context and its sentence as ``feedback_message``. A skill with an empty ``success`` is meant to run
+    until it is interrupted, and fails when it ends by itself. ``inputs`` may be a function of the context, called at the
     start. While another execution of the skillset that this tree has interrupted has not ended, the start waits, RUNNING.
     """
 
@@ -38,11 +38,11 @@ class SkillLeaf(Behaviour, Generic[Board]):  # type: ignore[misc]  # py_trees is
         name: str,
         client: Client,
         skill: str,
-        inputs: Inputs[Board],
+        inputs: Inputs[Context],
         *,
-        blackboard: Board,
+        context: Context,
         success: Collection[str] = (),
-        on_success: Callable[[Board], None] = nothing_more,
+        on_success: Callable[[Context], None] = nothing_more,
         halt_waits: bool = False,
     ) -> None:
         super().__init__(name)
@@ -51,7 +51,7 @@ class SkillLeaf(Behaviour, Generic[Board]):  # type: ignore[misc]  # py_trees is
         self.handle: SkillHandle | None = None
         self._interrupted = self._noted = False
         self._inputs = inputs
-        self._blackboard = blackboard
+        self._context = context
         self.success = frozenset(success)
         self._on_success = on_success
         self.halt_waits = halt_waits
@@ -76,14 +76,14 @@ class SkillLeaf(Behaviour, Generic[Board]):  # type: ignore[misc]  # py_trees is
             return Status.RUNNING
         if self._succeeded(handle):
             self.feedback_message = handle.result
-            self._on_success(self._blackboard)
+            self._on_success(self._context)
             return Status.SUCCESS
         self._note(handle)
         return Status.FAILURE
 
     def _note(self, handle: SkillHandle) -> None:
         failure = Failure(self.name, self.skill_name, handle.state, handle.result, handle.message)
-        self._blackboard.failures.append(failure)
+        self._context.failures.append(failure)
         self._noted = True
         self.feedback_message = failure.sentence()
 
@@ -98,7 +98,7 @@ class SkillLeaf(Behaviour, Generic[Board]):  # type: ignore[misc]  # py_trees is
         if not handle.done:
             self._interrupted = True
             self.feedback_message = "interrupted"
-            self._blackboard.pending.interrupt(self.client.skillset, self.skill, handle, holds_all=self.halt_waits)
+            self._context.pending.interrupt(self.client.skillset, self.skill, handle, holds_all=self.halt_waits)
         elif not self._succeeded(handle) and not self._noted:
             self._note(handle)
 
@@ -114,21 +114,21 @@ class SkillLeaf(Behaviour, Generic[Board]):  # type: ignore[misc]  # py_trees is
         """Follow another execution, as it was at another moment of the mission."""
         self.handle, self._interrupted, self._noted = handle, interrupted, False
 
-    def with_inputs(self, inputs: Inputs[Board]) -> None:
+    def with_inputs(self, inputs: Inputs[Context]) -> None:
         """Start with other inputs from now on."""
         self._inputs = inputs
 
     def _start(self) -> bool:
-        waits_for = self._blackboard.pending.names(self.client.skillset)
+        waits_for = self._context.pending.names(self.client.skillset)
         if waits_for:
             self.feedback_message = f"waits for the end of {', '.join(waits_for)}"
             return False
-        inputs = self._inputs(self._blackboard) if callable(self._inputs) else self._inputs
+        inputs = self._inputs(self._context) if callable(self._inputs) else self._inputs
         self.feedback_message = ""
         self.handle = self.client.start(self.skill, **inputs)
         return True
 
 
-def skill_leaf(node: Behaviour) -> SkillLeaf[Blackboard] | None:
+def skill_leaf(node: Behaviour) -> SkillLeaf[MissionContext] | None:
     """Return what follows the skill of a leaf, which of a mission that is a file is a part of its node; None for another node."""
     return node if isinstance(node, SkillLeaf) else getattr(node, "leaf", None)

@@ -16,8 +16,9 @@ from pathlib import Path
 from py_trees.behaviour import Behaviour
 from py_trees.behaviours import Success
 
-from alula.missions.blackboard import Blackboard
 from alula.missions.conditions import Condition, answers
+from alula.missions.context import MissionContext
+from alula.missions.environment import MissionEnvironment, asked_data, states_of
 from alula.missions.nodes import Needs
 from alula.missions.part import MissionPart
 from alula.missions.pending import PendingInterrupts
@@ -25,9 +26,8 @@ from alula.missions.plan import InputError, Inputs, MissionPlan
 from alula.missions.registry import no_class, registry_of, without_class
 from alula.missions.skills import Crew, SkillNode
 from alula.missions.skillset import Client, Clock
-from alula.missions.world import World, asked_data, states_of
 from alula.model.model import Skillset
-from alula.trees.blackboard import Blackboard as TreeBoard
+from alula.trees.blackboard import Blackboard
 from alula.trees.configuration import configure
 from alula.trees.errors import Report, TreeError, refuse
 from alula.trees.factory import build_tree
@@ -98,7 +98,7 @@ class MissionFile:
         """The tops of its trees as they will stand, on one blackboard: the main one, `stop_here`, and `ready`; raises InputError."""
         self._verify()
         shared, found = Shared(int), list[NodeConfig]()
-        board = TreeBoard(shared.clock)
+        board = Blackboard(shared.clock)
         for name in (self.files.main, *(one for one in (STOP_HERE, READY) if one in self.files.trees)):
             after = sum(1 for root in found for _ in root.walk())
             found.append(configure(self.files, self.registry, name, shared, enums=self.source.enums, blackboard=board, after=after))
@@ -129,18 +129,18 @@ class MissionFile:
         own = self._inputs(inputs)
         self.part.check_inputs(own)
         told = [port for port in self.model.ports.values() if port.direction is not Direction.INPUT]
-        board: list[TreeBoard] = []
+        board: list[Blackboard] = []
 
-        def make(clients: Mapping[str, Client], clock_ns: Clock, values: Mapping[str, float]) -> tuple[MissionTrees, Blackboard]:
-            memory = self.part.memory(clock_ns=clock_ns, pending=PendingInterrupts(clock_ns))
-            maker = Maker(self, Crew(clients, memory), clock_ns)
+        def make(clients: Mapping[str, Client], clock_ns: Clock, values: Mapping[str, float]) -> tuple[MissionTrees, MissionContext]:
+            context = self.part.context(clock_ns=clock_ns, pending=PendingInterrupts(clock_ns))
+            maker = Maker(self, Crew(clients, context), clock_ns)
             for port in told:
                 maker.board.set(port.name, _number(port))
             for key, value in {**parameters, **values, **own}.items():
                 maker.board.set(key, value)
             board[:] = [maker.board]
-            memory.entries = lambda: _shown(maker.board, {*parameters, *own})
-            return MissionTrees(maker), memory
+            context.entries = lambda: _shown(maker.board, {*parameters, *own})
+            return MissionTrees(maker), context
 
         def facts() -> Mapping[str, object]:
             return {port.name: board[0].get(port.name) if board else _number(port) for port in told}
@@ -216,7 +216,7 @@ class Maker:
         skillsets = file.skillsets
         self.files = file.files
         self.crew = crew
-        self.board = TreeBoard(clock_ns)
+        self.board = Blackboard(clock_ns)
         self._clock_ns = clock_ns
         self._enums = {**file.source.enums, **states_of(skillsets)}
         self._resources = frozenset(f"{one.name}.{resource}" for one in skillsets for resource in one.resource_index)
@@ -228,12 +228,14 @@ class Maker:
 
     def tree(self, name: str, after: int = 0) -> Tree:
         """Make one; that of the file where no name is given. Its nodes have the uids behind ``after``."""
-        world = World(self.crew.clients, self.crew.memory, self._resources, self._data)
+        environment = MissionEnvironment(self.crew.clients, self.crew.context, self._resources, self._data)
         files, registry, board = self.files, self._registry, self.board
-        tree = build_tree(files, registry, self._clock_ns, main=name, enums=self._enums, surroundings=world, blackboard=board, after=after)
+        tree = build_tree(
+            files, registry, self._clock_ns, main=name, enums=self._enums, environment=environment, blackboard=board, after=after
+        )
         for node in tree.nodes:
             if isinstance(node, SkillNode):
-                world.leaves.setdefault(node.config.type.name, []).append(node)
+                environment.leaves.setdefault(node.config.type.name, []).append(node)
         return tree
 
 
@@ -246,5 +248,5 @@ def _number(port: Port) -> float:
         raise InputError(message) from None
 
 
-def _shown(board: TreeBoard, given: set[str]) -> Mapping[str, object]:
+def _shown(board: Blackboard, given: set[str]) -> Mapping[str, object]:
     return {name: value for name, value in board.values().items() if name not in given}

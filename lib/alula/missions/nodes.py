@@ -5,7 +5,7 @@ from __future__ import annotations
 import math
 from collections.abc import Sequence
 
-from alula.missions.blackboard import Blackboard
+from alula.missions.context import MissionContext
 from alula.trees.ends import ENDS, FAILS, SUCCEEDS, Ends, Given, whole_number
 from alula.trees.errors import TickError
 from alula.trees.node import Action, Condition, Count, Decorator, NodeConfig, Script, SyncAction
@@ -217,15 +217,15 @@ class NoteReason(SyncAction):
 
     ports = (input_port("text", STRING, "", "what went wrong; empty: what the skills reported"),)
     ends = SUCCEEDS
-    memory: Blackboard
+    context: MissionContext
 
     def update(self) -> Answer:
         """Keep it."""
         text = str(self.get("text"))
         if text:
-            self.memory.note(text)
+            self.context.note(text)
         else:
-            self.memory.note_reason()
+            self.context.note_reason()
         return SUCCESS
 
 
@@ -237,11 +237,11 @@ def seconds_ns(node: Action | Decorator, port: str) -> int:
     return int(value * SECOND_NS)
 
 
-def mission_nodes(memory: Blackboard) -> NodeRegistry:
+def mission_nodes(context: MissionContext) -> NodeRegistry:
     """Return them."""
     registry = NodeRegistry()
     for node in (WaitFor, Stays, Awaits, Until, RetryAfter, Needs):
         registry.register(node)
-    noting: type[NoteReason] = type("NoteReason", (NoteReason,), {"memory": memory, "__doc__": NoteReason.__doc__})
+    noting: type[NoteReason] = type("NoteReason", (NoteReason,), {"context": context, "__doc__": NoteReason.__doc__})
     registry.register(noting)
     return registry

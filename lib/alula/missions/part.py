@@ -6,7 +6,7 @@ from collections.abc import Callable
 from dataclasses import dataclass
 
 from alula.common.public import public
-from alula.missions.blackboard import Blackboard
+from alula.missions.context import MissionContext
 from alula.missions.plan import Inputs
 from alula.trees.node import Node
 
@@ -14,13 +14,13 @@ from alula.trees.node import Node
 @public("alula.parts")
 @dataclass(frozen=True)
 class MissionPart:
-    """What a robot adds to missions: nodes, by the names of `alula.trees.register`, and the memory of its missions.
+    """What a robot adds to missions: nodes, by the names of `alula.trees.register`, and the context of its missions.
 
     ``check_inputs`` raises InputError for inputs that the robot's missions can't use: before the run, not in the middle of it.
     """
 
     nodes: tuple[type[Node], ...] = ()
-    memory: type[Blackboard] = Blackboard
+    context: type[MissionContext] = MissionContext
     check_inputs: Callable[[Inputs], object] = dict
 
 

@@ -8,15 +8,15 @@ from typing import Any
 
 from alula.common.errors import AlulaError
 from alula.common.public import public
-from alula.missions.blackboard import Blackboard
+from alula.missions.context import MissionContext
 from alula.missions.director import Mission
 from alula.missions.skillset import Client, Clock
 
 Inputs = Mapping[str, Any]
 """What a mission is given, such as a route, by name; as JSON has it, because records keep it."""
 
-MakeMission = Callable[[Mapping[str, Client], Clock, Mapping[str, float]], tuple[Mission, Blackboard]]
-"""Makes the mission and its blackboard of the clients by skillset, the mission clock, and the parameters by name."""
+MakeMission = Callable[[Mapping[str, Client], Clock, Mapping[str, float]], tuple[Mission, MissionContext]]
+"""Makes the mission and its context of the clients by skillset, the mission clock, and the parameters by name."""
 
 
 def nothing_more() -> Mapping[str, object]:

@@ -161,12 +161,12 @@ class MissionRecord:
 
     @_kept
     def outcome_of_tick(self, director: Director) -> None:
-        """Write what a tick has changed in the tree and on the blackboard."""
+        """Write what a tick has changed in the tree and in the context."""
         view = director.view()
         if view != self._view:
             self._view = view
             self._write(TREE, view.as_dict())
-        values = {name: to_plain(value) for name, value in director.blackboard.values().items()}
+        values = {name: to_plain(value) for name, value in director.context.values().items()}
         changed = {name: value for name, value in values.items() if name not in self._blackboard or self._blackboard[name] != value}
         if changed:
             self._blackboard = values

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Iterable, Sequence
 
-from alula.missions.blackboard import Blackboard
+from alula.missions.context import MissionContext
 from alula.missions.nodes import mission_nodes
 from alula.missions.part import MissionPart
 from alula.missions.pending import PendingInterrupts
@@ -23,7 +23,7 @@ from alula.trees.standard import standard_registry
 
 def mission_registry(skillsets: Sequence[Skillset], part: MissionPart, crew: Crew | None = None) -> NodeRegistry:
     """Return BehaviorTree.CPP's nodes, Alula's, the robot's own, its skills and resources; without a crew the last can't be ticked."""
-    return _with_robot(standard_registry() | mission_nodes(_memory(crew)), skillsets, part, crew)
+    return _with_robot(standard_registry() | mission_nodes(_context(crew)), skillsets, part, crew)
 
 
 def registry_of(
@@ -39,13 +39,13 @@ def registry_of(
     own = {name_in_files(node) for node in part.nodes}
     known = [one for one in nav2.registry_for(files.trees.values()) if one.name not in own and not _is_another(types.get(one.name), one)]
     types.update({one.name: nav2.told_of(given[one.name], one) if one.name in given and not one.is_tickable else one for one in known})
-    types.update({one.name: one for one in mission_nodes(_memory(crew)) if not _is_another(types.get(one.name), one)})
+    types.update({one.name: one for one in mission_nodes(_context(crew)) if not _is_another(types.get(one.name), one)})
     types.update({one.name: one for one in standard_registry()})
     return _with_robot(NodeRegistry(types.values()), skillsets, part, crew)
 
 
-def _memory(crew: Crew | None) -> Blackboard:
-    return Blackboard(clock_ns=int, pending=PendingInterrupts(int)) if crew is None else crew.memory
+def _context(crew: Crew | None) -> MissionContext:
+    return MissionContext(clock_ns=int, pending=PendingInterrupts(int)) if crew is None else crew.context
 
 
 def _with_robot(registry: NodeRegistry, skillsets: Sequence[Skillset], part: MissionPart, crew: Crew | None) -> NodeRegistry:
@@ -81,7 +81,7 @@ def no_class(files: TreeFiles, registry: NodeRegistry) -> Problem | None:
     if not found:
         return None
     first, *others = found
-    library = {one.name for one in (*nav2.registry(), *mission_nodes(_memory(None))) if one.is_tickable}
+    library = {one.name for one in (*nav2.registry(), *mission_nodes(_context(None))) if one.is_tickable}
     shadowed = [name for name in found if name in library]
     which = f"'{first}'" + (f" and {len(others)} more" if others else "")
     where = "by Nav2" if first not in files.models else "in the file"

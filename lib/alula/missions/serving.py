@@ -8,8 +8,8 @@ from py_trees.behaviour import Behaviour
 from py_trees.behaviours import Running, Success
 
 from alula.common.scenarios import Scenario
-from alula.missions.blackboard import Blackboard
 from alula.missions.conditions import Condition, answers
+from alula.missions.context import MissionContext
 from alula.missions.pending import PendingInterrupts
 from alula.missions.plan import MissionPlan
 from alula.missions.skillset import Client, Clock
@@ -37,7 +37,7 @@ class Serving:
 def serving_plan(scenario: Scenario) -> MissionPlan:
     """Return the plan of a scenario that has no mission."""
 
-    def make(clients: Mapping[str, Client], clock_ns: Clock, _values: Mapping[str, float]) -> tuple[Serving, Blackboard]:
-        return Serving(clients), Blackboard(clock_ns=clock_ns, pending=PendingInterrupts(clock_ns))
+    def make(clients: Mapping[str, Client], clock_ns: Clock, _values: Mapping[str, float]) -> tuple[Serving, MissionContext]:
+        return Serving(clients), MissionContext(clock_ns=clock_ns, pending=PendingInterrupts(clock_ns))
 
     return MissionPlan(scenario.name, scenario.skillsets, make, serves=True)

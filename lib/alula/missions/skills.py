@@ -6,7 +6,7 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 from functools import partial
 
-from alula.missions.blackboard import Blackboard
+from alula.missions.context import MissionContext
 from alula.missions.leaves import SkillLeaf
 from alula.missions.skill_types import HALT_PORT, OUTCOME_PORT, SEPARATOR, STATE_PORT, SUCCESS_PORT, resource_type, skill_type
 from alula.missions.skillset import Client
@@ -23,7 +23,7 @@ class Crew:
     """What the skills of a mission are called by."""
 
     clients: Mapping[str, Client]
-    memory: Blackboard
+    context: MissionContext
 
 
 class SkillNode(Action):
@@ -50,12 +50,12 @@ class SkillNode(Action):
         self.skillset = skillset
         client = self.crew.clients[self.skillset]
         success = str(self.get(SUCCESS_PORT)).split(SEPARATOR)
-        self.leaf: SkillLeaf[Blackboard] = SkillLeaf(
+        self.leaf: SkillLeaf[MissionContext] = SkillLeaf(
             self.name,
             client,
             self.model.name,
             self._inputs,
-            blackboard=self.crew.memory,
+            context=self.crew.context,
             success=frozenset(success) - {""},
             halt_waits=bool(self.get(HALT_PORT)),
         )
@@ -99,7 +99,7 @@ class SkillNode(Action):
         """Its progress while it is RUNNING, else 0."""
         return self.leaf.handle.progress if self.running and self.leaf.handle is not None else 0.0
 
-    def _inputs(self, _: Blackboard) -> Mapping[str, object]:
+    def _inputs(self, _: MissionContext) -> Mapping[str, object]:
         return {one.name: self.get(one.name) for one in self.model.inputs if self.given(one.name)}
 
 

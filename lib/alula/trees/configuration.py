@@ -25,7 +25,7 @@ from alula.trees.values import literal
 SUBTREE = TickableType("SubTree", Category.SUBTREE, {}, "Another tree of the files.", (1, 1), make=SubTree)
 
 
-class Surroundings(Protocol):
+class ScriptEnvironment(Protocol):
     """What scripts may name besides the blackboard: ``navigation.flight_status``, ``running(perception.zed_depthmap)``."""
 
     def value(self, name: str) -> object:
@@ -37,7 +37,7 @@ class Surroundings(Protocol):
         ...
 
 
-class Nothing:
+class EmptyEnvironment:
     """No names beyond the blackboard's."""
 
     def value(self, name: str) -> object:  # noqa: ARG002
@@ -55,14 +55,14 @@ class Scope:
 
     blackboard: Blackboard
     enums: Mapping[str, float]
-    surroundings: Surroundings
+    environment: ScriptEnvironment
 
     def get(self, name: str) -> object:
         """Return a value, None for an entry that was not written yet; raises KeyError where there is nothing of that name."""
         entry = self.blackboard.entry(name)
         if entry is not None:
             return entry.value
-        value = self.surroundings.value(name)
+        value = self.environment.value(name)
         if value is None:
             raise KeyError(name)
         return value
@@ -76,7 +76,7 @@ class Scope:
 
     def call(self, name: str, args: Sequence[object]) -> object:
         """Ask what surrounds the tree."""
-        return self.surroundings.call(name, args)
+        return self.environment.call(name, args)
 
 
 @dataclass
@@ -112,7 +112,7 @@ def configure(
     shared: Shared,
     *,
     enums: Mapping[str, float] | None = None,
-    surroundings: Surroundings | None = None,
+    environment: ScriptEnvironment | None = None,
     blackboard: Blackboard | None = None,
     after: int = 0,
 ) -> NodeConfig:
@@ -120,7 +120,7 @@ def configure(
 
     Arguments are those of `factory.build_tree`. On the blackboards stands nothing yet but what uses of subtrees give these as plain text.
     """
-    configurer = _Configurer(files, registry, shared, enums or {}, surroundings or Nothing(), after)
+    configurer = _Configurer(files, registry, shared, enums or {}, environment or EmptyEnvironment(), after)
     return configurer.node(files.trees[main].children[0], blackboard or Blackboard(shared.clock), "", None)
 
 
@@ -135,13 +135,19 @@ def _joined(path: str, name: str) -> str:
 
 class _Configurer:
     def __init__(
-        self, files: TreeFiles, registry: NodeRegistry, shared: Shared, enums: Mapping[str, float], surroundings: Surroundings, after: int
+        self,
+        files: TreeFiles,
+        registry: NodeRegistry,
+        shared: Shared,
+        enums: Mapping[str, float],
+        environment: ScriptEnvironment,
+        after: int,
     ) -> None:
         self._files = files
         self._registry = registry
         self._shared = shared
         self._enums = enums
-        self._surroundings = surroundings
+        self._environment = environment
         self._count = after
 
     def node(self, element: Element, board: Blackboard, path: str, parent: NodeConfig | None) -> NodeConfig:
@@ -156,7 +162,7 @@ class _Configurer:
             if port.name not in ports and port.default is not None:
                 ports[port.name] = port.default
         whole = _joined(path, name if name != tag else f"{name}::{uid}")
-        compiled = _compiler(element, Scope(board, self._enums, self._surroundings))
+        compiled = _compiler(element, Scope(board, self._enums, self._environment))
         config = NodeConfig(known, name, uid, whole, element, ports, board, self._shared, compiled, self._enums, parent)
         inner: Sequence[Element] = element.children
         if is_subtree:

@@ -6,7 +6,7 @@ from collections.abc import Mapping, Sequence
 
 from alula.trees.attributes import POSTCONDITIONS, PRECONDITIONS, type_name
 from alula.trees.blackboard import Blackboard, Clock
-from alula.trees.configuration import Surroundings, configure, path_inside
+from alula.trees.configuration import ScriptEnvironment, configure, path_inside
 from alula.trees.errors import FileError, Problem
 from alula.trees.node import After, Before, Node, NodeConfig, Script, Shared, TickableType, pointer
 from alula.trees.reading import TreeFiles
@@ -23,7 +23,7 @@ def make_tree(
     *,
     main: str = "",
     enums: Mapping[str, float] | None = None,
-    surroundings: Surroundings | None = None,
+    environment: ScriptEnvironment | None = None,
     blackboard: Blackboard | None = None,
 ) -> Tree:
     """Build a tree.
@@ -34,14 +34,14 @@ def make_tree(
         clock: mission clock, nanoseconds.
         main: the tree to build, that of the files unless it is given.
         enums: names of numbers for scripts and switches.
-        surroundings: what scripts may name besides.
+        environment: what scripts may name besides.
         blackboard: of the main tree, with what is written on it beforehand.
 
     Raises:
         FileError: something is wrong in a file.
     """
     verify(files, registry)
-    return build_tree(files, registry, clock, main=main, enums=enums, surroundings=surroundings, blackboard=blackboard)
+    return build_tree(files, registry, clock, main=main, enums=enums, environment=environment, blackboard=blackboard)
 
 
 def build_tree(
@@ -51,7 +51,7 @@ def build_tree(
     *,
     main: str = "",
     enums: Mapping[str, float] | None = None,
-    surroundings: Surroundings | None = None,
+    environment: ScriptEnvironment | None = None,
     blackboard: Blackboard | None = None,
     after: int = 0,
 ) -> Tree:
@@ -61,7 +61,7 @@ def build_tree(
     """
     shared = Shared(clock)
     board = blackboard or Blackboard(clock)
-    config = configure(files, registry, main or files.main, shared, enums=enums, surroundings=surroundings, blackboard=board, after=after)
+    config = configure(files, registry, main or files.main, shared, enums=enums, environment=environment, blackboard=board, after=after)
     subtrees = [Subtree(main or files.main, "", board)]
     return Tree(_made(config, subtrees[0], subtrees), subtrees, files, shared)
 

@@ -15,8 +15,8 @@ from py_trees.behaviour import Behaviour
 from py_trees.common import Status
 
 from alula.common.record import EVENTS, MISSION, OPERATOR, TICKS, TREE, read_record
-from alula.missions.blackboard import Blackboard
 from alula.missions.conditions import Condition
+from alula.missions.context import MissionContext
 from alula.missions.director import End, Outcome
 from alula.missions.driver import MissionDriver
 from alula.missions.pausing import PauseRefusedError
@@ -106,9 +106,9 @@ class Host:
         self.out = out
         self.entries: dict[str, object] = {}
 
-        def make(_clients: Mapping, _clock: object, _values: Mapping) -> tuple[Tree, Blackboard]:
+        def make(_clients: Mapping, _clock: object, _values: Mapping) -> tuple[Tree, MissionContext]:
             pending = PendingInterrupts(self.clock.ns)
-            return self.tree, Blackboard(clock_ns=self.clock.ns, pending=pending, entries=lambda: self.entries)
+            return self.tree, MissionContext(clock_ns=self.clock.ns, pending=pending, entries=lambda: self.entries)
 
         plan = MissionPlan("patrol", (), make, facts=self.tree.facts)
         record = MissionRecord(out, plan, self.clock.ns, {}, joins=joins) if recorded else None
@@ -345,7 +345,7 @@ def test_a_mission_ends_and_is_told_whatever_raises_when(spoils: list[tuple[int,
 
 
 def test_a_mission_that_can_not_be_made_is_refused_in_a_line(tmp_path: Path) -> None:
-    def make(*_: object) -> tuple[Tree, Blackboard]:
+    def make(*_: object) -> tuple[Tree, MissionContext]:
         raise ZeroDivisionError("no such node")
 
     with pytest.raises(InputError, match="the mission can't be made: ZeroDivisionError: no such node"):

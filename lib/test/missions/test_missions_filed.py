@@ -7,12 +7,12 @@ import pytest
 pytest.importorskip("py_trees")
 
 from alula.language.models import ModelFile, check_texts
-from alula.missions.blackboard import Blackboard
+from alula.missions.context import MissionContext
+from alula.missions.environment import MissionEnvironment
 from alula.missions.part import NO_PART
 from alula.missions.pending import PendingInterrupts
 from alula.missions.registry import mission_registry
 from alula.missions.skills import Crew
-from alula.missions.world import World
 from alula.model.execution_state import ExecutionState
 from alula.runtime.handle import SkillHandle
 from alula.trees.factory import make_tree
@@ -50,7 +50,7 @@ class Arm:
 def tree_of(body, arm):
     (file,) = check_texts([ModelFile("arm.rl", MODEL)])
     assert [one for one in file.findings if one.severity.value == "error"] == []
-    crew = Crew({"arm": arm}, Blackboard(clock_ns=int, pending=PendingInterrupts(int)))
+    crew = Crew({"arm": arm}, MissionContext(clock_ns=int, pending=PendingInterrupts(int)))
     files = read_text(f'<root BTCPP_format="4"><BehaviorTree ID="m">{body}</BehaviorTree></root>', "m.xml")
     return make_tree(files, mission_registry(file.skillsets, NO_PART, crew), int)
 
@@ -103,7 +103,9 @@ def test_numbers_have_the_limits_of_their_types():
 
 
 def test_what_is_no_resource_has_no_value_in_a_script():
-    world = World({"arm": Arm()}, Blackboard(clock_ns=int, pending=PendingInterrupts(int)), frozenset({"arm.hand"}), frozenset())
+    world = MissionEnvironment(
+        {"arm": Arm()}, MissionContext(clock_ns=int, pending=PendingInterrupts(int)), frozenset({"arm.hand"}), frozenset()
+    )
     assert [world.value(name) for name in ("arm.hand", "arm.level", "arm.level.value", "leg.hand")] == ["OPEN", None, None, None]
 
 
@@ -113,7 +115,7 @@ def test_after_a_halt_a_start_in_its_skillset_waits_and_in_another_one_where_the
     models = [one for file in check_texts(files) for one in file.skillsets]
     arm, leg = Arm(), Arm()
     leg.skillset = "leg"
-    crew = Crew({"arm": arm, "leg": leg}, Blackboard(clock_ns=int, pending=PendingInterrupts(int)))
+    crew = Crew({"arm": arm, "leg": leg}, MissionContext(clock_ns=int, pending=PendingInterrupts(int)))
     halted = f'<arm.grip tries="1" {"halt_waits=" + chr(34) + "true" + chr(34) if waits else ""}/>'
     body = f'<Sequence><Parallel success_count="1">{halted}<AlwaysSuccess/></Parallel><leg.walk/><arm.grip tries="2"/></Sequence>'
     text = f'<root BTCPP_format="4"><BehaviorTree ID="m">{body}</BehaviorTree></root>'
@@ -137,5 +139,5 @@ def test_two_skills_that_fail_at_once_are_both_the_reason():
     for handle, _ in arm.started:
         handle.end(ExecutionState.TERMINATED, "DROPPED", "")
     assert tree.tick() is FAILURE
-    memory = tree.root.children[0].crew.memory
-    assert [failure.leaf for failure in memory.failures] == ["a", "b"]
+    context = tree.root.children[0].crew.context
+    assert [failure.leaf for failure in context.failures] == ["a", "b"]

@@ -48,7 +48,7 @@ class Flown:
 
     @property
     def entries(self) -> dict[str, object]:
-        return dict(self.mission.director.blackboard.entries())
+        return dict(self.mission.director.context.entries())
 
     @property
     def stopped(self) -> bool:

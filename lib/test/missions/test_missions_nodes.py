@@ -11,7 +11,7 @@ pytest.importorskip("py_trees")
 from py_trees.behaviour import Behaviour
 from py_trees.common import Status
 
-from alula.missions.blackboard import Blackboard, Failure
+from alula.missions.context import Failure, MissionContext
 from alula.missions.leaves import SkillLeaf
 from alula.missions.pending import PendingInterrupts
 from alula.model.execution_state import ExecutionState
@@ -41,7 +41,7 @@ class Client:
 class Clock:
     def __init__(self) -> None:
         self.s = 0.0
-        self.board = Blackboard(clock_ns=self.ns, pending=PendingInterrupts(self.ns, bound_s=5.0))
+        self.board = MissionContext(clock_ns=self.ns, pending=PendingInterrupts(self.ns, bound_s=5.0))
 
     def ns(self) -> int:
         return round(self.s * 1e9)
@@ -58,7 +58,7 @@ def clock():
 
 
 def leaf(clock, client, skill="grip", inputs=None, **options):
-    return SkillLeaf(skill, client, skill, {} if inputs is None else inputs, blackboard=clock.board, **options)
+    return SkillLeaf(skill, client, skill, {} if inputs is None else inputs, context=clock.board, **options)
 
 
 def test_a_skill_is_started_once_with_inputs_of_that_moment_and_succeeds_by_its_result(clock):

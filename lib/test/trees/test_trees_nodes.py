@@ -183,8 +183,8 @@ def test_scripts_see_what_surrounds_the_tree():
             return arguments == ["navigation.goto"]
 
     body = '<ScriptCondition code="navigation.flight_status == IN_AIR &amp;&amp; running(navigation.goto)"/>'
-    assert Played(body, surroundings=World(), enums={"IN_AIR": 1, "ON_GROUND": 0}).tick() == "SUCCESS"
-    assert Played(body.replace("IN_AIR", "ON_GROUND"), surroundings=World(), enums={"IN_AIR": 1, "ON_GROUND": 0}).tick() == "FAILURE"
+    assert Played(body, environment=World(), enums={"IN_AIR": 1, "ON_GROUND": 0}).tick() == "SUCCESS"
+    assert Played(body.replace("IN_AIR", "ON_GROUND"), environment=World(), enums={"IN_AIR": 1, "ON_GROUND": 0}).tick() == "FAILURE"
 
 
 # --- what differs on purpose -----------------------------------------------------------------------------------------

@@ -17,7 +17,7 @@ from alula.prove.mission.moments import Later, Moment, Thawing, numbered
 from alula.prove.mission.oracle import UndecidedError
 from alula.prove.mission.own import MOST, Run
 from alula.prove.mission.reading import ANOTHER, Read
-from alula.prove.mission.robot import Handle, Memory, Robot
+from alula.prove.mission.robot import Handle, Robot, SummaryContext
 from alula.prove.mission.touched import Touched, TouchedEntries
 from alula.prove.mission.unknown import Unknown, UnknownItems, UnknownNumber, UnknownText, is_unknown
 from alula.trees.access import Key
@@ -104,7 +104,7 @@ class Body:
 
     robot: Robot
     director: Director
-    board: Memory
+    board: SummaryContext
     trees: tuple[Tree, ...]
     skillsets: Mapping[str, Skillset]
     read: Read

@@ -9,7 +9,7 @@ from typing import ClassVar
 from alula.missions.part import MissionPart
 from alula.prove.mission.oracle import Asked, UndecidedError
 from alula.prove.mission.reading import ANOTHER
-from alula.prove.mission.robot import Memory, Robot
+from alula.prove.mission.robot import Robot, SummaryContext
 from alula.prove.mission.runnable import names_in, remembered, why_not
 from alula.prove.mission.unknown import any_value, is_unknown
 from alula.trees.access import written_entries
@@ -90,7 +90,9 @@ def own_nodes(robot: Robot, part: MissionPart, declared: Sequence[NodeType], why
     run = {one.name for one in taken if not one.why_not}
     free = tuple(leaves) if known else ()
     unread = tuple(name for name, _ in nodes if name not in run and name not in free)
-    return OwnNodes(MissionPart(tuple(register(name)(node) for name, node in nodes), memory=Memory), tuple(taken), unread, free, why)
+    return OwnNodes(
+        MissionPart(tuple(register(name)(node) for name, node in nodes), context=SummaryContext), tuple(taken), unread, free, why
+    )
 
 
 def has_children(category: Category, count: tuple[int, int | None] | None) -> bool:

@@ -139,7 +139,7 @@ class _Player:
         file = mission.with_models(run.skillsets)
         uses = uses_of(file)
         own = own_nodes(Robot(self._oracle, uses=uses), file.part, file.nowhere_made, run.why_any_order)
-        nodes = MissionPart(own.part.nodes, memory=file.part.memory)
+        nodes = MissionPart(own.part.nodes, context=file.part.context)
         plan = file.with_models(run.skillsets, nodes).plan(file.source.path.stem, any_inputs(file, self._oracle, uses))
         plan = replace(plan, inputs={})
         self._facts = plan.facts

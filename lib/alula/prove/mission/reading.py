@@ -7,8 +7,8 @@ from collections.abc import Iterable, Mapping
 from dataclasses import dataclass, field
 
 from alula.common.graphs import reachable_from
+from alula.missions.environment import FUNCTIONS
 from alula.missions.mission_file import DEGRADED, STOPPING
-from alula.missions.world import FUNCTIONS
 from alula.prove.mission.oracle import Oracle
 from alula.prove.mission.unknown import Unknown, UnknownNumber, UnknownText
 from alula.trees.access import Accesses, Key

@@ -6,7 +6,7 @@ import math
 from collections.abc import Callable, Collection, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field
 
-from alula.missions.blackboard import Blackboard, Failure
+from alula.missions.context import Failure, MissionContext
 from alula.missions.pending import PendingInterrupts
 from alula.missions.skill_types import type_of
 from alula.missions.skills import SkillNode
@@ -204,8 +204,8 @@ class Waits(PendingInterrupts):
         return not mine.isdisjoint(self._robot.interrupted) or bool(self._robot.oracle.look(("interrupted", skillset, holds_all)))
 
 
-class Memory(Blackboard):
-    """A mission's blackboard that remembers of the failures what scripts ask for."""
+class SummaryContext(MissionContext):
+    """A mission's context that keeps of the failures what scripts ask for."""
 
     def recall_failures(self, first: str, ends: frozenset[str]) -> None:
         """Set the failures: the skill that failed first, and the ends of all that failed."""

@@ -12,7 +12,7 @@ from collections.abc import Iterable, Iterator, Mapping
 from dataclasses import dataclass, field
 from typing import TYPE_CHECKING
 
-from alula.missions.world import states_of
+from alula.missions.environment import states_of
 from alula.model.model import Skillset
 from alula.prove.mission.oracle import Oracle
 from alula.prove.mission.unknown import Distance

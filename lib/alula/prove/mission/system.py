@@ -25,10 +25,10 @@ from typing import TypeVar
 
 from alula.common.graphs import reachable_from
 from alula.missions.director import Director, Outcome
+from alula.missions.environment import states_of
 from alula.missions.mission_file import READY, STOP_HERE, MissionFile, MissionTrees
 from alula.missions.plan import InputError, Inputs
 from alula.missions.skill_types import OUTCOME_PORT
-from alula.missions.world import states_of
 from alula.model import semantics
 from alula.model.conditions import NO_DATA
 from alula.model.execution_state import ExecutionState
@@ -40,7 +40,7 @@ from alula.prove.mission.memory import FEW, Body, TreeMemory
 from alula.prove.mission.oracle import Answer, Oracle, Question, UndecidedError
 from alula.prove.mission.own import OwnNodes, own_nodes
 from alula.prove.mission.reading import what_is_read
-from alula.prove.mission.robot import Client, Memory, Robot, Waits
+from alula.prove.mission.robot import Client, Robot, SummaryContext, Waits
 from alula.prove.mission.state import Event, Execution, Kind, Managers, State
 from alula.prove.mission.states import Compared
 from alula.prove.mission.ticking import ABORT, TICK, OneStop, Ticker
@@ -106,7 +106,7 @@ class System:
         clients = {one.name: Client(robot, one) for one in skillsets}
         oracle.begin(lambda _: None)
         filed, board = plan.make(clients, robot.clock_ns, plan.parameters)  # type: ignore[arg-type]  # a client as far as missions use it
-        if not isinstance(filed, MissionTrees) or not isinstance(board, Memory):
+        if not isinstance(filed, MissionTrees) or not isinstance(board, SummaryContext):
             raise InputError(f"{path}: is no mission in a file")
         stop = filed.stop_tree() if STOP_HERE in files.trees else None
         trees = (filed.tree, *([stop] if stop else []))

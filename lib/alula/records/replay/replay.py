@@ -234,5 +234,5 @@ class Replay:
             for name, managers in self._world.managers.items()
             for resource, status in managers.engine.resources.items()
         }
-        blackboard = to_plain(self.director.blackboard.values())
+        blackboard = to_plain(self.director.context.values())
         return Knowledge(resources, blackboard, " > ".join(path_to(self.director.view().as_dict(), skill)))

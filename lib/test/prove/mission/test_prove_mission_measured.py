@@ -16,12 +16,12 @@ pytest.importorskip("py_trees")
 from alula.common.record import DATA as DATA_TOPIC
 from alula.common.record import read_record
 from alula.language.models import ModelFile, check_texts
-from alula.missions.blackboard import Blackboard
+from alula.missions.context import MissionContext
 from alula.missions.director import Outcome
+from alula.missions.environment import MissionEnvironment
 from alula.missions.mission_file import MissionFile
 from alula.missions.part import NO_PART
 from alula.missions.pending import PendingInterrupts
-from alula.missions.world import World
 from alula.model.model import Skillset
 from alula.prove.mission.fitting import agree, told
 from alula.prove.mission.measured import Conditions, Kind, Measurements
@@ -202,19 +202,20 @@ class Searched:
 
 
 class Scope:
-    """The names of a script, which are those of the world."""
+    """The names of a script, which are those of a mission's environment."""
 
     enums: Mapping[str, float] = {}
 
     def __init__(self, client: Robot | Searched) -> None:
         data = frozenset({"rover.battery", "rover.mode", "rover.level", "rover.docked"})
-        self._world = World({"rover": client}, Blackboard(clock_ns=lambda: 0, pending=PendingInterrupts(lambda: 0, 5.0)), frozenset(), data)  # type: ignore[dict-item]
+        context = MissionContext(clock_ns=lambda: 0, pending=PendingInterrupts(lambda: 0, 5.0))
+        self._environment = MissionEnvironment({"rover": client}, context, frozenset(), data)  # type: ignore[dict-item]
 
     def get(self, name: str) -> object:
-        return self._world.value(name)
+        return self._environment.value(name)
 
     def call(self, name: str, arguments: list[object]) -> object:
-        return self._world.call(name, arguments)
+        return self._environment.call(name, arguments)
 
     def set(self, name: str, value: object, *, create: bool) -> None:
         raise KeyError(name)

@@ -12,8 +12,8 @@ from py_trees.behaviour import Behaviour  # noqa: E402
 from py_trees.common import Status  # noqa: E402
 from rclpy.parameter import Parameter  # noqa: E402
 
-from alula.missions.blackboard import Blackboard  # noqa: E402
 from alula.missions.conditions import Condition  # noqa: E402
+from alula.missions.context import MissionContext  # noqa: E402
 from alula.missions.director import Outcome  # noqa: E402
 from alula.missions.driver import TICK_PERIOD_S  # noqa: E402
 from alula.missions.pending import PendingInterrupts  # noqa: E402
@@ -49,7 +49,7 @@ class Waiting:
 
     def make(self, _clients, clock_ns, _values):
         self._clock_ns = clock_ns
-        return self, Blackboard(clock_ns=clock_ns, pending=PendingInterrupts(clock_ns), entries=dict)
+        return self, MissionContext(clock_ns=clock_ns, pending=PendingInterrupts(clock_ns), entries=dict)
 
     @property
     def stamps_ns(self) -> list[int]:

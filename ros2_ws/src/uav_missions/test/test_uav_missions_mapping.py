@@ -14,7 +14,7 @@ class Flight:
 
     def __init__(self, world: World, waypoints=SQUARE) -> None:
         self.world = world
-        self.mission, self.blackboard = make_mission(world, waypoints)
+        self.mission, self.context = make_mission(world, waypoints)
 
     def tick(self) -> Status:
         self.mission.root.tick_once()
@@ -126,7 +126,7 @@ def test_losing_both_sensors_stops_and_lands_where_it_is():
     assert flight.world.starts()[-3:] == ["lidar_depthmap", "hover", "land"]
     assert flight.world.resources["flight_status"] == "ON_GROUND"
     assert not flight.world.running()
-    assert flight.blackboard.reason == (
+    assert flight.context.reason == (
         "perception.zed_depthmap: RESOURCE_INVARIANT_VIOLATED zed_ok (zed_status is BROKEN); "
         "then perception.lidar_depthmap: NOT_READY sensor_ok"
     )
@@ -151,7 +151,7 @@ def test_losing_the_map_gives_up():
     flight.fly_until_running("goto_straight", 2)
     world.script = lambda handle: "ABORTED" if handle.skill == "lidar_mapping" else None
     assert flight.fly() is Status.FAILURE
-    assert flight.blackboard.reason == "mapping.lidar_mapping: ABORTED"
+    assert flight.context.reason == "mapping.lidar_mapping: ABORTED"
     assert world.starts()[-2:] == ["hover", "land"]
 
 
@@ -235,7 +235,7 @@ def test_when_the_pilot_takes_over_nothing_more_is_commanded():
     flight.settle()
     assert flight.world.starts()[commands:] == []
     assert not flight.world.running()
-    assert "keep_sdk_authority" in flight.blackboard.reason
+    assert "keep_sdk_authority" in flight.context.reason
 
 
 @pytest.mark.parametrize("away_s", [0.0, 2.0, 60.0])
@@ -253,7 +253,7 @@ def test_a_vehicle_that_is_given_back_is_landed_where_it_is(away_s):
     assert world.starts()[commands:] == ["hover", "land"]
     assert world.handles[-2].started_s - back_s > 2.9, "not while the pilot still turns his switch"
     assert world.resources["flight_status"] == "ON_GROUND"
-    assert "keep_sdk_authority" in flight.blackboard.reason
+    assert "keep_sdk_authority" in flight.context.reason
 
 
 def test_a_vehicle_that_is_taken_again_while_it_lands_is_left_alone_again():
@@ -396,5 +396,5 @@ def test_whatever_happens_nothing_runs_on_and_no_resource_is_asked_for_twice(res
     assert status in {Status.SUCCESS, Status.FAILURE}
     assert not world.conflicts
     assert not world.running()
-    assert not flight.blackboard.pending.names()
+    assert not flight.context.pending.names()
     assert all(handle.state is not State.REQUESTED for handle in world.handles)

@@ -7,7 +7,7 @@ from collections.abc import Callable
 from dataclasses import dataclass, field
 
 from alula.common.scenarios import load_scenario
-from alula.missions.blackboard import Blackboard
+from alula.missions.context import MissionContext
 from alula.missions.director import Mission
 from alula.missions.plan import MissionPlan
 from alula.missions.scenario import plan_of
@@ -198,7 +198,7 @@ def mapping_plan(waypoints: tuple[tuple[float, float, float], ...]) -> MissionPl
     return plan_of(load_scenario("mapping"), {"route": [list(waypoint) for waypoint in waypoints]}, robot_skillsets())
 
 
-def make_mission(world: World, waypoints=SQUARE, **skillsets: FakeClient) -> tuple[Mission, Blackboard]:
+def make_mission(world: World, waypoints=SQUARE, **skillsets: FakeClient) -> tuple[Mission, MissionContext]:
     """Return the mapping mission of its file, and its memory."""
     plan = mapping_plan(tuple(waypoints))
     return plan.make(clients(world) | skillsets, world.clock_ns, plan.parameters)

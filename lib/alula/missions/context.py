@@ -1,7 +1,7 @@
-"""What the nodes of one tree share.
+"""The context of one mission: what its nodes share besides the entries of their blackboard.
 
 py_trees' own blackboard is one for the whole process, so two trees (or two tests) would write into each other's; this one is
-typed, and each mission has its own: derive from it to add what the leaves of a mission tell one another.
+typed, and each mission has its own: derive from it to add what the leaves of a mission share.
 """
 
 from __future__ import annotations
@@ -33,8 +33,8 @@ class Failure:
 
 
 @dataclass(kw_only=True)
-class Blackboard:
-    """The memory of a mission: what failed, and why; a robot's own derives from it."""
+class MissionContext:
+    """The context of a mission: its clock, what failed, and why; a robot's own derives from it."""
 
     clock_ns: Clock
     pending: PendingInterrupts

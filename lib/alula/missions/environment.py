@@ -6,7 +6,7 @@ import re
 from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import dataclass
 
-from alula.missions.blackboard import Blackboard
+from alula.missions.context import MissionContext
 from alula.missions.skills import SkillNode
 from alula.missions.skillset import Client
 from alula.model.conditions import value_in
@@ -18,7 +18,7 @@ NOT_HEARD = -1.0
 """No state's number."""
 
 
-class World:
+class MissionEnvironment:
     """``navigation.flight_status`` is a resource's state, ``navigation.guidance_state.obstacle_m`` a field of data, in SI units.
 
     Data without a fresh value are unknown, as in a model's conditions, and ``fresh(D)`` tells whether they are not; ``running(S)``,
@@ -27,11 +27,11 @@ class World:
     a resource, to be put behind a sentence.
     """
 
-    def __init__(self, clients: Mapping[str, Client], memory: Blackboard, resources: frozenset[str], data: frozenset[str]) -> None:
+    def __init__(self, clients: Mapping[str, Client], context: MissionContext, resources: frozenset[str], data: frozenset[str]) -> None:
         self._clients = clients
         self._resources = resources
         self._data = data
-        self.memory = memory
+        self.context = context
         self.leaves: dict[str, list[SkillNode]] = {}
 
     def value(self, name: str) -> object:
@@ -85,16 +85,16 @@ class Function:
     """What scripts may ask: ``kind`` is what its one name is of. An end is a result, a precondition or an invariant."""
 
     kind: str
-    ask: Callable[[World, str], object]
+    ask: Callable[[MissionEnvironment, str], object]
 
 
 FUNCTIONS: Mapping[str, Function] = {
-    "running": Function("skill", lambda world, skill: any(leaf.running for leaf in world.of(skill))),
-    "progress": Function("skill", lambda world, skill: max((leaf.progress for leaf in world.of(skill)), default=0.0)),
-    "fresh": Function("data", lambda world, data: world.fresh(data)),
-    "failed_first": Function("skill", lambda world, skill: bool(world.memory.failures) and world.memory.failures[0].skill == skill),
-    "failed": Function("end", lambda world, end: any(failure.result == end for failure in world.memory.failures)),
-    "reason": Function("resource", lambda world, resource: world.because(resource)),
+    "running": Function("skill", lambda env, skill: any(leaf.running for leaf in env.of(skill))),
+    "progress": Function("skill", lambda env, skill: max((leaf.progress for leaf in env.of(skill)), default=0.0)),
+    "fresh": Function("data", lambda env, data: env.fresh(data)),
+    "failed_first": Function("skill", lambda env, skill: bool(env.context.failures) and env.context.failures[0].skill == skill),
+    "failed": Function("end", lambda env, end: any(failure.result == end for failure in env.context.failures)),
+    "reason": Function("resource", lambda env, resource: env.because(resource)),
 }
 
 
