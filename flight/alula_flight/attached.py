@@ -19,8 +19,8 @@ from pathlib import Path
 
 from alula.common.scenarios import load_scenario
 from alula.common.signals import on_end_signal
+from alula.report.aborts import SIGNAL, SUPERVISOR, ReportedAbort, note_abort
 from alula.report.deaths import Death, describe_exit, note_again, note_death
-from alula.report.ends import SIGNAL, SUPERVISOR, ReportedEnd, note_end
 from alula.runtime.live.part import RunPart, part_of_robot
 from alula.runtime.live.spec import RunSpec
 from alula_flight.mission_clock import MissionClock
@@ -138,7 +138,7 @@ class AttachedSupervisor:
         if mission.returncode < 0:
             death = Death("mission", describe_exit(mission.returncode), self._clock.now_s)
             note_death(self._out, death)
-            note_end(self._out, ReportedEnd(SUPERVISOR, f"{death.name} died ({death.how})", death.when_s))
+            note_abort(self._out, ReportedAbort(SUPERVISOR, f"{death.name} died ({death.how})", death.when_s))
         if mission.returncode != 0 or self._serves or self._held.look():
             self._rest.bring()  # what the mission could not, or there was none
         return mission.returncode if mission.returncode >= 0 else GIVEN_UP
@@ -163,11 +163,11 @@ class AttachedSupervisor:
 
     def _note_abort(self) -> None:
         if self.front_died:
-            note_end(self._out, ReportedEnd(SUPERVISOR, "the front has died", self._clock.now_s))
+            note_abort(self._out, ReportedAbort(SUPERVISOR, "the front has died", self._clock.now_s))
         elif self._asked is not None:
-            note_end(self._out, ReportedEnd(SIGNAL, f"{self._asked.name} to the supervisor", self._clock.now_s))
+            note_abort(self._out, ReportedAbort(SIGNAL, f"{self._asked.name} to the supervisor", self._clock.now_s))
         else:
-            note_end(self._out, ReportedEnd(SUPERVISOR, f"its limit of {self._spec.limit_s:g} s is over", self._clock.now_s))
+            note_abort(self._out, ReportedAbort(SUPERVISOR, f"its limit of {self._spec.limit_s:g} s is over", self._clock.now_s))
 
     def _look_for_the_front(self) -> None:
         if os.getppid() != self._front and not self.front_died:

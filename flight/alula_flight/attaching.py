@@ -10,7 +10,7 @@ from pathlib import Path
 
 from alula.common.processes import RUN_ID_VARIABLE
 from alula.common.scenarios import load_scenario
-from alula.report.ends import RUNNING, last_account
+from alula.report.aborts import RUNNING, last_account
 from alula.runtime.live.spec import RequestError, RunSpec
 from alula_flight.station import state as states
 from alula_flight.station.master import why_no_master

@@ -8,8 +8,8 @@ from pathlib import Path
 from alula.common.deployments import DeploymentError, load_deployment
 from alula.common.robots import find_robot
 from alula.records.conformance import Monitor
+from alula.report.aborts import close_account
 from alula.report.deaths import read_deaths
-from alula.report.ends import close_account
 from alula.runtime.live.spec import RunSpec
 
 GIVEN_UP, CANNOT_START = 1, 2

@@ -28,8 +28,8 @@ from alula.common.shared_memory import sweep_shared_memory
 from alula.common.signals import Interrupts
 from alula.records.conformance import Monitor
 from alula.records.models import models_of
+from alula.report.aborts import FRONT, ReportedAbort, aborted_by_signal, note_abort
 from alula.report.deaths import Death, describe_exit, note_death
-from alula.report.ends import FRONT, ReportedEnd, ended_by_signal, note_end
 from alula.report.live import LiveEvents
 from alula.runtime.live.part import part_of_robot
 from alula.runtime.live.spec import FILE, RequestError, RunSpec
@@ -132,7 +132,7 @@ class Front:
 
     def _stop(self) -> None:
         self._say(STOPPING)
-        note_end(Path(self._spec.out_dir), ended_by_signal(self._interrupts.first))
+        note_abort(Path(self._spec.out_dir), aborted_by_signal(self._interrupts.first))
         if self._supervisor is not None and self._supervisor.poll() is None:
             self._supervisor.send_signal(signal.SIGINT)
 
@@ -140,7 +140,7 @@ class Front:
         """Let the mission bring the robot to rest; it lives in a session of its own and knows nothing of its parents."""
         out = Path(self._spec.out_dir)
         note_death(out, Death("supervisor", describe_exit(code), None))
-        note_end(out, ReportedEnd(FRONT, "the supervisor died"))
+        note_abort(out, ReportedAbort(FRONT, "the supervisor died"))
         self._say("the supervisor died; the mission brings the robot to rest")
         missions = [process for process in processes_of_run(self._spec.run_id) if node_name(process) == MISSION_NODE]
         for mission in missions:

@@ -22,8 +22,8 @@ from alula.common.processes import end_run
 from alula.common.scenarios import load_scenario
 from alula.common.signals import on_end_signal
 from alula.records.departure import Departure
+from alula.report.aborts import SIGNAL, SUPERVISOR, ReportedAbort, note_abort
 from alula.report.deaths import Death, describe_exit, note_again, note_death
-from alula.report.ends import SIGNAL, SUPERVISOR, ReportedEnd, note_end
 from alula.runtime.live.part import DEAD_S, Consequence, RunPart, part_of_robot
 from alula.runtime.live.spec import RunSpec
 from alula_flight.launch import launch_arguments, launch_file
@@ -188,14 +188,14 @@ class Supervisor:
     def _ends(self, why: str) -> None:
         """Note that the supervisor ends the run by itself."""
         log.error("the run is ended: %s", why)
-        note_end(self._out, ReportedEnd(SUPERVISOR, why, self._clock.now_s))
+        note_abort(self._out, ReportedAbort(SUPERVISOR, why, self._clock.now_s))
 
     def _note_abort(self) -> None:
         """Note who has the mission come to rest, and why; what the front has noted before it asked for it stays."""
         if self._front_died:
             self._ends("the front has died")
         elif self._asked_to_end is not None:
-            note_end(self._out, ReportedEnd(SIGNAL, f"{self._asked_to_end.name} to the supervisor", self._clock.now_s))
+            note_abort(self._out, ReportedAbort(SIGNAL, f"{self._asked_to_end.name} to the supervisor", self._clock.now_s))
         elif self._over_time:
             self._ends(f"its limit of {self._spec.limit_s:g} s is over")
         else:

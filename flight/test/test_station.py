@@ -27,8 +27,8 @@ from alula.common.robots import VARIABLE as ROBOT
 from alula.common.robots import find_robot
 from alula.common.run_log import read_held
 from alula.generate.scaffold.skeleton import files_of
+from alula.report.aborts import read_abort
 from alula.report.deaths import read_deaths
-from alula.report.ends import read_end
 from alula.runtime.live.part import RunPart
 from alula.runtime.live.spec import RequestError, RunSpec
 from alula_flight import attached as attachments
@@ -624,7 +624,7 @@ def test_a_limit_ends_a_mission_on_what_runs_and_a_run_that_watches_on(robot, mo
     monkeypatch.setattr(attachments, "LOOK_S", 0.01)
     supervisor = attached(robot, Watched(looks=10**9), "exit(1)", limit_s=0.3)
     assert supervisor.run() == 1
-    end = read_end(robot / "runs/patrol")
+    end = read_abort(robot / "runs/patrol")
     assert end is not None
     assert end.why == "its limit of 0.3 s is over"
 

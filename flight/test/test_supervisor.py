@@ -13,8 +13,8 @@ import pytest
 
 from alula.common.record import FILE, MISSION, RecordWriter
 from alula.common.run_log import read_held
+from alula.report.aborts import OPERATOR, SIGNAL, SUPERVISOR, ReportedAbort, last_account, note_abort, read_abort
 from alula.report.deaths import read_deaths
-from alula.report.ends import OPERATOR, SIGNAL, SUPERVISOR, ReportedEnd, last_account, note_end, read_end
 from alula.report.live import LiveEvents
 from alula.runtime.live.part import DEAD_S, Clock, Consequence, RunPart
 from alula.runtime.live.spec import RunSpec
@@ -99,7 +99,7 @@ def flight(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Flight:
 def test_a_clock_that_never_begins_is_the_reason_that_is_told(flight: Flight, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(mission_clock, "START_TIMEOUT_S", 0.0)
     assert flight.ends() == GIVEN_UP
-    assert read_end(tmp_path) == ReportedEnd(SUPERVISOR, "the mission clock did not begin within 0 s: nothing came from the simulator")
+    assert read_abort(tmp_path) == ReportedAbort(SUPERVISOR, "the mission clock did not begin within 0 s: nothing came from the simulator")
 
 
 @pytest.mark.parametrize("name", ["simulator", "master"])
@@ -107,7 +107,7 @@ def test_a_death_that_ends_a_run_is_the_reason_that_is_told(name: str, flight: F
     flight.died("driver")
     flight.died(name)
     assert flight.ends() == GIVEN_UP
-    assert read_end(tmp_path) == ReportedEnd(SUPERVISOR, f"{name} died (exit code 1)")
+    assert read_abort(tmp_path) == ReportedAbort(SUPERVISOR, f"{name} died (exit code 1)")
 
 
 @pytest.mark.parametrize(("again_s", "worst"), [(None, Consequence.REST), (4.0, Consequence.GO_ON), (9.0, Consequence.GO_ON)])
@@ -130,14 +130,14 @@ def test_a_process_that_stays_dead_has_another_consequence_than_one_that_runs_ag
     assert death.again_s == (None if again_s is None else 30.0 + again_s)
     if worst is Consequence.REST:
         assert (flight.ends(), flight.part.rested) == (GIVEN_UP, 1)
-        assert read_end(tmp_path) == ReportedEnd(SUPERVISOR, "ros_bridge died (exit code 1) and stayed dead", 30.0 + DEAD_S + 0.1)
+        assert read_abort(tmp_path) == ReportedAbort(SUPERVISOR, "ros_bridge died (exit code 1) and stayed dead", 30.0 + DEAD_S + 0.1)
 
 
 def test_a_mission_that_was_killed_is_the_reason_that_is_told(flight: Flight, tmp_path: Path) -> None:
     flight.clock(30.0)
     flight.died("mission", -signal.SIGKILL)
     assert (flight.ends(), flight.part.rested) == (GIVEN_UP, 1)
-    assert read_end(tmp_path) == ReportedEnd(SUPERVISOR, "mission died (signal SIGKILL)", 30.0)
+    assert read_abort(tmp_path) == ReportedAbort(SUPERVISOR, "mission died (signal SIGKILL)", 30.0)
 
 
 def test_the_report_of_a_mission_that_was_killed_says_that_it_was_aborted_and_why(flight: Flight, tmp_path: Path) -> None:
@@ -160,7 +160,7 @@ def test_a_mission_that_lives_and_is_not_heard_any_more_has_the_robot_brought_to
     assert not flight.supervisor._mission.silent
     flight.clock(20.1 + SILENT_S)
     assert (flight.ends(), flight.part.rested) == (GIVEN_UP, 1)
-    assert read_end(tmp_path) == ReportedEnd(SUPERVISOR, "the mission's process runs, and has not been heard for 30 s", 20.1 + SILENT_S)
+    assert read_abort(tmp_path) == ReportedAbort(SUPERVISOR, "the mission's process runs, and has not been heard for 30 s", 20.1 + SILENT_S)
 
 
 def test_a_mission_that_was_never_heard_is_not_missed(flight: Flight) -> None:
@@ -172,14 +172,14 @@ def test_a_mission_that_was_never_heard_is_not_missed(flight: Flight) -> None:
 def test_a_signal_from_outside_is_named(flight: Flight, tmp_path: Path) -> None:
     flight.signalled(signal.SIGTERM)
     assert flight.ends() == GIVEN_UP
-    assert read_end(tmp_path) == ReportedEnd(SIGNAL, "SIGTERM to the supervisor")
+    assert read_abort(tmp_path) == ReportedAbort(SIGNAL, "SIGTERM to the supervisor")
 
 
 def test_what_the_operator_asked_the_front_for_is_the_operators(flight: Flight, tmp_path: Path) -> None:
-    note_end(tmp_path, ReportedEnd(OPERATOR, "Ctrl-C"))
+    note_abort(tmp_path, ReportedAbort(OPERATOR, "Ctrl-C"))
     flight.signalled(signal.SIGINT)
     flight.ends()
-    assert read_end(tmp_path) == ReportedEnd(OPERATOR, "Ctrl-C")
+    assert read_abort(tmp_path) == ReportedAbort(OPERATOR, "Ctrl-C")
 
 
 def test_a_run_lasts_no_longer_than_its_limit(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
@@ -190,7 +190,7 @@ def test_a_run_lasts_no_longer_than_its_limit(tmp_path: Path, monkeypatch: pytes
         assert not flight.supervisor._over_time
     flight.clock(37.1)
     assert flight.ends() == GIVEN_UP
-    assert read_end(tmp_path) == ReportedEnd(SUPERVISOR, "its limit of 30 s is over", 37.1)
+    assert read_abort(tmp_path) == ReportedAbort(SUPERVISOR, "its limit of 30 s is over", 37.1)
 
 
 @pytest.mark.parametrize(("scenario", "rested"), [("standby", 1), ("mapping", 0)])
@@ -205,7 +205,7 @@ def test_a_front_that_has_died_is_named(flight: Flight, tmp_path: Path) -> None:
     flight.supervisor._front = 0  # no process's parent
     flight.signalled(signal.SIGTERM)  # by the kernel
     flight.ends()
-    assert read_end(tmp_path) == ReportedEnd(SUPERVISOR, "the front has died")
+    assert read_abort(tmp_path) == ReportedAbort(SUPERVISOR, "the front has died")
 
 
 BRAKE = "a failsafe has it, in BRAKE"
@@ -275,7 +275,7 @@ def test_who_wants_a_run_to_end_that_watches_ends_it(flight: Flight, tmp_path: P
     flight.part.hold = stop()
     flight.supervisor._watch.mission_exit = 1
     assert flight.ends() == 1
-    assert read_end(tmp_path) == ReportedEnd(SIGNAL, "SIGTERM to the supervisor", 110.0)
+    assert read_abort(tmp_path) == ReportedAbort(SIGNAL, "SIGTERM to the supervisor", 110.0)
 
 
 def test_who_has_told_a_run_to_end_before_its_mission_ended_waits_no_longer(flight: Flight) -> None:
@@ -293,6 +293,6 @@ def test_a_limit_ends_a_run_that_watches(tmp_path: Path) -> None:
     flight.part.hold = iter(Hovering(flight, 1000))
     flight.supervisor._watch.mission_exit = 1
     assert flight.ends() == 1
-    end = read_end(tmp_path)
+    end = read_abort(tmp_path)
     assert end is not None
     assert end.why == "its limit of 20 s is over"

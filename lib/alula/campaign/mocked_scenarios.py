@@ -11,7 +11,7 @@ from alula.campaign.flown import FlownAnswer, Ticks
 from alula.common.faults import FaultError, FaultRequest
 from alula.common.robots import RobotError, find_robot
 from alula.common.scenarios import Scenario, ScenarioError, load_scenario
-from alula.missions.director import End
+from alula.missions.director import MissionResult
 from alula.missions.mocked import MockedMission, check_faults
 from alula.missions.plan import InputError, Inputs, MissionPlan
 from alula.missions.scenario import check_names, inputs_of, plan_of
@@ -31,7 +31,7 @@ class MockedRun:
     """A run over mocks: what happened, how it ended, what went wrong in the mocks themselves, and what is open."""
 
     events: Sequence[EngineEvent]
-    end: End
+    end: MissionResult
     notes: Sequence[str]
     open: Sequence[str]
     faults: dict[str, float] = field(default_factory=dict)

@@ -30,7 +30,7 @@ from alula.missions.plan import InputError
 from alula.records.conformance import Monitor
 from alula.records.errors import AnalysisError
 from alula.records.models import models_of
-from alula.report.ends import ended_by_signal, note_end
+from alula.report.aborts import aborted_by_signal, note_abort
 from alula.report.facts import RunFacts
 from alula.report.live import LiveEvents
 from alula.report.making import make_report
@@ -87,7 +87,7 @@ def run(given: argparse.Namespace) -> int:
 
 def _abort_on_signals(mission: MockedMission, out: Path) -> None:
     def first() -> None:
-        note_end(out, ended_by_signal(interrupts.first))
+        note_abort(out, aborted_by_signal(interrupts.first))
         mission.abort(f"told to end by {interrupts.first.name if interrupts.first else 'a signal'}")
 
     def second() -> None:

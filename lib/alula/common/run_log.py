@@ -22,7 +22,7 @@ PICTURES_FILE = "pictures.jsonl"
 DEATH, AGAIN, FAULT, WAIT, HELD, ACT = "death", "again", "fault", "wait", "held", "act"
 END, MOCKED, MISSION = "end", "mocked", "mission"
 """The kinds of lines: see ``alula.report.deaths``, ``alula.common.faults.FaultChange``, ``read_waits``, ``note_held``, ``note_act``,
-``alula.report.ends``, ``note_mocked`` and ``account``."""
+``alula.report.aborts``, ``note_mocked`` and ``account``."""
 
 
 def note(out: Path, kind: str, content: Mapping[str, object]) -> None:

@@ -21,7 +21,7 @@ from alula.common.robots import find_robot
 from alula.common.runs import runs_folder
 from alula.common.scenarios import scenario_names
 from alula.console.link import ActError
-from alula.report.ends import OPERATOR, ReportedEnd, note_end
+from alula.report.aborts import OPERATOR, ReportedAbort, note_abort
 from alula.runtime.live.options import RunOption, entry, words_of
 from alula.runtime.live.spec import RequestError
 
@@ -172,7 +172,7 @@ def end(process: subprocess.Popen[bytes]) -> None:
 
 def everything_off(folder: Path) -> str:
     """End all processes of a run at once, without landing; return what was done."""
-    note_end(folder, ReportedEnd(OPERATOR, "everything off"))
+    note_abort(folder, ReportedAbort(OPERATOR, "everything off"))
     run_id = str(json.loads((folder / "run.json").read_text(encoding="utf-8"))["run_id"])
     ended = end_run(run_id, timeout_s=0.0)
     return f"{len(ended)} processes were ended at once"

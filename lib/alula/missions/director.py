@@ -49,8 +49,8 @@ EXIT_CODES = {
 
 
 @dataclass(frozen=True)
-class End:
-    """How a mission ended: its outcome, and the reason in words."""
+class MissionResult:
+    """The result of a mission: its outcome, and the reason in words."""
 
     outcome: Outcome
     reason: str = ""
@@ -88,7 +88,7 @@ class DirectorMemory:
     """The state of a director, without its trees; times as ``MissionContext.now_s``, seconds."""
 
     phase: str
-    end: End | None
+    end: MissionResult | None
     start_s: float | None
     wait_until_s: float | None
     stops: bool
@@ -117,7 +117,7 @@ class Director:
     def __init__(
         self, mission: Mission, context: MissionContext, *, start_timeout_s: float = START_TIMEOUT_S, serves: bool = False
     ) -> None:
-        self.end: End | None = None
+        self.end: MissionResult | None = None
         self.start_s: float | None = None
         self._mission = mission
         self.context = context
@@ -205,7 +205,7 @@ class Director:
         if self.end is not None:
             return "the mission is over already"
         if self.start_s is None:
-            self.end = End(Outcome.ABORTED, reason)
+            self.end = MissionResult(Outcome.ABORTED, reason)
             return "the mission does not start"
         if self._stops:
             return "the robot is being stopped already"
@@ -221,7 +221,7 @@ class Director:
         if self.end is not None:
             return
         if self.start_s is None:
-            self.end = End(Outcome.NOT_STARTED, reason)
+            self.end = MissionResult(Outcome.NOT_STARTED, reason)
         elif self._stop is None:
             self._leave(reason)
         elif ticked:
@@ -275,7 +275,7 @@ class Director:
             self.start_s = now_s
             self._phase = self._run
         elif self._wait_until_s is not None and now_s > self._wait_until_s:
-            self.end = End(Outcome.NOT_STARTED, "; ".join(unmet))
+            self.end = MissionResult(Outcome.NOT_STARTED, "; ".join(unmet))
 
     def _run(self) -> None:
         self._mission.root.tick_once()
@@ -293,11 +293,11 @@ class Director:
         if not self.context.pending.names():
             self.end = self._judge()
 
-    def _judge(self) -> End:
+    def _judge(self) -> MissionResult:
         if self._stop is not None:
-            return End(Outcome.SERVED if self._serves else Outcome.ABORTED, self._abort_reason)
+            return MissionResult(Outcome.SERVED if self._serves else Outcome.ABORTED, self._abort_reason)
         if self._mission.root.status is not Status.SUCCESS:
-            return End(Outcome.GIVEN_UP, self.context.reason)
+            return MissionResult(Outcome.GIVEN_UP, self.context.reason)
         if self._mission.degraded:
-            return End(Outcome.DEGRADED, self.context.what_went_wrong)
-        return End(Outcome.ACCOMPLISHED)
+            return MissionResult(Outcome.DEGRADED, self.context.what_went_wrong)
+        return MissionResult(Outcome.ACCOMPLISHED)

@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Callable, Mapping
 from typing import TypeVar
 
-from alula.missions.director import START_TIMEOUT_S, Director, End
+from alula.missions.director import START_TIMEOUT_S, Director, MissionResult
 from alula.missions.leaves import skill_leaf
 from alula.missions.pausing import PauseRefusedError
 from alula.missions.plan import InputError, MissionPlan
@@ -85,7 +85,7 @@ class MissionDriver:
         self.director = Director(mission, self.context, start_timeout_s=start_timeout_s, serves=plan.serves)
 
     @property
-    def end(self) -> End | None:
+    def end(self) -> MissionResult | None:
         """How the mission ended; None while it runs."""
         return self.director.end
 
@@ -203,7 +203,7 @@ class MissionDriver:
         """Return whether the events of all that has ended are here; a result may come before its event."""
         return self.record is None or not self.record.unended
 
-    def finish(self, end: End) -> None:
+    def finish(self, end: MissionResult) -> None:
         """Write what is left to write, and show the tree no more."""
         if self._watched is not None:
             self.show(self._watched.close)

@@ -12,7 +12,7 @@ from typing import Protocol
 from alula.common.faults import FaultRequest, check_fault
 from alula.common.operator import ABORT, PAUSE, acts_of, is_operator, on_time
 from alula.common.public import public
-from alula.missions.director import Director, End, Outcome
+from alula.missions.director import Director, MissionResult, Outcome
 from alula.missions.driver import TICK_PERIOD_S, Job, MissionDriver
 from alula.missions.pausing import PauseRefusedError
 from alula.missions.plan import MissionPlan
@@ -110,7 +110,7 @@ class MockedMission:
         self.events: list[EngineEvent] = []
         self.places: dict[str, tuple[str, ...]] = {}
         """Where in the tree each execution was started, by its id: the names of the nodes from the root down."""
-        self.end: End | None = None
+        self.end: MissionResult | None = None
         """How it ended; None before."""
         self.wall_s = 0.0
         names = [one.name for one in skillsets]
@@ -138,7 +138,7 @@ class MockedMission:
         self._leaves = self._driver.leaves
         self.world.on_event(self._on_event)
 
-    def run(self) -> End:
+    def run(self) -> MissionResult:
         """Run to the end in virtual time; return how it ended."""
         begun = time.perf_counter()
         self._driver.tick_regularly(self.world.clock.after, self._tick_period_s)
@@ -147,7 +147,7 @@ class MockedMission:
             self._driver.abort(f"its limit of {self._limit_s:g} s is over")
             self.world.run_until(over, timeout_s=STOP_S)
         self.world.run_for(0.0)
-        end = self._driver.end or End(Outcome.ABORTED, "the stop did not end")
+        end = self._driver.end or MissionResult(Outcome.ABORTED, "the stop did not end")
         self.wall_s = time.perf_counter() - begun
         self._driver.finish(end)
         self.end = end

@@ -13,7 +13,7 @@ from alula.common.plain import to_plain
 from alula.common.record import BLACKBOARD, DATA, DECISIONS, EVENTS, FILE, MISSION, OPERATOR, REPORTS, TICKS, TREE, RecordWriter
 from alula.common.robots import RobotError, find_robot
 from alula.missions.conditions import Condition
-from alula.missions.director import Director, End, Outcome
+from alula.missions.director import Director, MissionResult, Outcome
 from alula.missions.drawing import draw
 from alula.missions.plan import MissionPlan
 from alula.missions.skillset import Clock
@@ -73,7 +73,7 @@ class MissionRecord:
         self._blackboard: dict[str, object] = {}
         self._writer = RecordWriter(out / FILE)
         # So that a mission that is killed leaves one that says `running`.
-        self._write_mission(End(Outcome.RUNNING), None, None)
+        self._write_mission(MissionResult(Outcome.RUNNING), None, None)
 
     @property
     def unended(self) -> bool:
@@ -104,7 +104,7 @@ class MissionRecord:
             self._joined_told = False
             return
         if not self._joined_told:  # also for a mission that is killed
-            self._write_mission(End(Outcome.RUNNING), None, None)
+            self._write_mission(MissionResult(Outcome.RUNNING), None, None)
         self._writer.write(EVENTS, event.stamp_ns, event_record(event))
         if isinstance(event, ExecutionEvent):
             (self._unended.discard if event.state.terminal else self._unended.add)(event.id)
@@ -172,7 +172,7 @@ class MissionRecord:
             self._blackboard = values
             self._write(BLACKBOARD, changed)
 
-    def finish(self, end: End, director: Director, end_s: float) -> None:
+    def finish(self, end: MissionResult, director: Director, end_s: float) -> None:
         """Write what is left to write."""
         self._draw(end, director)
         self._write_mission(end, director.start_s, end_s)
@@ -185,7 +185,7 @@ class MissionRecord:
         facts |= to_plain(self._plan.facts())
 
     @_kept
-    def _draw(self, end: End, director: Director) -> None:
+    def _draw(self, end: MissionResult, director: Director) -> None:
         title = f"Mission {self._plan.scenario}: {end.outcome.value.replace('_', ' ')}"
         try:
             write_text(self._out / "tree.svg", draw(director.view(), title))
@@ -195,7 +195,7 @@ class MissionRecord:
     def _write(self, topic: str, content: Mapping[str, object]) -> None:
         self._writer.write(topic, self._clock_ns(), content)
 
-    def _write_mission(self, end: End, start_s: float | None, end_s: float | None) -> None:
+    def _write_mission(self, end: MissionResult, start_s: float | None, end_s: float | None) -> None:
         self._joined_told = True
         if self._writer.error and self._writer.error not in self.problems:
             self.problems.append(self._writer.error)

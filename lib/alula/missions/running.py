@@ -5,7 +5,7 @@ from __future__ import annotations
 import time
 from collections.abc import Callable
 
-from alula.missions.director import End, Outcome
+from alula.missions.director import MissionResult, Outcome
 from alula.missions.driver import MissionDriver
 
 STANDS_S = 60.0
@@ -38,7 +38,7 @@ def run_to_the_end(
     turn: Callable[[], None],
     now_s: Callable[[], float],
     wall_s: Callable[[], float] = time.monotonic,
-) -> End:
+) -> MissionResult:
     """Take turns until the mission is over; return how it ended.
 
     Args:
@@ -57,13 +57,13 @@ def run_to_the_end(
     return end
 
 
-def _stopped(driver: MissionDriver, turn: Callable[[], None], wall_s: Callable[[], float]) -> End:
+def _stopped(driver: MissionDriver, turn: Callable[[], None], wall_s: Callable[[], float]) -> MissionResult:
     """Interrupt what runs and bring the robot to rest as far as that takes no time of a clock that stands still."""
     if driver.director.start_s is None:
-        return End(Outcome.NOT_STARTED, STANDS)
+        return MissionResult(Outcome.NOT_STARTED, STANDS)
     driver.abort(STANDS)
     end_s = wall_s() + STOP_S
     while driver.end is None and wall_s() < end_s:
         driver.wake()  # no timer of the mission clock does
         turn()
-    return End(Outcome.ABORTED, driver.end.reason if driver.end else f"{STANDS}; the robot was not at rest within {STOP_S:g} s")
+    return MissionResult(Outcome.ABORTED, driver.end.reason if driver.end else f"{STANDS}; the robot was not at rest within {STOP_S:g} s")

@@ -61,8 +61,8 @@ class Stimulus(NamedTuple):
         return self.cause.value.format(name=self.name, target=self.target, execution=called)
 
 
-class End(NamedTuple):
-    """How an execution can be asked to end: by RESULT, ``name``, or by INTERRUPT."""
+class SkillOutcome(NamedTuple):
+    """An outcome that an execution can be brought to: by RESULT, ``name``, or by INTERRUPT."""
 
     cause: Cause
     name: str
@@ -70,10 +70,10 @@ class End(NamedTuple):
     postcondition: Expression
 
 
-def ends_of(skill: Skill) -> tuple[End, ...]:
-    """Return how executions of a skill can be asked to end: with its results, in the model's order, or interrupted."""
-    results = (End(Cause.RESULT, one.name, one.effect, one.postcondition) for one in skill.results)
-    return (*results, End(Cause.INTERRUPT, "", skill.interrupt.effect, skill.interrupt.postcondition))
+def outcomes_of(skill: Skill) -> tuple[SkillOutcome, ...]:
+    """Return the outcomes that executions of a skill can be brought to: its results, in the model's order, and the interruption."""
+    results = (SkillOutcome(Cause.RESULT, one.name, one.effect, one.postcondition) for one in skill.results)
+    return (*results, SkillOutcome(Cause.INTERRUPT, "", skill.interrupt.effect, skill.interrupt.postcondition))
 
 
 class PossibleSteps:
@@ -82,7 +82,7 @@ class PossibleSteps:
     def __init__(self, model: OverApproximation) -> None:
         self.skillset = model.skillset
         self._original = model.original
-        self._ends = {s.name: [*((one.cause, one.name) for one in ends_of(s)), (Cause.FAIL, "")] for s in model.skillset.skills}
+        self._ends = {s.name: [*((one.cause, one.name) for one in outcomes_of(s)), (Cause.FAIL, "")] for s in model.skillset.skills}
         self._breakers: dict[str, list[Breaker]] = {skill.name: [] for skill in model.skillset.skills}
         for breaker in model.breakers:
             self._breakers[breaker.skill].append(breaker)

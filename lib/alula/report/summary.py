@@ -14,7 +14,7 @@ from alula.common.operator import PAUSE, is_operator
 from alula.common.robots import page_words, robots_of_fleet
 from alula.common.run_log import ACT, read
 from alula.common.scenarios import load_scenario
-from alula.report.ends import read_end, true_reason, with_dead
+from alula.report.aborts import read_abort, true_reason, with_dead
 from alula.report.facts import Death, RunFacts
 from alula.report.files import Problems, ReportError, finite, mapping, read_json, sequence
 from alula.report.history import History
@@ -76,7 +76,7 @@ def read_outcome(facts: RunFacts, history: History, problems: Problems) -> tuple
         )
     if outcome != "aborted":
         return outcome, reason or None
-    return outcome, with_dead(true_reason(reason or None, read_end(facts.out_dir)), facts.died)
+    return outcome, with_dead(true_reason(reason or None, read_abort(facts.out_dir)), facts.died)
 
 
 def read_bridge(facts: RunFacts, problems: Problems) -> dict[str, object] | None:

@@ -8,8 +8,8 @@ from typing import Any
 
 from alula.common.robots import page_words
 from alula.common.run_log import read_waits
+from alula.report.aborts import SIGNAL, TOLD_TO_END, ReportedAbort, read_abort
 from alula.report.deaths import Death
-from alula.report.ends import SIGNAL, TOLD_TO_END, ReportedEnd, read_end
 from alula.report.phases import home
 
 MEANING = {
@@ -47,18 +47,18 @@ def duration_words(summary: Mapping[str, Any]) -> str:
     return f"duration {number(summary.get('duration_s'), 's', 1)}"
 
 
-def was_ended(summary: Mapping[str, Any], ended: ReportedEnd | None) -> bool:
+def was_ended(summary: Mapping[str, Any], ended: ReportedAbort | None) -> bool:
     """Return whether the mission came to no end of its own."""
     outcome, reason = summary.get("outcome"), str(summary.get("reason"))
     told = reason.startswith(TOLD_TO_END) or (ended is not None and reason == ended.sentence())
     return outcome in {None, "running"} or (outcome == "aborted" and told)
 
 
-def outcome_words(summary: Mapping[str, Any], died: Sequence[Death], out: Path, ended: ReportedEnd | None) -> str:
+def outcome_words(summary: Mapping[str, Any], died: Sequence[Death], out: Path, ended: ReportedAbort | None) -> str:
     """Return how the mission ended, in words; where its files are lost, by the exit code of its process, or by what died."""
     outcome, code, reason = summary.get("outcome"), summary.get("mission_exit"), summary.get("reason")
     if outcome == "aborted" and ended is None and was_ended(summary, ended):
-        ended = ReportedEnd(SIGNAL, str(reason))
+        ended = ReportedAbort(SIGNAL, str(reason))
     if ended is not None and was_ended(summary, ended):
         return f"mission {ended.sentence()}"
     if outcome == "served":
@@ -146,7 +146,7 @@ def conformance_lines(found: Mapping[str, Any]) -> list[str]:
 
 def verdict_lines(summary: Mapping[str, Any], died: Sequence[Death], out: Path) -> list[str]:
     """Return the verdict, a line each; who ended the run stands in its folder."""
-    ended = read_end(out)
+    ended = read_abort(out)
     lines = ["", outcome_words(summary, died, out, ended), *death_lines(died)]
     if ended is not None and not was_ended(summary, ended) and summary.get("outcome") != "served":
         lines.append(f"  the run was {ended.sentence()}")

@@ -15,7 +15,7 @@ from alula.cli import new, run
 from alula.common import run_log
 from alula.common.record import FILE, read_record
 from alula.missions.mocked import STOP_S
-from alula.report.ends import OPERATOR, ReportedEnd, read_end
+from alula.report.aborts import OPERATOR, ReportedAbort, read_abort
 
 
 @pytest.mark.parametrize(
@@ -108,6 +108,6 @@ def test_ctrl_c_is_the_operators(tmp_path: Path) -> None:
     words = [sys.executable, "-c", script, "mapping", "--mock", "--out", str(out)]
     done = subprocess.run(words, capture_output=True, text=True, check=False, timeout=120, env=dict(os.environ))
     assert done.returncode == 1, done.stderr
-    assert read_end(out) == ReportedEnd(OPERATOR, "Ctrl-C")
+    assert read_abort(out) == ReportedAbort(OPERATOR, "Ctrl-C")
     assert "mission aborted by the operator: Ctrl-C" in done.stdout
     assert run_log.account(out, read_record(out))["reason"] == f"told to end by {signal.SIGINT.name}"

@@ -297,8 +297,8 @@ def test_everything_off_ends_the_processes_of_the_run(make_run: Callable[..., Pa
     folder = make_run()
     assert acts.everything_off(folder) == "3 processes were ended at once"
     assert ended == [("id-run", 0.0)]
-    ends.note_end(folder, ends.ReportedEnd(ends.FRONT, "the supervisor died"))  # which is what the front sees of it
-    assert ends.read_end(folder) == ends.ReportedEnd(ends.OPERATOR, "everything off")
+    ends.note_abort(folder, ends.ReportedAbort(ends.FRONT, "the supervisor died"))  # which is what the front sees of it
+    assert ends.read_abort(folder) == ends.ReportedAbort(ends.OPERATOR, "everything off")
 
 
 @pytest.mark.parametrize(

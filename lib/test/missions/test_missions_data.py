@@ -13,7 +13,7 @@ from alula.common.record import DATA, TREE, read_record
 from alula.common.robots import load_robot_folder
 from alula.language.messages import Messages, fields_of, messages_of
 from alula.language.models import ModelFile, check_texts
-from alula.missions.director import End, Outcome
+from alula.missions.director import MissionResult, Outcome
 from alula.missions.mission_file import plan_of_file
 from alula.missions.mocked import MockedMission
 from alula.missions.part import NO_PART
@@ -59,7 +59,7 @@ def text_of(body: str, ready: str = "<AlwaysSuccess/>") -> str:
     return f'<root BTCPP_format="4" main_tree_to_execute="m">{trees}{ports}</root>'
 
 
-def flown(body: str, folder: Path, *, recorded: bool = True, ready: str = "<AlwaysSuccess/>") -> End:
+def flown(body: str, folder: Path, *, recorded: bool = True, ready: str = "<AlwaysSuccess/>") -> MissionResult:
     (folder / "m.xml").write_text(text_of(body, ready), encoding="utf-8")
     (folder / "mock.yaml").write_text(MOCK, encoding="utf-8")
     (folder / "run").mkdir()

@@ -17,7 +17,7 @@ from py_trees.common import Status
 from alula.common.record import EVENTS, MISSION, OPERATOR, TICKS, TREE, read_record
 from alula.missions.conditions import Condition
 from alula.missions.context import MissionContext
-from alula.missions.director import End, Outcome
+from alula.missions.director import MissionResult, Outcome
 from alula.missions.driver import MissionDriver
 from alula.missions.pausing import PauseRefusedError
 from alula.missions.pending import PendingInterrupts
@@ -142,7 +142,7 @@ def test_what_happened_before_a_mission_is_not_its_own_where_it_joins_managers_t
         host.driver.event(TransitionEvent(number, stamp_ns, "wheels", "FREE", "USED", "extern", skillset="base"))
     host.work()
     killed = host.written(MISSION)[-1]
-    host.driver.finish(End(Outcome.ACCOMPLISHED))
+    host.driver.finish(MissionResult(Outcome.ACCOMPLISHED))
     assert (killed["outcome"], killed.get("joined")) == ("running", {"base": 8} if joins else None)
     assert [event["sequence"] for event in host.written(EVENTS)] == ([9] if joins else [7, 8, 9])
     assert host.written(MISSION)[-1].get("joined") == ({"base": 8} if joins else None)
@@ -156,7 +156,7 @@ def test_what_happened_before_the_clock_was_set_back_is_not_the_missions_own(tmp
     stamps_ns = [host.clock.now_ns - 20, host.clock.now_ns + hour_ns, host.clock.now_ns]
     for number, stamp_ns in enumerate([*stamps_ns, host.clock.now_ns + hour_ns], start=7):  # the last one came just when it was set again
         host.driver.event(TransitionEvent(number, stamp_ns, "wheels", "FREE", "USED", "extern", skillset="base"))
-    host.driver.finish(End(Outcome.ACCOMPLISHED))
+    host.driver.finish(MissionResult(Outcome.ACCOMPLISHED))
     assert [event["sequence"] for event in host.written(EVENTS)] == [9, 10]
     assert host.written(MISSION)[-1].get("joined") == {"base": 8}
 
@@ -268,7 +268,7 @@ SPOILS = {
 ASK_ONLY_AT_THE_END = {"stopping", "stop_here", "facts"}
 
 
-def ended(host: Host) -> End:
+def ended(host: Host) -> MissionResult:
     for _ in range(10):
         host.wake()
     assert host.driver.end is not None

@@ -10,7 +10,7 @@ pytest.importorskip("py_trees")
 
 from alula.common.record import MISSION, OPERATOR, read_record
 from alula.language.models import ModelFile, check_texts
-from alula.missions.director import End, Outcome
+from alula.missions.director import MissionResult, Outcome
 from alula.missions.driver import MissionDriver
 from alula.missions.mission_file import plan_of_file
 from alula.missions.part import NO_PART
@@ -64,7 +64,7 @@ class Host:
             self.driver.tick()
             self.world.run_for(0.0)
 
-    def run(self) -> End:
+    def run(self) -> MissionResult:
         end = run_to_the_end(self.driver, self.turn, lambda: self.world.now_s, lambda: self.turns * 0.1)
         self.driver.finish(end)
         return end
@@ -88,7 +88,7 @@ def test_a_clock_that_stands_ends_the_mission_and_what_runs(stop: str, tmp_path:
 
 def test_a_clock_that_stands_before_the_start_starts_nothing(tmp_path: Path) -> None:
     host = Host(tmp_path, NEEDS + STOPS["at once"])
-    assert host.run() == End(Outcome.NOT_STARTED, STANDS)
+    assert host.run() == MissionResult(Outcome.NOT_STARTED, STANDS)
     assert host.turns * 0.1 >= STANDS_S
     assert host.running == []
 

@@ -14,7 +14,7 @@ from alula.model import semantics
 from alula.model.execution_state import ExecutionState as S
 from alula.model.overapproximation import over_approximate
 from alula.model.situation import Change, Entered, Running
-from alula.model.steps import Cause, PossibleSteps, Stimulus, ends_of, take
+from alula.model.steps import Cause, PossibleSteps, Stimulus, outcomes_of, take
 
 pytestmark = pytest.mark.long
 QUIET = {"deadline": None, "suppress_health_check": list(HealthCheck)}
@@ -113,6 +113,6 @@ def test_a_request_is_always_answered_and_a_running_execution_can_always_end(ski
             assert Cause.START in causes or Cause.REFUSE in causes
         for execution in situation.running:
             names = [(one.cause, one.name) for one in steps.of_running(situation, execution)]
-            asked = [(end.cause, end.name) for end in ends_of(skillset.skill(execution.skill))]
+            asked = [(end.cause, end.name) for end in outcomes_of(skillset.skill(execution.skill))]
             assert names[: len(asked)] == asked
             assert len(names) == len(set(names))

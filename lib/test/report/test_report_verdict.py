@@ -12,22 +12,22 @@ from alula.common.record import FILE as RECORD
 from alula.common.record import MISSION, RecordWriter
 from alula.common.run_log import FILE, note_wait
 from alula.missions.running import STANDS
-from alula.report.deaths import Death
-from alula.report.ends import (
+from alula.report.aborts import (
     FRONT,
     NO_OWN_END,
     OPERATOR,
     SIGNAL,
     SUPERVISOR,
-    ReportedEnd,
+    ReportedAbort,
+    aborted_by_signal,
     close_account,
-    ended_by_signal,
     last_account,
-    note_end,
-    read_end,
+    note_abort,
+    read_abort,
     true_reason,
     with_dead,
 )
+from alula.report.deaths import Death
 from alula.report.facts import RunFacts
 from alula.report.files import Problems
 from alula.report.summary import read_outcome
@@ -143,29 +143,29 @@ NO_CLOCK = "the mission clock did not begin within 120 s: nothing came from Ardu
 @pytest.mark.parametrize(
     ("outcome", "reason", "ended", "told"),
     [
-        ("aborted", SIGINT, ReportedEnd(SUPERVISOR, NO_CLOCK), f"mission ended by the supervisor: {NO_CLOCK}"),
-        ("aborted", SIGINT, ReportedEnd(OPERATOR, "Ctrl-C"), "mission aborted by the operator: Ctrl-C"),
-        ("aborted", SIGINT, ReportedEnd(SIGNAL, "SIGTERM to alula run"), "mission aborted from outside: SIGTERM to alula run"),
+        ("aborted", SIGINT, ReportedAbort(SUPERVISOR, NO_CLOCK), f"mission ended by the supervisor: {NO_CLOCK}"),
+        ("aborted", SIGINT, ReportedAbort(OPERATOR, "Ctrl-C"), "mission aborted by the operator: Ctrl-C"),
+        ("aborted", SIGINT, ReportedAbort(SIGNAL, "SIGTERM to alula run"), "mission aborted from outside: SIGTERM to alula run"),
         ("aborted", SIGTERM, None, "mission aborted from outside: told to end by SIGTERM"),
         ("aborted", "aborted by the operator", None, "mission aborted by the operator"),
         ("aborted", "the tree raised ValueError: x", None, "mission aborted: the tree raised ValueError: x"),
-        (None, None, ReportedEnd(SUPERVISOR, "uav_simulator died"), "mission ended by the supervisor: uav_simulator died"),
-        ("running", None, ReportedEnd(FRONT, "the supervisor died"), "mission ended by the front: the supervisor died"),
+        (None, None, ReportedAbort(SUPERVISOR, "uav_simulator died"), "mission ended by the supervisor: uav_simulator died"),
+        ("running", None, ReportedAbort(FRONT, "the supervisor died"), "mission ended by the front: the supervisor died"),
     ],
 )
 def test_whoever_ends_a_mission_is_told_by_name(
-    outcome: str | None, reason: str | None, ended: ReportedEnd | None, told: str, tmp_path: Path
+    outcome: str | None, reason: str | None, ended: ReportedAbort | None, told: str, tmp_path: Path
 ):
     if ended is not None:
-        note_end(tmp_path, ended)
-        note_end(tmp_path, ReportedEnd(OPERATOR, "who came later"))
+        note_abort(tmp_path, ended)
+        note_abort(tmp_path, ReportedAbort(OPERATOR, "who came later"))
     for said in (reason, true_reason(reason, ended)):  # as the mission says it, and as the summary does
         lines = verdict_lines({"outcome": outcome, "reason": said, "mission_exit": 1, "landed": None}, [], tmp_path)
         assert lines == ["", told]
 
 
 def test_a_mission_that_had_come_to_its_end_keeps_its_outcome(tmp_path: Path) -> None:
-    note_end(tmp_path, ReportedEnd(OPERATOR, "Ctrl-C"))
+    note_abort(tmp_path, ReportedAbort(OPERATOR, "Ctrl-C"))
     lines = verdict_lines({"outcome": "accomplished", "landed": None}, [], tmp_path)
     assert lines == ["", "mission accomplished", "  the run was aborted by the operator: Ctrl-C"]
 
@@ -185,16 +185,16 @@ def test_what_a_run_still_waited_for_at_its_end_is_told(tmp_path: Path) -> None:
 
 
 def test_a_folder_that_is_gone_or_holds_nonsense_ends_nothing_else(tmp_path: Path) -> None:
-    note_end(tmp_path / "gone", ReportedEnd(OPERATOR, "Ctrl-C"))
-    assert read_end(tmp_path / "gone") is None
+    note_abort(tmp_path / "gone", ReportedAbort(OPERATOR, "Ctrl-C"))
+    assert read_abort(tmp_path / "gone") is None
     for nonsense in ("", "[]", '{"kind": "end", "by": 1}', '{"kind": "end", "who": "x"}'):
         (tmp_path / FILE).write_text(nonsense, encoding="utf-8")
-        assert read_end(tmp_path) is None
+        assert read_abort(tmp_path) is None
 
 
 def test_a_signal_to_the_command_is_the_operators_when_it_is_ctrl_c() -> None:
-    assert ended_by_signal(signal.SIGINT) == ReportedEnd(OPERATOR, "Ctrl-C")
-    assert ended_by_signal(signal.SIGHUP) == ReportedEnd(SIGNAL, "SIGHUP to alula run")
+    assert aborted_by_signal(signal.SIGINT) == ReportedAbort(OPERATOR, "Ctrl-C")
+    assert aborted_by_signal(signal.SIGHUP) == ReportedAbort(SIGNAL, "SIGHUP to alula run")
 
 
 def test_an_outcome_is_told_with_its_reason() -> None:
@@ -203,14 +203,14 @@ def test_an_outcome_is_told_with_its_reason() -> None:
 
 
 def test_the_summary_of_a_run_that_came_to_its_limit_says_so(tmp_path: Path) -> None:
-    note_end(tmp_path, ReportedEnd(SUPERVISOR, "its limit of 30 s is over"))
+    note_abort(tmp_path, ReportedAbort(SUPERVISOR, "its limit of 30 s is over"))
     facts = RunFacts("mapping", 1, tmp_path, (), (), 1)
     history = SimpleNamespace(mission={"outcome": "aborted", "reason": SIGINT})
     assert read_outcome(facts, history, Problems()) == ("aborted", "ended by the supervisor: its limit of 30 s is over")
 
 
-KILLED = ReportedEnd(SUPERVISOR, "mission died (signal SIGKILL)", 30.0)
-UNHEARD = ReportedEnd(SUPERVISOR, "ros_bridge died (exit code 1) and stayed dead", 41.0)
+KILLED = ReportedAbort(SUPERVISOR, "mission died (signal SIGKILL)", 30.0)
+UNHEARD = ReportedAbort(SUPERVISOR, "ros_bridge died (exit code 1) and stayed dead", 41.0)
 
 
 @pytest.mark.parametrize("damage", [b"", b"\x05cut"])
@@ -219,7 +219,7 @@ UNHEARD = ReportedEnd(SUPERVISOR, "ros_bridge died (exit code 1) and stayed dead
     [
         (KILLED, 1, KILLED.sentence(), "mission ended by the supervisor: mission died (signal SIGKILL)"),
         (UNHEARD, 1, UNHEARD.sentence(), "mission ended by the supervisor: ros_bridge died (exit code 1) and stayed dead"),
-        (ReportedEnd(OPERATOR, "Ctrl-C"), 1, "aborted by the operator: Ctrl-C", "mission aborted by the operator: Ctrl-C"),
+        (ReportedAbort(OPERATOR, "Ctrl-C"), 1, "aborted by the operator: Ctrl-C", "mission aborted by the operator: Ctrl-C"),
         (
             None,
             1,
@@ -229,13 +229,13 @@ UNHEARD = ReportedEnd(SUPERVISOR, "ros_bridge died (exit code 1) and stayed dead
     ],
 )
 def test_a_mission_that_could_not_tell_its_end_was_aborted_by_whoever_ended_it(
-    ended: ReportedEnd | None, code: int, reason: str, told: str, damage: bytes, tmp_path: Path
+    ended: ReportedAbort | None, code: int, reason: str, told: str, damage: bytes, tmp_path: Path
 ) -> None:
     RecordWriter(tmp_path / RECORD).write(MISSION, 0, {"outcome": "running", "reason": "", "lift_off_s": None, "joined": {"base": 8}})
     with (tmp_path / RECORD).open("ab") as file:
         file.write(damage)
     if ended is not None:
-        note_end(tmp_path, ended)
+        note_abort(tmp_path, ended)
     for _ in range(2):
         close_account(tmp_path, code)
         account = last_account(tmp_path)
@@ -250,6 +250,6 @@ def test_a_mission_that_could_not_tell_its_end_was_aborted_by_whoever_ended_it(
 def test_the_account_of_a_mission_that_had_come_to_its_end_stays(account: dict[str, str], code: int, tmp_path: Path) -> None:
     if account:
         RecordWriter(tmp_path / RECORD).write(MISSION, 0, account)
-    note_end(tmp_path, KILLED)
+    note_abort(tmp_path, KILLED)
     close_account(tmp_path, code)
     assert last_account(tmp_path) == account

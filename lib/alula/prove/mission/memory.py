@@ -8,7 +8,7 @@ from itertools import compress
 from operator import ne
 from typing import NamedTuple
 
-from alula.missions.director import Director, DirectorMemory, End, Outcome
+from alula.missions.director import Director, DirectorMemory, MissionResult, Outcome
 from alula.missions.skills import SkillNode
 from alula.model.model import Skillset
 from alula.prove.mission.ahead import RUNS, Ahead, Looking
@@ -308,7 +308,7 @@ class Keeper:
         body.director.recall(
             DirectorMemory(
                 memory.phase,
-                None if memory.end is None else End(memory.end),
+                None if memory.end is None else MissionResult(memory.end),
                 0.0 if memory.started else None,
                 self._thawed(memory.waits),  # type: ignore[arg-type]
                 memory.stops,

@@ -13,7 +13,7 @@ from dataclasses import dataclass, replace
 from functools import partial
 from pathlib import Path
 
-from alula.missions.director import START_TIMEOUT_S, End, Outcome
+from alula.missions.director import START_TIMEOUT_S, MissionResult, Outcome
 from alula.missions.driver import MissionDriver
 from alula.missions.mission_file import MissionFile
 from alula.missions.part import MissionPart
@@ -54,7 +54,7 @@ class LeftError(Exception):
 class Played:
     """The result of a play: the mission's end, where it left the run (empty: nowhere), and the outputs in the mission's account."""
 
-    end: End
+    end: MissionResult
     left: str
     simulated_s: float
     facts: Mapping[str, object]
@@ -364,6 +364,8 @@ class _Player:
 
     def finish(self, left: str) -> Played:
         """Close the record, and return the result; ``left`` is where the mission left the run."""
-        end = self._driver.end or End(Outcome.ABORTED, f"it left the counterexample {left}" if left else "the counterexample ends here")
+        end = self._driver.end or MissionResult(
+            Outcome.ABORTED, f"it left the counterexample {left}" if left else "the counterexample ends here"
+        )
         self._driver.finish(end)
         return Played(end, left, self.world.now_s, self._facts())

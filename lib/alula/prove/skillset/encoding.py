@@ -16,7 +16,7 @@ from dd import cudd
 from alula.model.expressions import Expression, ResourceIs, atoms
 from alula.model.model import Effect, Event, Resource, Skill, Skillset
 from alula.model.overapproximation import Breaker
-from alula.model.steps import Cause, ends_of
+from alula.model.steps import Cause, outcomes_of
 from alula.prove.limits import Deadline
 from alula.prove.skillset.abstract import Abstraction
 from alula.prove.skillset.diagrams import ENDED, Encoded, Update, Within, bits, broken_name, runs_name
@@ -154,7 +154,7 @@ def _starts(model: Encoded, skill: Skill) -> None:
 
 def _ends(model: Encoded, skill: Skill) -> None:
     running = model.runs(skill.name)
-    for end in ends_of(skill):
+    for end in outcomes_of(skill):
         applies = model.applies(end.effect)
         _end_faults(model, end_key(skill.name, end.name), running, end.effect, applies, end.postcondition)
         # An end whose effect does not apply is a failure, which does what an interruption does.

@@ -18,7 +18,7 @@ from alula.model.errors import EffectError
 from alula.model.execution_state import ExecutionState
 from alula.model.model import Effect, Event, Skill, Skillset
 from alula.model.situation import Entered, Running, Situation, Step
-from alula.model.steps import Cause, PossibleSteps, Stimulus, ends_of, take
+from alula.model.steps import Cause, PossibleSteps, Stimulus, outcomes_of, take
 from alula.prove.skillset.abstract import Abstraction
 from alula.prove.skillset.local import end_key
 
@@ -75,7 +75,7 @@ class TransitionSystem:
         self._effects = {
             (end.cause, skill.name, end.name): (skill, end.effect, end_key(skill.name, end.name))
             for skill in self.skillset.skills
-            for end in ends_of(skill)
+            for end in outcomes_of(skill)
         }
         self._births = abstraction.births
         self._startable = [s for s in self.skillset.skills if part is None or s.name in part.skills]

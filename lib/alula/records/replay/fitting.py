@@ -15,7 +15,7 @@ from alula.common.record import EVENTS
 from alula.mock import Behaviour, Ending, Rule
 from alula.model.execution_state import ExecutionState
 from alula.records.replay.comparison import alike
-from alula.records.replay.recorded import Recorded, RecordedEnd
+from alula.records.replay.recorded import Recorded, RecordedExecution
 
 
 def fitted(recorded: Recorded) -> Behaviour:
@@ -44,7 +44,7 @@ def with_untold(recorded: Recorded, behaviour: Behaviour) -> Behaviour:
     return of(behaviour)
 
 
-def _rule(answer: RecordedEnd, duration_s: float) -> Rule:
+def _rule(answer: RecordedExecution, duration_s: float) -> Rule:
     inputs = dict(answer.inputs)
 
     def same(names: Mapping[str, Any]) -> bool:

@@ -50,8 +50,8 @@ class Knowledge:
 
 
 @dataclass(frozen=True)
-class RecordedEnd:
-    """What became of an execution, and when."""
+class RecordedExecution:
+    """An execution of a record: what became of it, and when."""
 
     skillset: str
     skill: str
@@ -87,7 +87,7 @@ class Recorded:
     entries: Sequence[Entry]
     mission: Mapping[str, Any]
     decisions: Sequence[RecordedDecision]
-    answers: Mapping[str, RecordedEnd]
+    answers: Mapping[str, RecordedExecution]
     whole: bool
 
     @property
@@ -207,9 +207,9 @@ def _decisions(file: Path, entries: Iterable[Entry]) -> Iterator[RecordedDecisio
             yield decision
 
 
-def _answers(file: Path, entries: Iterable[Entry]) -> dict[str, RecordedEnd]:
+def _answers(file: Path, entries: Iterable[Entry]) -> dict[str, RecordedExecution]:
     """Put together what is known of each execution."""
-    answers: dict[str, RecordedEnd] = {}
+    answers: dict[str, RecordedExecution] = {}
     for entry in entries:
         with _of(file, entry):
             event = event_of(entry) if entry.topic == EVENTS else None
@@ -218,14 +218,14 @@ def _answers(file: Path, entries: Iterable[Entry]) -> dict[str, RecordedEnd]:
     return answers
 
 
-def _advance(before: RecordedEnd | None, event: ExecutionEvent) -> RecordedEnd:
+def _advance(before: RecordedExecution | None, event: ExecutionEvent) -> RecordedExecution:
     inputs = event.inputs if isinstance(event.inputs, Mapping) else {}
-    answer = before or RecordedEnd(event.skillset, event.skill, event.id, dict(inputs), event.stamp_s)
+    answer = before or RecordedExecution(event.skillset, event.skill, event.id, dict(inputs), event.stamp_s)
     if answer.state.terminal:
         return answer
     ended_s = event.stamp_s if event.state.terminal else None
     values = {"state": event.state, "result": event.result, "message": event.message, "outputs": dict(event.outputs), "ended_s": ended_s}
-    return RecordedEnd(**{**vars(answer), **values})
+    return RecordedExecution(**{**vars(answer), **values})
 
 
 def _short(value: Any) -> str:

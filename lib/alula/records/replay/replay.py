@@ -17,7 +17,7 @@ from typing import Any
 from alula.common.faults import FaultRequest
 from alula.common.plain import to_plain
 from alula.common.record import OPERATOR, TICKS, Entry
-from alula.missions.director import Director, End, Outcome
+from alula.missions.director import Director, MissionResult, Outcome
 from alula.missions.driver import MissionDriver
 from alula.missions.pausing import PauseRefusedError
 from alula.missions.plan import MissionPlan
@@ -47,7 +47,7 @@ class Result:
 
     decisions: Sequence[RecordedDecision]
     difference: Difference | None
-    end: End | None
+    end: MissionResult | None
     notes: Sequence[str]
     simulated_s: float
     wall_s: float
@@ -126,7 +126,7 @@ class Replay:
                 break
         if self._may_go_on():
             self._after_the_record()
-        self._driver.finish(self.director.end or End(Outcome.RUNNING))
+        self._driver.finish(self.director.end or MissionResult(Outcome.RUNNING))
         notes = [*self._world.errors, *self.vehicle.host.notes]
         return Result(
             decisions=self.decisions,

@@ -12,7 +12,7 @@ from alula.common.record import DATA, EVENTS, REPORTS, Entry
 from alula.mock import NEVER, Behaviour, Choice, Ending, LocalMockHost, MockRobot, MockSkill, MockState, Rule, serve_robot
 from alula.model.execution_state import ExecutionState
 from alula.model.model import Skill, Skillset
-from alula.records.replay.recorded import EXTERN, Recorded, RecordedDecision, RecordedEnd, event_of
+from alula.records.replay.recorded import EXTERN, Recorded, RecordedDecision, RecordedExecution, event_of
 from alula.runtime.core.events import EngineEvent, TransitionEvent
 from alula.runtime.core.execution import Execution
 from alula.runtime.handle import SkillHandle
@@ -149,7 +149,7 @@ class RecordedSkills(ReplayedRobot):
         self._held = {str(event.get("id")) for event in events if event.get("state") == ExecutionState.PAUSED.value}
         self._here: dict[str, str] = {}
         """The execution of this replay that has an id in the record."""
-        self._calls: dict[str, deque[RecordedEnd | None]] = {}
+        self._calls: dict[str, deque[RecordedExecution | None]] = {}
         self._running: dict[str, tuple[Execution, MockSkill]] = {}
         self._progress: dict[str, float] = {}
         self._passed: set[str] = set()
@@ -170,7 +170,7 @@ class RecordedSkills(ReplayedRobot):
             self._here[answer.id] = execution_id
         self._calls.setdefault(f"{skillset}.{skill}", deque()).append(answer)
 
-    def next_answer(self, name: str) -> RecordedEnd | None:
+    def next_answer(self, name: str) -> RecordedExecution | None:
         """Return the recorded outcome of the next call of a skill; None where a mock decides."""
         calls = self._calls.get(name)
         return calls.popleft() if calls else None

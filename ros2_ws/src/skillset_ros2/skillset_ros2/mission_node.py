@@ -27,7 +27,7 @@ from std_srvs.srv import SetBool, Trigger
 
 from alula.common.fast_dds import leave, small_segment
 from alula.common.signals import on_end_signal
-from alula.missions.director import EXIT_CODES, START_TIMEOUT_S, End, Outcome
+from alula.missions.director import EXIT_CODES, START_TIMEOUT_S, MissionResult, Outcome
 from alula.missions.driver import TICK_PERIOD_S, MissionDriver
 from alula.missions.pausing import PauseRefusedError
 from alula.missions.plan import InputError, MissionPlan
@@ -121,7 +121,7 @@ class MissionNode(Node):  # type: ignore[misc]  # rclpy is not typed
             self._ticks.timer_period_ns = period_ns
             self._ticks.reset()
 
-    def finish(self, end: End) -> None:
+    def finish(self, end: MissionResult) -> None:
         """Write what is left to write."""
         self.driver.show(self._publish_tree)
         self.driver.finish(end)
@@ -189,7 +189,7 @@ class MissionNode(Node):  # type: ignore[misc]  # rclpy is not typed
         return response
 
 
-def tick_to_the_end(node: MissionNode, signals: list[signal.Signals]) -> End:
+def tick_to_the_end(node: MissionNode, signals: list[signal.Signals]) -> MissionResult:
     """Tick until the mission is over; ``signals`` grows when the process receives a signal to end."""
     executor = NodeExecutor()
     executor.add_node(node)

@@ -1,4 +1,4 @@
-"""Who ended a run before its mission did, and why, the first entry counts; and the account of a mission that could not tell its end."""
+"""Who aborted a run, and why: the first entry counts; and the account of a mission that could not tell its end."""
 
 from __future__ import annotations
 
@@ -27,8 +27,8 @@ NO_OWN_END = "the mission did not tell how it ended"
 
 
 @dataclass(frozen=True)
-class ReportedEnd:
-    """``why`` in words for a person; ``when_s``: absolute mission clock, None where it is not known."""
+class ReportedAbort:
+    """Who aborted a run: ``why`` in words for a person; ``when_s``: absolute mission clock, None where it is not known."""
 
     by: str
     why: str
@@ -40,17 +40,19 @@ class ReportedEnd:
         return f"{told.get(self.by, f'ended by the {self.by}')}: {self.why}"
 
 
-def ended_by_signal(number: signal.Signals | None) -> ReportedEnd:
+def aborted_by_signal(number: signal.Signals | None) -> ReportedAbort:
     """Return what a signal to ``alula run`` means: SIGINT is the operator's Ctrl-C."""
-    return ReportedEnd(SIGNAL, f"{number.name} to alula run") if number not in {None, signal.SIGINT} else ReportedEnd(OPERATOR, "Ctrl-C")
+    return (
+        ReportedAbort(SIGNAL, f"{number.name} to alula run") if number not in {None, signal.SIGINT} else ReportedAbort(OPERATOR, "Ctrl-C")
+    )
 
 
-def note_end(out: Path, ended: ReportedEnd) -> None:
-    """Write down who ends the run; it counts unless somebody else has done so already."""
+def note_abort(out: Path, ended: ReportedAbort) -> None:
+    """Write down who aborts the run; it counts unless somebody else has done so already."""
     note(out, END, asdict(ended))
 
 
-def true_reason(reason: str | None, ended: ReportedEnd | None) -> str | None:
+def true_reason(reason: str | None, ended: ReportedAbort | None) -> str | None:
     """Return why a mission was aborted: who ended the run in place of the signal that the mission got; the mission's reason otherwise."""
     return ended.sentence() if ended is not None and (reason or "").startswith(TOLD_TO_END) else reason
 
@@ -63,11 +65,11 @@ def with_dead(reason: str | None, died: Sequence[Death]) -> str | None:
     return re.sub(rf"^{CLOCK_STANDS}( \([^)]*\))?", lambda _: f"{CLOCK_STANDS}: {gone}", reason)
 
 
-def read_end(out: Path) -> ReportedEnd | None:
-    """Return who ended the run; None: nobody did, or it is not known."""
+def read_abort(out: Path) -> ReportedAbort | None:
+    """Return who aborted the run; None: nobody did, or it is not known."""
     for values in read(out, END):
         with contextlib.suppress(TypeError):
-            return ReportedEnd(**values)
+            return ReportedAbort(**values)
     return None
 
 
@@ -88,7 +90,7 @@ def close_account(out: Path, mission_exit: int | None) -> None:
     told = last_account(out)
     if told.get("outcome") != RUNNING or mission_exit == 0:
         return
-    ended = read_end(out)
+    ended = read_abort(out)
     code = "" if mission_exit is None else f" with exit code {mission_exit}"
     why = f"the mission's process ended{code} before the mission did" if ended is None else ended.sentence()
     # An account before the departure does not tell that there was none.
