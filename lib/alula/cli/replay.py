@@ -25,7 +25,7 @@ from alula.common.files import json_line, write_text
 from alula.common.record import FILE
 from alula.records.errors import AnalysisError
 from alula.records.expectations import Checked, check, junit, load_expectations
-from alula.records.replay.deciding import Conditions, MakeAnswers, decide, read_mission
+from alula.records.replay.deciding import Conditions, MakeRobot, decide, read_mission
 from alula.records.replay.outputs import same, trace_of, verdict, write_out
 from alula.records.replay.recorded import Recorded, ReplayError, load
 from alula.records.replay.replay import Result
@@ -57,7 +57,7 @@ class Arguments(argparse.Namespace):
 class Below:
     """What answers a mission below its skills, and which failures and settings are then left for the mission itself."""
 
-    answers: MakeAnswers | None
+    make_robot: MakeRobot | None
     fail: Sequence[str]
     settings: Sequence[str]
 
@@ -116,7 +116,7 @@ def decide_again(given: Arguments, recorded: Recorded, folder: Path, out: Path |
     mission = read_mission(recorded, tree=given.tree, models=given.model, behaviour=given.behaviour)
     depth = depths.get(given.depth)
     below = Below(None, given.fail, given.settings) if depth is None else depth.below(given, recorded, folder)
-    return decide(mission, Conditions(below.answers, below.fail, below.settings, go_on=given.on, rate=given.rate, out=out))
+    return decide(mission, Conditions(below.make_robot, below.fail, below.settings, go_on=given.on, rate=given.rate, out=out))
 
 
 def tell(recorded: Recorded, result: Result, *, as_json: bool) -> None:

@@ -33,9 +33,9 @@ class RecordedMission:
     behaviour: Behaviour
 
 
-Answers = tuple[ReplayedRobot, Iterable[Entry]]
-"""The entries that are inputs of the tree, in the order of time."""
-MakeAnswers = Callable[[RecordedMission], Answers]
+RobotAndInputs = tuple[ReplayedRobot, Iterable[Entry]]
+"""The robot under the tree, and the entries that are inputs of the tree, in the order of time."""
+MakeRobot = Callable[[RecordedMission], RobotAndInputs]
 
 
 @dataclass(frozen=True)
@@ -43,7 +43,8 @@ class Conditions:
     """Under which conditions it is decided again.
 
     Attributes:
-        answers: makes what answers the tree, such as the functional layer's bag under the real hooks; None: the skills end as they did.
+        make_robot: makes the robot under the tree and its inputs, such as real hooks over the functional layer's bag; None: the skills end
+            as they did.
         fail: what did not fail then, as on the command line.
         settings: other parameters of the mission, ``NAME=VALUE``.
         go_on: go on over mocks after the first difference.
@@ -51,7 +52,7 @@ class Conditions:
         out: folder of the replay's own record; None: it leaves none.
     """
 
-    answers: MakeAnswers | None = None
+    make_robot: MakeRobot | None = None
     fail: Sequence[str] = ()
     settings: Sequence[str] = ()
     go_on: bool = False
@@ -85,20 +86,18 @@ def decide(mission: RecordedMission, conditions: Conditions) -> Result:
     recorded, plan, out = mission.recorded, mission.plan, conditions.out
     parameters = parameters_for(recorded, plan, conditions.settings)
     faults = faults_for(mission.behaviour, conditions.fail)
-    vehicle, entries = (conditions.answers or recorded_skills)(mission)
+    robot, entries = (conditions.make_robot or recorded_skills)(mission)
     for fault in faults:
-        vehicle.fail(fault)
+        robot.fail(fault)
     make_record = None
     if out is not None:
         _make_folder(out)
         make_record = lambda clock_ns: MissionRecord(out, plan, clock_ns, parameters)  # noqa: E731
-    replay = Replay(
-        recorded, vehicle, entries, plan, parameters=parameters, go_on=conditions.go_on, record=make_record, rate=conditions.rate
-    )
+    replay = Replay(recorded, robot, entries, plan, parameters=parameters, go_on=conditions.go_on, record=make_record, rate=conditions.rate)
     return replay.run()
 
 
-def recorded_skills(mission: RecordedMission) -> Answers:
+def recorded_skills(mission: RecordedMission) -> RobotAndInputs:
     """Have the skills end as they did."""
     recorded = mission.recorded
     return RecordedSkills(mission.skillsets, recorded, mission.behaviour, start_s=recorded.begun_s), recorded.entries

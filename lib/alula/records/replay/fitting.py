@@ -21,9 +21,9 @@ from alula.records.replay.recorded import Recorded, RecordedExecution
 def fitted(recorded: Recorded) -> Behaviour:
     """Return the mock rules of a record; of several outcomes for the same inputs the last one counts."""
     rules: dict[tuple[str, str], list[Rule]] = defaultdict(list)
-    for answer in reversed(list(recorded.answers.values())):
-        if answer.state is ExecutionState.TERMINATED and answer.duration_s is not None:
-            rules[answer.skillset, answer.skill].append(_rule(answer, answer.duration_s))
+    for execution in reversed(list(recorded.executions.values())):
+        if execution.state is ExecutionState.TERMINATED and execution.duration_s is not None:
+            rules[execution.skillset, execution.skill].append(_rule(execution, execution.duration_s))
     return Behaviour(rules={place: tuple(found) for place, found in rules.items()})
 
 
@@ -44,14 +44,14 @@ def with_untold(recorded: Recorded, behaviour: Behaviour) -> Behaviour:
     return of(behaviour)
 
 
-def _rule(answer: RecordedExecution, duration_s: float) -> Rule:
-    inputs = dict(answer.inputs)
+def _rule(execution: RecordedExecution, duration_s: float) -> Rule:
+    inputs = dict(execution.inputs)
 
     def same(names: Mapping[str, Any]) -> bool:
         return all(alike(_plain(names.get(name)), value) for name, value in inputs.items())
 
-    ending = Ending(results=((answer.result, 1.0),), message=answer.message)
-    return Rule(when=same if inputs else None, delay=duration_s, ending=ending, outputs=dict(answer.outputs) or None)
+    ending = Ending(results=((execution.result, 1.0),), message=execution.message)
+    return Rule(when=same if inputs else None, delay=duration_s, ending=ending, outputs=dict(execution.outputs) or None)
 
 
 def _plain(value: Any) -> Any:

@@ -1,4 +1,4 @@
-"""A recorded mission: what the robot answered and when, what the tree decided, and what it knew then."""
+"""A recorded mission: what its executions came to and when, what the tree decided, and what it knew then."""
 
 from __future__ import annotations
 
@@ -79,7 +79,7 @@ class Recorded:
         entries: all of it, in the order in which the mission came to know.
         mission: what was asked for and, unless the record breaks off, how it ended.
         decisions: what the tree asked for, in order.
-        answers: by the id of the execution.
+        executions: by the id of the execution.
         whole: whether the record was ended as records are.
     """
 
@@ -87,7 +87,7 @@ class Recorded:
     entries: Sequence[Entry]
     mission: Mapping[str, Any]
     decisions: Sequence[RecordedDecision]
-    answers: Mapping[str, RecordedExecution]
+    executions: Mapping[str, RecordedExecution]
     whole: bool
 
     @property
@@ -167,7 +167,7 @@ def load(path: Path) -> Recorded:
     if not missions:
         raise ReplayError(f"{file}: there is no mission in it")
     _check(file, entries)
-    return Recorded(file, entries, missions[-1], list(_decisions(file, entries)), _answers(file, entries), follower.ended)
+    return Recorded(file, entries, missions[-1], list(_decisions(file, entries)), _executions(file, entries), follower.ended)
 
 
 def event_of(entry: Entry) -> EngineEvent:
@@ -207,25 +207,25 @@ def _decisions(file: Path, entries: Iterable[Entry]) -> Iterator[RecordedDecisio
             yield decision
 
 
-def _answers(file: Path, entries: Iterable[Entry]) -> dict[str, RecordedExecution]:
+def _executions(file: Path, entries: Iterable[Entry]) -> dict[str, RecordedExecution]:
     """Put together what is known of each execution."""
-    answers: dict[str, RecordedExecution] = {}
+    executions: dict[str, RecordedExecution] = {}
     for entry in entries:
         with _of(file, entry):
             event = event_of(entry) if entry.topic == EVENTS else None
         if isinstance(event, ExecutionEvent):
-            answers[event.id] = _advance(answers.get(event.id), event)
-    return answers
+            executions[event.id] = _advance(executions.get(event.id), event)
+    return executions
 
 
 def _advance(before: RecordedExecution | None, event: ExecutionEvent) -> RecordedExecution:
     inputs = event.inputs if isinstance(event.inputs, Mapping) else {}
-    answer = before or RecordedExecution(event.skillset, event.skill, event.id, dict(inputs), event.stamp_s)
-    if answer.state.terminal:
-        return answer
+    execution = before or RecordedExecution(event.skillset, event.skill, event.id, dict(inputs), event.stamp_s)
+    if execution.state.terminal:
+        return execution
     ended_s = event.stamp_s if event.state.terminal else None
     values = {"state": event.state, "result": event.result, "message": event.message, "outputs": dict(event.outputs), "ended_s": ended_s}
-    return RecordedExecution(**{**vars(answer), **values})
+    return RecordedExecution(**{**vars(execution), **values})
 
 
 def _short(value: Any) -> str:

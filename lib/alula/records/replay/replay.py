@@ -1,6 +1,6 @@
 """Replay a recorded mission in virtual time, without ROS: its tree, or another, gets the recorded inputs at the recorded ticks.
 
-1. What the record says of the vehicle happens under real managers in virtual time (``vehicle``, ``functional``).
+1. What the record says of the robot happens under real managers in virtual time (``robot``, ``functional``).
 2. The tree is ticked when it was ticked.
 3. What it asks for is held against what it asked for. As long as both agree, the record answers.
 4. At the first difference the replay stops; or it goes on over mocks, the tree ticked at 10 Hz and whenever something happens.
@@ -75,8 +75,8 @@ class Replay:
 
     Args:
         recorded: what is replayed.
-        vehicle: what answers the tree, serving the plan's skillsets.
-        entries: what the vehicle and the tree are told, in order.
+        robot: the one under the tree, serving the plan's skillsets.
+        entries: what the robot and the tree receive, in order.
         plan: the mission, its own or another.
         parameters: of the mission.
         go_on: go on after the first difference.
@@ -87,7 +87,7 @@ class Replay:
     def __init__(
         self,
         recorded: Recorded,
-        vehicle: ReplayedRobot,
+        robot: ReplayedRobot,
         entries: Iterable[Entry],
         plan: MissionPlan,
         *,
@@ -101,17 +101,17 @@ class Replay:
         self._go_on = go_on
         self._rate = rate
         self._ticked = recorded.started
-        self.vehicle = vehicle
+        self.robot = robot
         self.decisions: list[RecordedDecision] = []
-        self._world = self.vehicle.world
+        self._world = self.robot.world
         clock_ns = lambda: self._world.clock.now_ns  # noqa: E731
         self._record = None if record is None else record(clock_ns)
-        client = lambda name, wake: ReplayClient(self._world.client(name), wake, self, vehicle.handles)  # noqa: E731
+        client = lambda name, wake: ReplayClient(self._world.client(name), wake, self, robot.handles)  # noqa: E731
         self._driver = MissionDriver(plan, client, clock_ns, parameters, record=self._record, soon=self._world.clock.soon)
         self._driver.remembers = True
         self._driver.woken_by_events = False  # while the record says when it is ticked
         self._comparison = Comparison(recorded, self._knowledge)
-        vehicle.differs = lambda why: self._comparison.told(why, self._world.now_s)
+        robot.differs = lambda why: self._comparison.told(why, self._world.now_s)
         self._world.on_event(self._on_event)
 
     def run(self) -> Result:
@@ -127,7 +127,7 @@ class Replay:
         if self._may_go_on():
             self._after_the_record()
         self._driver.finish(self.director.end or MissionResult(Outcome.RUNNING))
-        notes = [*self._world.errors, *self.vehicle.host.notes]
+        notes = [*self._world.errors, *self.robot.host.notes]
         return Result(
             decisions=self.decisions,
             difference=self._comparison.difference,
@@ -136,8 +136,8 @@ class Replay:
             simulated_s=self._world.now_s,
             wall_s=time.monotonic() - begun,
             lift_off_s=None if self._record is None else self._record.departure_s,
-            faults=self.vehicle.faults,
-            first_s=dict(self.vehicle.robot.faults),
+            faults=self.robot.faults,
+            first_s=dict(self.robot.robot.faults),
         )
 
     # --- what the record says ----------------------------------------------------------------------------------------
@@ -162,7 +162,7 @@ class Replay:
             if entry.value.get("by") == "mission":
                 self._obey(str(entry.value.get("command")), str(entry.value.get("reason", "")))
         else:
-            self.vehicle.take(entry, diverged=self._comparison.difference is not None)
+            self.robot.take(entry, diverged=self._comparison.difference is not None)
 
     def _obey(self, command: str, reason: str) -> None:
         """Give the mission the recorded commands of the operator, where it can obey them now."""
@@ -178,7 +178,7 @@ class Replay:
             self._comparison.over(self._world.now_s, whole=self._recorded.whole and self.director.end is None)
         if self._go_on and self.director.end is None:
             self._set_free()
-            self.vehicle.over()
+            self.robot.over()
             self._world.run_until(lambda: self.director.end is not None, timeout_s=LIMIT_S)
 
     # --- the tree ----------------------------------------------------------------------------------------------------
@@ -209,9 +209,9 @@ class Replay:
         now = RecordedDecision(len(self.decisions) + 1, self._world.now_s, kind, skillset, skill, execution_id, said)
         if self._may_go_on():  # else this is the rest of the tick that has decided otherwise
             self.decisions.append(now)
-        then = self._comparison.decided(now, self.vehicle.recorded_id(execution_id))
+        then = self._comparison.decided(now, self.robot.recorded_id(execution_id))
         if kind == "start":
-            self.vehicle.requested(skillset, skill, execution_id, then)
+            self.robot.requested(skillset, skill, execution_id, then)
         if self._record is not None:
             self._record.decision(kind, skillset, skill, execution_id, inputs)
 

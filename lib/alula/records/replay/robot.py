@@ -1,4 +1,4 @@
-"""The recorded vehicle under the tree: real managers in virtual time; below them what was recorded, and mocks where nothing was."""
+"""The recorded robot under the tree: real managers in virtual time; below them what was recorded, and mocks where nothing was."""
 
 from __future__ import annotations
 
@@ -23,41 +23,41 @@ class ReplayedSkill(MockSkill):
     """The hooks of one skill: a call that was recorded is answered by the record, any other one by the mock's rules."""
 
     def __init__(
-        self, vehicle: RecordedSkills, state: MockState, skillset: str, skill: Skill, rules: Sequence[Rule], chance: random.Random
+        self, skills: RecordedSkills, state: MockState, skillset: str, skill: Skill, rules: Sequence[Rule], chance: random.Random
     ) -> None:
         super().__init__(state, skillset, skill, rules, chance)
-        self._vehicle = vehicle
+        self._skills = skills
 
     def choose(self, inputs: object) -> Choice:
         """Let the record end the call, where it does; the rules still say what the call moves."""
         choice = super().choose(inputs)
-        answer = self._vehicle.next_answer(".".join(self.place))
-        if answer is None:
+        recorded = self._skills.next_execution(".".join(self.place))
+        if recorded is None:
             return choice
-        by_itself = answer.state is ExecutionState.TERMINATED
-        delay = choice.script.delay if not by_itself or answer.duration_s is None else answer.duration_s
-        refused = answer.state is ExecutionState.NOT_VALIDATED
-        ending = Ending(refuse=answer.message or "refused") if refused else NEVER
+        by_itself = recorded.state is ExecutionState.TERMINATED
+        delay = choice.script.delay if not by_itself or recorded.duration_s is None else recorded.duration_s
+        refused = recorded.state is ExecutionState.NOT_VALIDATED
+        ending = Ending(refuse=recorded.message or "refused") if refused else NEVER
         return Choice(replace(choice.script, delay=delay, ending=ending, progress=0.0, outputs={}, changes=()), "")
 
     def on_dispatch(self, execution: Execution) -> None:
-        """Begin the execution; the vehicle ends it as the record says."""
+        """Begin the execution; the replay ends it as the record says."""
         super().on_dispatch(execution)
-        self._vehicle.dispatched(execution, self)
+        self._skills.dispatched(execution, self)
 
     def progress(self, execution: Execution) -> float:
         """Return the progress that was reported last."""
-        told = self._vehicle.progress_of(execution.id)
+        told = self._skills.progress_of(execution.id)
         return super().progress(execution) if told is None else told
 
     def on_interrupt(self, execution: Execution) -> bool | None:
         """Stop; done when it was done in the record."""
         super().on_interrupt(execution)
-        return False if self._vehicle.stops_later(execution.id) else None
+        return False if self._skills.stops_later(execution.id) else None
 
     def on_pause(self, execution: Execution) -> str | None:
         """Hold where it held in the record."""
-        return "" if self._vehicle.held(execution.id) else super().on_pause(execution)
+        return "" if self._skills.held(execution.id) else super().on_pause(execution)
 
     def on_resume(self, execution: Execution) -> str | None:  # noqa: ARG002
         """Accept: the record says when it ends."""
@@ -143,7 +143,7 @@ class RecordedSkills(ReplayedRobot):
 
     def __init__(self, skillsets: Sequence[Skillset], recorded: Recorded, behaviour: Behaviour, *, start_s: float) -> None:
         super().__init__(behaviour, start_s=start_s)
-        self._answers = recorded.answers
+        self._executions = recorded.executions
         self._reported = recorded.reported
         events = (entry.value for entry in recorded.entries if entry.topic == EVENTS)
         self._held = {str(event.get("id")) for event in events if event.get("state") == ExecutionState.PAUSED.value}
@@ -162,15 +162,15 @@ class RecordedSkills(ReplayedRobot):
 
     def requested(self, skillset: str, skill: str, execution_id: str, then: RecordedDecision | None) -> None:
         """Take note of a request."""
-        answer = None if then is None else self._answers.get(then.id)
-        if answer is not None and not (answer.state.terminal or answer.state.active):
-            answer = None  # the record broke off before anything came of it
-        if answer is not None:
-            self._recorded[execution_id] = answer.id
-            self._here[answer.id] = execution_id
-        self._calls.setdefault(f"{skillset}.{skill}", deque()).append(answer)
+        recorded = None if then is None else self._executions.get(then.id)
+        if recorded is not None and not (recorded.state.terminal or recorded.state.active):
+            recorded = None  # the record broke off before anything came of it
+        if recorded is not None:
+            self._recorded[execution_id] = recorded.id
+            self._here[recorded.id] = execution_id
+        self._calls.setdefault(f"{skillset}.{skill}", deque()).append(recorded)
 
-    def next_answer(self, name: str) -> RecordedExecution | None:
+    def next_execution(self, name: str) -> RecordedExecution | None:
         """Return the recorded outcome of the next call of a skill; None where a mock decides."""
         calls = self._calls.get(name)
         return calls.popleft() if calls else None
@@ -193,7 +193,7 @@ class RecordedSkills(ReplayedRobot):
         recorded_id = self._recorded.get(execution_id)
         if recorded_id is None or recorded_id in self._passed:
             return False
-        return self._answers[recorded_id].state is ExecutionState.INTERRUPTED
+        return self._executions[recorded_id].state is ExecutionState.INTERRUPTED
 
     def held(self, execution_id: str) -> bool:
         """Return whether an execution was paused in the record."""
@@ -247,24 +247,24 @@ class RecordedSkills(ReplayedRobot):
     def _explained(self, skillset: str) -> bool:
         """Return whether an execution of the skillset runs whose course is the recorded one."""
         return any(
-            answer.skillset == skillset and not execution.done
+            recorded.skillset == skillset and not execution.done
             for recorded_id, (execution, _) in self._running.items()
-            if (answer := self._answers[recorded_id]).state is ExecutionState.TERMINATED
+            if (recorded := self._executions[recorded_id]).state is ExecutionState.TERMINATED
         )
 
     def _end(self, recorded_id: str) -> None:
         """End an execution as the record has it; violations and refusals follow from the model by themselves."""
-        answer = self._answers[recorded_id]
+        recorded = self._executions[recorded_id]
         execution, hooks = self._running.get(recorded_id, (None, None))
         if execution is None or hooks is None or execution.done:
             return
-        match answer.state:
+        match recorded.state:
             case ExecutionState.TERMINATED:
                 hooks.forget(execution.id)
-                execution.terminate(answer.result, answer.message, answer.outputs)
+                execution.terminate(recorded.result, recorded.message, recorded.outputs)
             case ExecutionState.INTERRUPTED:
-                execution.interrupted(answer.message)
+                execution.interrupted(recorded.message)
             case ExecutionState.FAILED:
-                execution.fail(answer.message)
+                execution.fail(recorded.message)
             case _:
                 pass

@@ -22,7 +22,7 @@ from alula.mock import NEVER, Behaviour, Choice, MockSkill, follow
 from alula.model.execution_state import ExecutionState
 from alula.model.model import Skillset
 from alula.records.replay.comparison import alike
-from alula.records.replay.deciding import Answers, MakeAnswers, RecordedMission
+from alula.records.replay.deciding import MakeRobot, RecordedMission, RobotAndInputs
 from alula.records.replay.recorded import RecordedDecision, ReplayError
 from alula.records.replay.robot import ReplayedRobot
 from alula.runtime.core.events import EngineEvent, ExecutionEvent
@@ -36,10 +36,10 @@ from skillset_ros2.replay.bag import CALLS, MESSAGE, Call, begin_of, entries_of,
 from skillset_ros2.replay.node import BagNode, RecordedFuture, Subscribers
 
 
-def from_bag(bag: Path) -> MakeAnswers:
+def from_bag(bag: Path) -> MakeRobot:
     """Return what has a bag of the functional layer answer a replay; raises ReplayError, also when it is called."""
 
-    def make(mission: RecordedMission) -> Answers:
+    def make(mission: RecordedMission) -> RobotAndInputs:
         begun_s = begin_of(mission.recorded, bag)
         functions = RecordedFunctions(mission.skillsets, bag, mission.behaviour, start_s=begun_s)
         return functions, entries_of(mission.recorded, bag, functions.topics)
