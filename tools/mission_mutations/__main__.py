@@ -18,8 +18,8 @@ from alula.trees.reading import read_files
 from mission_mutations.flights import Campaigned, Flights
 from mission_mutations.judging import MISSED, Judge, Robot, Verdict
 from mission_mutations.mutants import Mutant, chosen, mutants_of
+from mission_mutations.rendering import by_what, table, table_of_flights
 from mission_mutations.study import Study
-from mission_mutations.telling import by_what, table, table_of_flights
 
 COMMAND = "mission_mutations"
 MAIN = "main_tree_to_execute="

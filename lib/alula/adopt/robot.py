@@ -12,8 +12,8 @@ from alula.adopt.entries import GivenEntry
 from alula.adopt.expected import expected_states
 from alula.adopt.foreign import elements_of, foreign_types, known_registry, make_actions_of_missing_trees, needed
 from alula.adopt.missions import MissionOf, Missions
+from alula.adopt.rendering import decisions, names_of_nodes
 from alula.adopt.skillset import faults_text, mocks_text, model_text, types_text
-from alula.adopt.telling import decisions, names_of_nodes
 from alula.adopt.vocabulary import Vocabulary
 from alula.check.checking import ENDLESS
 from alula.generate.scaffold.skeleton import files_of

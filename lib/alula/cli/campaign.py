@@ -18,9 +18,9 @@ from alula.campaign.failures import ways_to_fail
 from alula.campaign.mocked_scenarios import load_mocked_scenario
 from alula.campaign.plan import MOCKS, Campaign, load_campaign
 from alula.campaign.proved import proved
+from alula.campaign.rendering import as_page, as_text
 from alula.campaign.running import check_live_faults, offer_of, options_of, run
 from alula.campaign.table import ROWS, Row, Table
-from alula.campaign.telling import as_page, as_text
 from alula.cli.table import parse
 from alula.common.files import write_json, write_text
 from alula.common.garbage import collect_seldom

@@ -10,7 +10,7 @@ from pathlib import Path
 from alula.cli.table import parser_of
 from alula.common.files import json_line, write_aside
 from alula.records.comparing import compare, load_side
-from alula.records.comparing.telling import as_dict, lines
+from alula.records.comparing.rendering import as_dict, lines
 from alula.records.errors import AnalysisError
 
 ALIKE, DIFFERENT, UNREADABLE = 0, 1, 2

@@ -17,8 +17,8 @@ from alula.common.scenarios import ScenarioError
 from alula.missions.plan import InputError
 from alula.odds.errors import OddsError
 from alula.odds.odds import changed, odds_of
+from alula.odds.rendering import as_dict, as_svg, as_text
 from alula.odds.robot import graph_of
-from alula.odds.telling import as_dict, as_svg, as_text
 from alula.prove.mission.oracle import UndecidedError
 from alula.records.errors import AnalysisError
 from alula.runtime.core.errors import SkillRuntimeError

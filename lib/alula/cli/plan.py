@@ -19,7 +19,7 @@ from alula.common.robots import find_robot, meaning
 from alula.prove.limits import Deadline
 from alula.repair.errors import RepairError
 from alula.repair.planning import Aim, Planner
-from alula.repair.telling import plan_as_dict, plan_as_text
+from alula.repair.rendering import plan_as_dict, plan_as_text
 
 COMMAND = "alula plan"
 NONE, WRONG = 1, 2

@@ -22,9 +22,9 @@ from alula.odds.odds import Odds, odds_of
 from alula.odds.robot import graph_of
 from alula.prove.limits import Deadline, OutOfTimeError
 from alula.repair.branches import Branch
+from alula.repair.rendering import added, as_dict, as_text
 from alula.repair.repairing import Question, Search
 from alula.repair.subject import Subject
-from alula.repair.telling import added, as_dict, as_text
 from alula.trees.answers import Answers, StepClock, scripted_tree
 from alula.trees.view import view_of
 

@@ -17,9 +17,9 @@ from alula.campaign.coverage import cover, is_troubled, processes
 from alula.campaign.failures import FAULT, INVARIANT, PROCESS, RESULT, TRANSITION, Failure, Way, failures_in, ways_to_fail
 from alula.campaign.mocked_scenarios import load_mocked_scenario
 from alula.campaign.plan import MOCKS, PlannedRun, load_campaign
+from alula.campaign.rendering import as_page, as_text
 from alula.campaign.rows import rows_of
 from alula.campaign.table import ROWS, Table
-from alula.campaign.telling import as_page, as_text
 from alula.cli.campaign import main
 from alula.common.record import read_record
 from alula.common.scenarios import load_scenario, scenario_names

@@ -18,8 +18,8 @@ from alula.campaign.flown import FlownAnswer
 from alula.campaign.mocked_scenarios import load_mocked_scenario
 from alula.campaign.plan import MOCKS, PlannedRun
 from alula.campaign.proved import ProvedMission, proved
+from alula.campaign.rendering import as_page, as_text
 from alula.campaign.rows import rows_of
-from alula.campaign.telling import as_page, as_text
 from alula.cli.campaign import main
 from alula.common.scenarios import load_scenario
 from alula.records.causes.fault_file import effects_of_robot

@@ -14,7 +14,7 @@ from alula.common import run_log
 from alula.common.faults import parse_fault
 from alula.common.robots import find_robot
 from alula.records.comparing import ComparedDecision, Side, compare
-from alula.records.comparing.telling import lines, spread
+from alula.records.comparing.rendering import lines, spread
 from alula.runtime.core.events import event_record
 
 

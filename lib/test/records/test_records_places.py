@@ -13,8 +13,8 @@ from alula.common.record import FILE, RecordWriter
 from alula.common.robots import VARIABLE, load_robot_folder, meaning
 from alula.common.runs import robot_of
 from alula.missions.record import EVENTS
+from alula.records.comparing.rendering import lines
 from alula.records.comparing.sides import compare, load_side
-from alula.records.comparing.telling import lines
 from alula.records.conformance.judging import judge
 from alula.records.logs import read_log
 from alula.records.run import load_recorded_run

@@ -27,9 +27,9 @@ from alula.repair.judging import Judge
 from alula.repair.planning import Aim, Planner
 from alula.repair.planning import Answer as Planned
 from alula.repair.purposes import Purposes
+from alula.repair.rendering import as_dict, as_text
 from alula.repair.repairing import Answer, Question, Search
 from alula.repair.subject import Subject
-from alula.repair.telling import as_dict, as_text
 
 TIME_S = 600.0
 """What a search may take: it ends by its result, also on a busy machine."""

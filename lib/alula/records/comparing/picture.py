@@ -9,8 +9,8 @@ import matplotlib as mpl
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
+from alula.records.comparing.rendering import SIDE_BY_SIDE
 from alula.records.comparing.sides import Compared
-from alula.records.comparing.telling import SIDE_BY_SIDE
 
 # After Okabe and Ito (2008): told apart by the colour-blind.
 COLOURS = ("#0072b2", "#e69f00", "#009e73", "#cc79a7", "#56b4e9", "#d55e00")

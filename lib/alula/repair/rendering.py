@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Sequence
 
 from alula.odds.odds import Odds
-from alula.odds.telling import WORDS
+from alula.odds.rendering import WORDS
 from alula.repair import planning
 from alula.repair.branches import Branch
 from alula.repair.fates import Fate
