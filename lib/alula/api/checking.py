@@ -7,6 +7,7 @@ all runs of each skillset, all runs of each mission.
 from __future__ import annotations
 
 import re
+import warnings
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from functools import partial
@@ -35,7 +36,7 @@ if TYPE_CHECKING:
     from alula.missions.mission_file import MissionFile
     from alula.missions.part import MissionPart
 
-Tell = Callable[[str], None]
+OnProgress = Callable[[str], None]
 """Takes a line about progress, or about what is left out."""
 NO_ENUMS: Mapping[str, float] = {}
 TIME_S = 30.0
@@ -57,7 +58,8 @@ def check_files(
     proofs: bool = True,
     closed_world: bool = False,
     timeout_s: float = TIME_S,
-    tell: Callable[[str], None] = ignore,
+    on_progress: Callable[[str], None] = ignore,
+    tell: Callable[[str], None] | None = None,
 ) -> list[Diagnostic]:
     """Check models and missions, and prove their properties; return all findings, file by file.
 
@@ -75,17 +77,27 @@ def check_files(
         proofs: False: leave out the proofs.
         closed_world: assume that transitions that are neither extern nor used by an effect are never taken.
         timeout_s: for the proofs of a file; what could not be decided in it is a finding.
-        tell: takes lines about the progress.
+        on_progress: takes lines about the progress.
+        tell: deprecated name of ``on_progress``.
 
     Raises:
         AlulaError: no files are given, and there is no robot.
     """
+    if tell is not None:
+        warnings.warn(
+            "check_files(tell=...) is check_files(on_progress=...) now; the old name goes with the next minor version",
+            DeprecationWarning,
+            stacklevel=2,
+        )
+        on_progress = tell
     with meaning(None if robot is None else load_robot_folder(Path(robot).resolve())):
         given = list(map(str, paths)) or robot_models(find_robot())
         others = {name: Path(folder) for name, folder in (packages or {}).items()}
-        files = checked_files(given, palettes=list(map(str, palettes)), main=main, packages=others, enums=enums or {}, tell=tell)
+        files = checked_files(
+            given, palettes=list(map(str, palettes)), main=main, packages=others, enums=enums or {}, on_progress=on_progress
+        )
         if proofs:
-            prove_files(files, timeout_s, closed_world=closed_world, tell=tell)
+            prove_files(files, timeout_s, closed_world=closed_world, on_progress=on_progress)
     return [finding for file in files for finding in file.findings]
 
 
@@ -107,7 +119,7 @@ def checked_files(
     main: str = "",
     packages: Mapping[str, Path] | None = None,
     enums: Mapping[str, float] = NO_ENUMS,
-    tell: Tell = ignore,
+    on_progress: OnProgress = ignore,
 ) -> list[ModelFile]:
     """Return the models, then the missions, with their findings; `-` is the standard input where that is given."""
     library = Library(packages)
@@ -124,22 +136,24 @@ def checked_files(
         check_fields(model)
     for folder, first in {Path(one.path).parent: one for one in reversed(read) if Path(one.path).is_file()}.items():
         first.findings += load_types(folder / "types.yaml")[1]  # once for all models beside it
-    checked = _checked_missions(list(missions), list(map(Path, palettes)), library, main, enums, tell)
+    checked = _checked_missions(list(missions), list(map(Path, palettes)), library, main, enums, on_progress)
     for file in checked:
         file.named = file.path in {str(Path(place)) for place in places}
     return [*read, *checked]
 
 
-def prove_files(files: Sequence[ModelFile], timeout_s: float, *, closed_world: bool = False, tell: Tell = ignore) -> None:
+def prove_files(files: Sequence[ModelFile], timeout_s: float, *, closed_world: bool = False, on_progress: OnProgress = ignore) -> None:
     """Add what the proofs find about each file that is free of errors."""
-    prove_models([file for file in files if not isinstance(file, CheckedMission)], timeout_s, closed_world=closed_world, tell=tell)
-    prove_missions([file for file in files if isinstance(file, CheckedMission)], timeout_s, tell)
+    prove_models(
+        [file for file in files if not isinstance(file, CheckedMission)], timeout_s, closed_world=closed_world, on_progress=on_progress
+    )
+    prove_missions([file for file in files if isinstance(file, CheckedMission)], timeout_s, on_progress)
 
 
 # --- models -------------------------------------------------------------------------------------------------------------
 
 
-def prove_models(files: Sequence[ModelFile], timeout_s: float, *, closed_world: bool, tell: Tell = ignore) -> None:
+def prove_models(files: Sequence[ModelFile], timeout_s: float, *, closed_world: bool, on_progress: OnProgress = ignore) -> None:
     """Add the prover's findings about every skillset of a file that is free of errors."""
     # The prover brings its solvers along, which a conversion should not wait for.
     from alula.prove.skillset.prover import prove
@@ -154,16 +168,16 @@ def prove_models(files: Sequence[ModelFile], timeout_s: float, *, closed_world: 
                 found.append(_not_begun(file.skillsets[number:], timeout_s))
                 break
             left_s = max(0.0, end - monotonic())
-            report = partial(_tell_proof, tell, f"{file.path}: {skillset.name}")
-            found += prove(skillset, closed_world=closed_world, timeout_s=left_s, tell=report)
+            report = partial(_proof_progress, on_progress, f"{file.path}: {skillset.name}")
+            found += prove(skillset, closed_world=closed_world, timeout_s=left_s, on_progress=report)
         file.add(found)
 
 
 def counterexamples_of(
-    files: Sequence[ModelFile], timeout_s: float, *, closed_world: bool, tell: Tell = ignore
+    files: Sequence[ModelFile], timeout_s: float, *, closed_world: bool, on_progress: OnProgress = ignore
 ) -> list[tuple[Skillset, Diagnostic]]:
     """Prove the files; return each finding that has a counterexample with steps, in the order of the output, with its skillset."""
-    prove_models(files, timeout_s, closed_world=closed_world, tell=tell)
+    prove_models(files, timeout_s, closed_world=closed_world, on_progress=on_progress)
     return [
         (max((one for one in file.skillsets if one.span.line <= finding.span.line), key=lambda one: one.span.line), finding)
         for file in files
@@ -172,8 +186,8 @@ def counterexamples_of(
     ]
 
 
-def _tell_proof(tell: Tell, what: str, progress: str) -> None:
-    tell(f"{what}: proving: {progress}")
+def _proof_progress(on_progress: OnProgress, what: str, progress: str) -> None:
+    on_progress(f"{what}: proving: {progress}")
 
 
 def _not_begun(skillsets: Sequence[Skillset], timeout_s: float) -> Diagnostic:
@@ -204,7 +218,7 @@ class CheckedMission(ModelFile):
 
 
 def _checked_missions(
-    paths: Sequence[str], palettes: Sequence[Path], library: Library, main: str, enums: Mapping[str, float], tell: Tell
+    paths: Sequence[str], palettes: Sequence[Path], library: Library, main: str, enums: Mapping[str, float], on_progress: OnProgress
 ) -> list[CheckedMission]:
     """Return each mission with its findings; what can't be read is told, too, in one line.
 
@@ -212,7 +226,7 @@ def _checked_missions(
     """
     if not paths:
         return []
-    robot = _robot(tell)
+    robot = _robot(on_progress)
     if len(paths) > 1:
         library.add(map(Path, paths))
     files: dict[Path, CheckedMission] = {}
@@ -222,7 +236,7 @@ def _checked_missions(
         files[path.resolve()] = CheckedMission(str(path), source=source, named=True)
     beside = library if len(paths) > 1 else None
     for file in files.values():
-        for finding in _checked(file, robot, palettes, beside, tell):
+        for finding in _checked(file, robot, palettes, beside, on_progress):
             its = files.get(Path(finding.span.file).resolve(), file)  # one file's tree is checked in another, too, that uses it
             if finding not in its.findings:
                 its.findings.append(finding)
@@ -231,7 +245,7 @@ def _checked_missions(
     return list(files.values())
 
 
-def prove_missions(files: Sequence[CheckedMission], timeout_s: float, tell: Tell = ignore) -> None:
+def prove_missions(files: Sequence[CheckedMission], timeout_s: float, on_progress: OnProgress = ignore) -> None:
     """Look at all runs of the missions that are free of errors and use skills, and add what is found."""
     sound = [file for file in files if not has_errors(file.findings)]
     if not sound:
@@ -245,8 +259,8 @@ def prove_missions(files: Sequence[CheckedMission], timeout_s: float, tell: Tell
         mission = file.mission
         if mission is None or mission.files.is_part or not (mission.skillsets if file.own else _is_known(file, mission)):
             continue  # what can't be looked at, or a part of other missions, which are looked at
-        faults = faults or (states_of_faults(mission.skillsets, tell) if mission.skillsets else {})
-        proved = prove_mission(mission, faults=faults, timeout_s=timeout_s, tell=partial(_tell_runs, tell, file.path))
+        faults = faults or (states_of_faults(mission.skillsets, on_progress) if mission.skillsets else {})
+        proved = prove_mission(mission, faults=faults, timeout_s=timeout_s, on_progress=partial(_runs_progress, on_progress, file.path))
         file.findings += [*proved.findings, *map(_accepted, proved.accepted)]
 
 
@@ -264,8 +278,8 @@ def _accepted(finding: Diagnostic) -> Diagnostic:
     return replace(finding, severity=Severity.NOTE, message=f"accepted in the file: {finding.message}", hint="")
 
 
-def _tell_runs(tell: Tell, path: str, progress: str) -> None:
-    tell(f"{path}: looking at its runs: {progress}")
+def _runs_progress(on_progress: OnProgress, path: str, progress: str) -> None:
+    on_progress(f"{path}: looking at its runs: {progress}")
 
 
 @dataclass(frozen=True)
@@ -292,28 +306,30 @@ class _Robot:
         return any(re.search(rb"\b" * name[0].isalpha() + re.escape(name.encode()) + rb"\b", source) for name in names)
 
 
-def _robot(tell: Tell) -> _Robot:
+def _robot(on_progress: OnProgress) -> _Robot:
     try:
         robot = find_robot()
     except RobotError as error:
-        tell(f"no skills are known: {error}")
+        on_progress(f"no skills are known: {error}")
         return _Robot()
     from alula.check.robot import models_of, part_of  # late, as in `_checked`
 
-    return _Robot(robot.root, models_of(robot, tell), part_of(robot, tell), messages_of(robot), _flown(tell))
+    return _Robot(robot.root, models_of(robot, on_progress), part_of(robot, on_progress), messages_of(robot), _flown(on_progress))
 
 
-def _flown(tell: Tell) -> dict[Path, Scenario]:
+def _flown(on_progress: OnProgress) -> dict[Path, Scenario]:
     from alula.missions.scenario import by_mission  # late, as in `_checked`
 
     try:
         return by_mission()
     except ScenarioError as error:
-        tell(str(error))
+        on_progress(str(error))
         return {}
 
 
-def _checked(file: CheckedMission, robot: _Robot, palettes: Sequence[Path], beside: Library | None, tell: Tell) -> list[Diagnostic]:
+def _checked(
+    file: CheckedMission, robot: _Robot, palettes: Sequence[Path], beside: Library | None, on_progress: OnProgress
+) -> list[Diagnostic]:
     """Read a mission, and return what is wrong with it."""
     from alula.check.findings import read_and_check  # late: models are checked without it
     from alula.missions.part import NO_PART
@@ -330,5 +346,5 @@ def _checked(file: CheckedMission, robot: _Robot, palettes: Sequence[Path], besi
     for finding in found:
         if finding.code.startswith("ALU0") and finding.severity is Severity.ERROR:
             cure = f"; {finding.hint}" if finding.hint else ""
-            tell(f"{finding.span if finding.span.line else file.path}: {finding.message}{cure}")
+            on_progress(f"{finding.span if finding.span.line else file.path}: {finding.message}{cure}")
     return found

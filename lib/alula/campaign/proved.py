@@ -79,12 +79,12 @@ class ProvedMission:
 
 
 def proved(
-    scenario: Scenario, models: Sequence[Skillset], effects: EffectsByFault, tell: Callable[[str], None], time_s: float
+    scenario: Scenario, models: Sequence[Skillset], effects: EffectsByFault, on_progress: Callable[[str], None], time_s: float
 ) -> ProvedMission:
-    """Search all runs of a scenario's mission within a time; ``tell`` gets the progress of a long search."""
+    """Search all runs of a scenario's mission within a time; ``on_progress`` gets the progress of a long search."""
     if not scenario.mission.endswith(".xml"):
         return ProvedMission(unproved=f"{scenario.mission} is no file of a tree")
-    deadline = Deadline.after(time_s, tell)
+    deadline = Deadline.after(time_s, on_progress)
     try:
         robot = find_robot()
         source = flown(robot.root / scenario.mission, scenario)

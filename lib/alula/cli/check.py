@@ -48,10 +48,10 @@ def main(arguments: Sequence[str] | None = None) -> int:
         sys.stderr.write(f"{COMMAND}: no files are named, and {error}\n")
         return 2
     files = checked_files(
-        given, sys.stdin.buffer, palettes=options.palette, main=options.main, packages=options.package, enums=enums, tell=warn
+        given, sys.stdin.buffer, palettes=options.palette, main=options.main, packages=options.package, enums=enums, on_progress=warn
     )
     if options.proofs and options.to is None:
-        prove_files(files, options.time, closed_world=options.closed_world, tell=warn)
+        prove_files(files, options.time, closed_world=options.closed_world, on_progress=warn)
     for file in files:
         file.findings = [_strict(finding) for finding in file.findings] if options.strict else file.findings
     findings = [finding for file in files for finding in file.findings]

@@ -52,7 +52,7 @@ def run(given: argparse.Namespace) -> int:
     """Do what is asked for; raises what ``main`` tells."""
     if given.most < 1:
         raise OddsError(f"--most {given.most}: is a number of situations, from 1 on")
-    graph, figures = graph_of(given.file, given.world, most=given.most, unlikely=given.unlikely, tell=_tell, warn=warner(COMMAND))
+    graph, figures = graph_of(given.file, given.world, most=given.most, unlikely=given.unlikely, on_progress=_tell, warn=warner(COMMAND))
     changes = {text: changed(figures, text, graph) for text in given.changes}
     found = odds_of(graph, figures)
     others = {text: odds_of(graph, other, costs=False) for text, other in changes.items()}

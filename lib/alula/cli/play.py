@@ -27,7 +27,7 @@ def run(options: argparse.Namespace, enums: Mapping[str, float]) -> int:
         return play_mission(options, enums)
     paths = dict.fromkeys(path for given in options.files for path in models_in(given))
     files = check_files(list(paths), sys.stdin.buffer)
-    counterexamples = counterexamples_of(files, options.time, closed_world=options.closed_world, tell=warner("alula check"))
+    counterexamples = counterexamples_of(files, options.time, closed_world=options.closed_world, on_progress=warner("alula check"))
     if not 1 <= options.play <= len(counterexamples):
         sys.stderr.write(f"alula check: there is no counterexample {options.play}; these models have {len(counterexamples) or 'none'}\n")
         return 2

@@ -29,7 +29,7 @@ def play_mission(options: argparse.Namespace, enums: Mapping[str, float]) -> int
         main=options.main,
         packages=options.package,
         enums=enums,
-        tell=warner(COMMAND),
+        on_progress=warner(COMMAND),
     )
     files = [file for file in checked if isinstance(file, CheckedMission)]
     if len(files) < len(checked):

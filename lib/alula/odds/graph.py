@@ -12,7 +12,7 @@ from alula.odds.figures import ANY_CHANCE, ANY_RATE, Figures, Range
 from alula.odds.system import Kind, LabelledSystem, Outcome, Step
 
 State = TypeVar("State", bound=Hashable)
-Tell = Callable[[int, int], None]
+OnProgress = Callable[[int, int], None]
 """Gets how many situations were found, and how many of them were looked at."""
 TELL_EVERY = 10_000
 MOST_SITUATIONS = 1_000_000
@@ -43,7 +43,7 @@ def explore(
     *,
     most: int = MOST_SITUATIONS,
     unlikely: float = 0.0,
-    tell: Tell | None = None,
+    on_progress: OnProgress | None = None,
 ) -> Graph:
     """Explore the situations that a system can come into, the likeliest first.
 
@@ -55,11 +55,11 @@ def explore(
             something happen besides.
         most: of the situations that are looked at.
         unlikely: what each single way leads to with a smaller chance is not looked at.
-        tell: how far it is, every so often.
+        on_progress: how far it is, every so often.
     """
     search = _Search(system, figures)
     with suppress(KeyboardInterrupt):  # what was found until then holds
-        search.run(most, unlikely, tell)
+        search.run(most, unlikely, on_progress)
     return search.graph()
 
 
@@ -75,7 +75,7 @@ class _Search(Generic[State]):
         self._chance = dict.fromkeys(self._initial, 1.0)
         self._looked: dict[int, tuple[Outcome | None, tuple[Step[int], ...]]] = {}
 
-    def run(self, most: int, unlikely: float, tell: Tell | None) -> None:
+    def run(self, most: int, unlikely: float, on_progress: OnProgress | None) -> None:
         """Explore the situations; one to which a likelier path is found than the first keeps its number."""
         todo = [(-1.0, number) for number in self._initial]
         while todo and len(self._looked) < most:
@@ -88,8 +88,8 @@ class _Search(Generic[State]):
                     self._chance[step.target] = -chance * part
                     heappush(todo, (chance * part, step.target))
             self._looked[number] = outcome, steps
-            if tell is not None and len(self._looked) % TELL_EVERY == 0:
-                tell(len(self._states), len(self._looked))
+            if on_progress is not None and len(self._looked) % TELL_EVERY == 0:
+                on_progress(len(self._states), len(self._looked))
 
     def graph(self) -> Graph:
         """Return what was found; all that was not looked at is one situation, the last."""

@@ -13,7 +13,7 @@ from alula.mock import Behaviour
 from alula.mock.behaviour import Place
 from alula.model.model import Skillset
 from alula.odds.figures import Figures
-from alula.odds.graph import MOST_SITUATIONS, Graph, Tell, explore
+from alula.odds.graph import MOST_SITUATIONS, Graph, OnProgress, explore
 from alula.odds.mission import Brought, MissionSteps
 from alula.odds.reading import load_figures
 from alula.prove.mission.findings import taken_as
@@ -79,7 +79,7 @@ def graph_of(
     *,
     most: int = MOST_SITUATIONS,
     unlikely: float = 0.0,
-    tell: Tell | None = None,
+    on_progress: OnProgress | None = None,
     warn: Warn = ignore,
     changed: Path | None = None,
 ) -> tuple[Graph, Figures]:
@@ -91,7 +91,7 @@ def graph_of(
         others: figures in the place of the robot's.
         most: of the situations that are looked at, as of ``explore``.
         unlikely: as of ``explore``.
-        tell: as of ``explore``.
+        on_progress: as of ``explore``.
         warn: is told what can't be read, and which nodes may do anything, so that the odds are bounds over all of that.
         changed: another file with the same mission, changed, which is looked at with this one's inputs.
 
@@ -101,7 +101,7 @@ def graph_of(
     read, steps_of, known = mission_of(path, world, others, warn=warn, changed=changed)
 
     def look(system: System) -> tuple[Graph, System]:
-        return explore(steps_of(system), known, most=most, unlikely=unlikely, tell=tell), system
+        return explore(steps_of(system), known, most=most, unlikely=unlikely, on_progress=on_progress), system
 
     graph, system = look_at(read, look)
     for finding in taken_as(system, exactly=False):

@@ -28,20 +28,20 @@ def _now_s() -> float:
 class Deadline:
     """A moment on the monotonic clock, seconds; ``given_s`` is what the user allowed.
 
-    ``tell`` is called with what is being done and for how long, every few seconds of a long search.
+    ``on_progress`` is called with what is being done and for how long, every few seconds of a long search.
     """
 
     at_s: float
     given_s: float
-    tell: Callable[[str], None] | None = None
+    on_progress: Callable[[str], None] | None = None
     doing: str = ""
     _begun_s: float = field(default_factory=_now_s)
-    _told_s: float = field(default_factory=_now_s)
+    _reported_s: float = field(default_factory=_now_s)
 
     @classmethod
-    def after(cls, given_s: float, tell: Callable[[str], None] | None = None) -> Deadline:
+    def after(cls, given_s: float, on_progress: Callable[[str], None] | None = None) -> Deadline:
         """Return the moment so many seconds from now."""
-        return cls(_now_s() + given_s, given_s, tell)
+        return cls(_now_s() + given_s, given_s, on_progress)
 
     def half(self, doing: str) -> Deadline:
         """Return the deadline in the middle of the time left, for a computation called ``doing``."""
@@ -60,6 +60,6 @@ class Deadline:
         now_s = _now_s()
         if now_s > self.at_s:
             raise OutOfTimeError
-        if self.tell is not None and now_s - self._told_s >= EVERY_S:
-            self._told_s = now_s
-            self.tell(f"{self.doing}; {now_s - self._begun_s:.0f} s of {self.given_s:.3g} s")
+        if self.on_progress is not None and now_s - self._reported_s >= EVERY_S:
+            self._reported_s = now_s
+            self.on_progress(f"{self.doing}; {now_s - self._begun_s:.0f} s of {self.given_s:.3g} s")

@@ -402,7 +402,7 @@ class Search:
         stripped, _ = repair.branch.written(self._subject, self._missing)
         before: dict[tuple[str, ...], Fate] = {}
         after: dict[tuple[str, ...], Fate] = {}
-        self._deadlines.append(Deadline.after(self._deadline.left_s() * SHARE, self._deadline.tell))
+        self._deadlines.append(Deadline.after(self._deadline.left_s() * SHARE, self._deadline.on_progress))
         judge = Judge(self._subject, self._deadlines[-1], self._goal, self._question.most_faults, self._question.reached)
         with suppress(OutOfTimeError):
             was, now = judge.fates(text), judge.fates(stripped)

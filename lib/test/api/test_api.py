@@ -137,10 +137,16 @@ def test_check_tells_findings_and_counterexamples(door):
     text = text.replace("leaf != JAMMED", "leaf != SHUT")
     (door / "door.skill").write_text(text, encoding="utf-8")
     lines: list[str] = []
-    found = check_files(door / "door.skill", tell=lines.append)
+    found = check_files(door / "door.skill", on_progress=lines.append)
     assert {one.span.file for one in found} == {str(door / "door.skill")}
     assert any(one.counterexample.steps for one in found)
     assert not any(one.counterexample.steps for one in check_files(door / "door.skill", proofs=False))
+
+
+def test_the_old_name_of_a_parameter_warns_and_is_taken(door):
+    lines: list[str] = []
+    with pytest.deprecated_call(match=r"check_files\(tell=...\) is check_files\(on_progress=...\) now"):
+        assert check_files(door / "door.skill", proofs=False, tell=lines.append) == check_files(door / "door.skill", proofs=False)
 
 
 def test_missions_are_checked_with_the_robot_that_is_named():

@@ -51,18 +51,18 @@ def prove_mission(
     *,
     faults: Faults = NO_FAULTS,
     timeout_s: float = 30.0,
-    tell: Callable[[str], None] | None = None,
+    on_progress: Callable[[str], None] | None = None,
 ) -> Proved:
     """Return what is wrong with the runs of a mission that ``check_mission`` finds no error in.
 
     Runs in which hooks raise, processes die or people interfere are looked at afterwards, in a time of their own (``SHARE``).
-    ``faults`` says in which states faults show, for properties that name them. ``tell`` hears now and then how far a long search is.
+    ``faults`` says in which states faults show, for properties that name them. ``on_progress`` hears now and then how far a long search is.
     Ctrl-C ends the search as the end of the time does: what was found by then is returned.
     """
     search = _Search(mission, faults)
-    seen = search.within(Deadline.after(timeout_s, tell), f"{timeout_s:.3g} s")
+    seen = search.within(Deadline.after(timeout_s, on_progress), f"{timeout_s:.3g} s")
     share_s = timeout_s * SHARE
-    return search.also(seen, Deadline.after(share_s, tell), f"{share_s:.3g} s").proved()
+    return search.also(seen, Deadline.after(share_s, on_progress), f"{share_s:.3g} s").proved()
 
 
 def prove_within(

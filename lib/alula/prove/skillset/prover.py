@@ -27,16 +27,16 @@ def prove(
     timeout_s: float = 30.0,
     most: int = MOST_SITUATIONS,
     copies: int = COPIES,
-    tell: Callable[[str], None] | None = None,
+    on_progress: Callable[[str], None] | None = None,
 ) -> list[Diagnostic]:
     """Return what is wrong with a skillset that the checker finds no error in, in the order of the source.
 
     A transition that nothing in the model makes may be made from outside (see ``outside``), unless ``closed_world``. What could not
     be decided within ``timeout_s`` seconds is a finding as well (ALU540). The skillset must be free of errors of
     ``alula.language.check``: every name in it leads somewhere. ``most`` is how many situations are looked at one by one before they
-    are taken as sets, ``copies`` how many executions of one skill at once. ``tell`` hears now and then what takes long.
+    are taken as sets, ``copies`` how many executions of one skill at once. ``on_progress`` hears now and then what takes long.
     """
-    deadline = Deadline.after(timeout_s, tell)
+    deadline = Deadline.after(timeout_s, on_progress)
     findings: list[Diagnostic] = []
     suspects: list[Suspect] = []
     try:

@@ -132,7 +132,7 @@ def test_the_vehicles_skillsets_are_proved():
 def test_a_long_search_says_what_it_is_doing(monkeypatch):
     monkeypatch.setattr(limits, "EVERY_S", 0.0)
     told = []
-    assert prove(bench.sparse(6), most=0, timeout_s=600, tell=told.append) == []
+    assert prove(bench.sparse(6), most=0, timeout_s=600, on_progress=told.append) == []
     stages = {"each block alone", "situations one by one", "properties, with a few skills", "situations as sets"}
     assert {line.split(";")[0] for line in told} == stages
 
