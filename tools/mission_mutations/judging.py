@@ -19,7 +19,6 @@ from alula.missions.plan import InputError
 from alula.model.model import Skillset
 from alula.prove.limits import Deadline, OutOfTimeError
 from alula.prove.mission.accepted import acceptances, divided
-from alula.prove.mission.answers import Answers
 from alula.prove.mission.conditions import Faults
 from alula.prove.mission.findings import OWN, findings, taken_as, waits
 from alula.prove.mission.holding import SINGLE, held
@@ -27,6 +26,7 @@ from alula.prove.mission.oracle import UndecidedError
 from alula.prove.mission.play import Played, play
 from alula.prove.mission.prover import LOOKED_AT
 from alula.prove.mission.regions import Regions
+from alula.prove.mission.responses import FailureResponses
 from alula.prove.mission.run import MissionFinding, MissionRun
 from alula.prove.mission.system import System
 from alula.prove.mission.unknown import is_unknown
@@ -110,7 +110,7 @@ class Looked:
     skillsets: tuple[Skillset, ...]
     part: MissionPart
     regions: Regions
-    answers: Answers
+    responses: FailureResponses
     seen: Seen
 
     @property
@@ -121,7 +121,7 @@ class Looked:
     @property
     def table(self) -> Mapping[object, object]:
         """What answers each failure, and how the mission can end after it."""
-        rows = self.answers.rows
+        rows = self.responses.rows
         return {(row.skill, row.end, row.node, row.moment): (tuple(sorted(row.starts)), tuple(sorted(row.outcomes))) for row in rows}
 
 
@@ -244,14 +244,14 @@ class Judge:
         system = System.of(MissionFile.read(path, skillsets, part), LOOKED_AT, why_any_order=why_any_order)
         regions = Regions(system, deadline)
         regions.explore()
-        return Looked(path, system.skillsets, part, regions, Answers(regions), self._shown.of(regions, path))
+        return Looked(path, system.skillsets, part, regions, FailureResponses(regions), self._shown.of(regions, path))
 
     def _stages(self, looked: Looked) -> Iterator[list[Diagnostic]]:
         """Yield what `check` finds about all runs, the quick parts first."""
         deadline, faults = Deadline.after(GIVEN_S), self._robot.faults
         properties, wrong = wanted(looked.system.nodes, looked.system.skillsets, self._robot.faults)
         known = acceptances(looked.system.nodes)
-        found = [*taken_as(looked.system), *findings(looked.regions, looked.answers), *wrong]
+        found = [*taken_as(looked.system), *findings(looked.regions, looked.responses), *wrong]
         yield divided(found, known, "", complete=True)[0]
         yield [one for each in properties if each.kind in SINGLE and (one := held(looked.regions, each, faults, deadline).finding)]
         waiting = Waits(looked.regions)

@@ -36,10 +36,10 @@ from alula.model.model import (
     Transition,
 )
 from alula.prove.limits import Deadline, OutOfTimeError
-from alula.prove.mission.answers import Answers
 from alula.prove.mission.findings import findings
 from alula.prove.mission.prover import LOOKED_AT
 from alula.prove.mission.regions import Regions
+from alula.prove.mission.responses import FailureResponses
 from alula.prove.mission.system import System
 from growing_bench import Row, measured_apart, peak_mb, tell_row, tell_rows, write_rows
 from prove_bench.growth import picture
@@ -166,7 +166,7 @@ def _looked_at(path: Path, models: Sequence[Skillset], part: MissionPart, timeou
     regions = Regions(System.of(MissionFile.read(path, models, part), LOOKED_AT), deadline)
     with contextlib.suppress(OutOfTimeError):
         regions.explore()
-    found = findings(regions, Answers(regions))
+    found = findings(regions, FailureResponses(regions))
     return {
         "leaves": len(regions.system.leaves),
         "seconds": round(time.monotonic() - begin, 3),

@@ -1,6 +1,6 @@
 """Compare how the missions of a campaign reacted to each failure with all reactions that the search of their runs proves possible.
 
-A flown answer that the proof does not know is an error of one of them.
+A flown response that the proof does not know is an error of one of them.
 """
 
 from __future__ import annotations
@@ -10,8 +10,8 @@ from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass, field
 from typing import Any
 
-from alula.campaign.flown import FlownAnswer
-from alula.campaign.proved import Asked, Key, ProvedAnswer, ProvedMission
+from alula.campaign.flown import FlownResponse
+from alula.campaign.proved import Asked, Key, ProvedMission, ProvedResponse
 from alula.missions.director import Outcome
 from alula.prove.mission.system import FAILED
 from alula.records.tree import Path, Places
@@ -44,7 +44,7 @@ class Beside:
 
     key: Key
     skill: str
-    proved: ProvedAnswer | None
+    proved: ProvedResponse | None
     leaf: str = ""
     """The name of the leaf that fails, of several by one name with the branch that it is in."""
     flown: list[Flown] = field(default_factory=list)
@@ -107,7 +107,7 @@ class Beside:
 
 
 @dataclass(frozen=True)
-class MissionAnswers:
+class MissionResponses:
     """The proved and flown reactions of a scenario's mission; ``unproved``: why the proof is incomplete."""
 
     scenario: str
@@ -131,14 +131,14 @@ class MissionAnswers:
         return {"scenario": self.scenario, "unproved": self.unproved, "unknown": self.unknown, "rows": rows}
 
 
-def beside(scenario: str, mission: ProvedMission, rows: Iterable[Row]) -> MissionAnswers:
+def beside(scenario: str, mission: ProvedMission, rows: Iterable[Row]) -> MissionResponses:
     """Compare the flown reactions of a scenario's runs with the proved ones."""
-    found = {key: Beside(key, one.skill, one) for key, one in mission.answers.items()}
+    found = {key: Beside(key, one.skill, one) for key, one in mission.responses.items()}
     flown: dict[tuple[Key, Asked, str, str, str], Flown] = {}
     for row in rows:
-        for one in map(FlownAnswer.read, row["answers"] if row["outcome"] in PROVED_OUTCOMES else ()):
+        for one in map(FlownResponse.read, row["answers"] if row["outcome"] in PROVED_OUTCOMES else ()):
             key, asked, outcome = mission.key(one.place, (one.state, one.result), one.moment), frozenset(one.asked), str(row["outcome"])
-            proved = mission.answers.get(key)
+            proved = mission.responses.get(key)
             known = proved is not None and asked in proved.asked and outcome in proved.outcomes
             beside_it = found.setdefault(key, Beside(key, one.skill, proved))
             fault = next(str(told["fault"]) for told in row["answers"] if told["id"] == one.id)
@@ -150,7 +150,7 @@ def beside(scenario: str, mission: ProvedMission, rows: Iterable[Row]) -> Missio
             flown[same].runs.append(int(row["run"]))
     for failure in found.values():
         failure.leaf = _leaf(failure.place, {key[0] for key in found})
-    return MissionAnswers(
+    return MissionResponses(
         scenario, sorted(found.values(), key=lambda one: (one.skill, one.place, one.key[1], one.moment)), mission.unproved
     )
 
@@ -173,7 +173,7 @@ def words_of(failed: Path, asked: Asked) -> str:
 
 
 def _line(scenario: str, row: Beside, one: Flown) -> str:
-    """Return a flown answer that the proof does not know: fault, moment, what was flown, what is proved."""
+    """Return a flown response that the proof does not know: fault, moment, what was flown, what is proved."""
     by = f", by the fault {one.fault}" if one.fault else ""
     meanwhile = f" while {', '.join(row.moment)} ran" if row.moment else ""
     what = f"{scenario}, run {one.runs[0]}: {row.leaf} ({row.skill}) ended with {one.end}{by}{meanwhile}"

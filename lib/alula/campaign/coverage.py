@@ -11,7 +11,7 @@ from pathlib import Path
 from typing import Any
 from xml.etree import ElementTree as ET
 
-from alula.campaign.beside import MissionAnswers
+from alula.campaign.beside import MissionResponses
 from alula.campaign.failures import FAULT, KINDS, Way, name_of
 from alula.common.faults import parse_fault
 from alula.common.robots import find_robot
@@ -56,7 +56,7 @@ class Coverage:
     troubled: Sequence[int]
     """Runs that did not come to an end or conform, left something open, collided, did not land, had problems, or an exit code that
     does not say their outcome."""
-    answers: Sequence[MissionAnswers] = ()
+    responses: Sequence[MissionResponses] = ()
     """Of each mission, flown beside proved."""
     again: Mapping[int, str] = field(default_factory=dict)
     """What a run with trouble was asked for, in the words of ``alula run``: its scenario, its own seed, its faults."""
@@ -64,7 +64,7 @@ class Coverage:
     @property
     def unknown(self) -> list[str]:
         """Each flown reaction that the proof of its mission does not have, one line each."""
-        return [line for mission in self.answers for line in mission.unknown]
+        return [line for mission in self.responses for line in mission.unknown]
 
     @property
     def never(self) -> list[Way]:
@@ -75,13 +75,13 @@ class Coverage:
         """Return the whole matrix in the form of ``coverage.json``."""
         tried = [cover.as_dict() for cover in self.covers if cover.times]
         never = [vars(way) for way in self.never]
-        answers = [mission.as_dict() for mission in self.answers]
+        responses = [mission.as_dict() for mission in self.responses]
         whole = {"runs": self.runs, "outcomes": dict(self.outcomes), "troubled": list(self.troubled), "again": dict(self.again)}
-        return {**whole, "tried": tried, "never": never, "answers": answers}
+        return {**whole, "tried": tried, "never": never, "answers": responses}
 
 
-def cover(rows: Iterable[Row], ways: Iterable[Way], answers: Sequence[MissionAnswers] = ()) -> Coverage:
-    """Count the outcomes of each way to fail; ``answers`` are the reactions of the same runs, compared with the proved ones."""
+def cover(rows: Iterable[Row], ways: Iterable[Way], responses: Sequence[MissionResponses] = ()) -> Coverage:
+    """Count the outcomes of each way to fail; ``responses`` are the reactions of the same runs, compared with the proved ones."""
     covers = {way: Cover(way) for way in ways}
     outcomes: Counter[str] = Counter()
     troubled: list[int] = []
@@ -102,7 +102,7 @@ def cover(rows: Iterable[Row], ways: Iterable[Way], answers: Sequence[MissionAns
             way = Way(failure["kind"], failure["name"])
             _count(covers.setdefault(way, Cover(way)), row, str(failure["answered_by"]), failure["after_s"])
     ordered = sorted(covers.values(), key=lambda one: (KINDS.index(one.way.kind), one.way.name))
-    return Coverage(ordered, runs, dict(outcomes.most_common()), troubled, answers, again)
+    return Coverage(ordered, runs, dict(outcomes.most_common()), troubled, responses, again)
 
 
 def is_troubled(row: Row) -> bool:

@@ -1,6 +1,6 @@
 """How the tree of a flown mission reacted to each failure: the skills that it requested next, and what else ran at that moment.
 
-This is what the proof states of all runs (``alula.prove.mission.answers``), of one: by ticks, not by the managers' events.
+This is what the proof states of all runs (``alula.prove.mission.responses``), of one: by ticks, not by the managers' events.
 """
 
 from __future__ import annotations
@@ -18,7 +18,7 @@ from alula.trees.status import FAILURE, RUNNING, Status
 
 
 @dataclass(frozen=True)
-class FlownAnswer:
+class FlownResponse:
     """A failure that the tree saw, and its reaction.
 
     Attributes:
@@ -44,7 +44,7 @@ class FlownAnswer:
         return asdict(self)
 
     @classmethod
-    def read(cls, row: Mapping[str, Any]) -> FlownAnswer:
+    def read(cls, row: Mapping[str, Any]) -> FlownResponse:
         """Return the reaction that a row of the table holds."""
         texts = {name: str(row[name]) for name in ("id", "skill", "state", "result")}
         asked = tuple(tuple(place) for place in row["asked"])
@@ -88,16 +88,16 @@ class Ticks:
     def sample(self, skillset: str, data: str, value: object, stamp_ns: int | None) -> None:
         """Ignore a sample of data."""
 
-    def answers(self, places: Mapping[str, Path]) -> list[FlownAnswer]:
+    def responses(self, places: Mapping[str, Path]) -> list[FlownResponse]:
         """Return the reactions in the order of time; ``places`` maps the IDs of executions to the leaves that requested them."""
-        found: list[FlownAnswer] = []
+        found: list[FlownResponse] = []
         asked: tuple[Path, ...] = ()
         for tick in reversed(self._ticks):
             asked = tuple(sorted({places[one] for one in tick.asked if one in places})) or asked
             for node, handle in reversed(tick.failed):
                 moment = {one.leaf.skill_name for one in tick.running if one is not node}
                 place, state = path_of(node), handle.state.value
-                found.append(FlownAnswer(handle.id, place, node.leaf.skill_name, state, handle.result, tuple(sorted(moment)), asked))
+                found.append(FlownResponse(handle.id, place, node.leaf.skill_name, state, handle.result, tuple(sorted(moment)), asked))
         return found[::-1]
 
     def _changed(self, node: Node, _previous: Status, status: Status) -> None:

@@ -7,7 +7,7 @@ from dataclasses import dataclass, field
 from functools import cached_property
 from pathlib import Path
 
-from alula.campaign.flown import FlownAnswer, Ticks
+from alula.campaign.flown import FlownResponse, Ticks
 from alula.common.faults import FaultError, FaultRequest
 from alula.common.robots import RobotError, find_robot
 from alula.common.scenarios import Scenario, ScenarioError, load_scenario
@@ -38,7 +38,7 @@ class MockedRun:
     """When each fault came, seconds of mission clock; those that came to nothing are missing."""
     places: Places = field(default_factory=Places)
     """Where in the tree its executions were started."""
-    answers: Sequence[FlownAnswer] = ()
+    responses: Sequence[FlownResponse] = ()
     """What its tree did about each failure that it saw."""
 
 
@@ -75,8 +75,8 @@ class MockedScenario:
             ticks.watch(mission.director.root)
         end = mission.run()
         places = Places(mission.places, tip_of(mission.director.view().as_dict()))
-        answers = ticks.answers(mission.places)
-        return MockedRun(mission.events, end, mission.notes, mission.open_executions, mission.faults, places, answers)
+        responses = ticks.responses(mission.places)
+        return MockedRun(mission.events, end, mission.notes, mission.open_executions, mission.faults, places, responses)
 
 
 def load_mocked_scenario(name: str, behaviour: Sequence[Path] = (), *, world: str = "", inputs: Inputs | None = None) -> MockedScenario:

@@ -18,10 +18,10 @@ from alula.model.execution_state import ExecutionState as S
 from alula.model.expressions import Expression
 from alula.model.model import Invariant, Precondition, Skillset, Transition
 from alula.prove.limits import Deadline, OutOfTimeError
-from alula.prove.mission.answers import Answers, Row
 from alula.prove.mission.managers import Failures
 from alula.prove.mission.oracle import UndecidedError
 from alula.prove.mission.regions import Regions
+from alula.prove.mission.responses import FailureResponses, Row
 from alula.prove.mission.system import System, look_at
 from alula.records.causes.effects import EffectsByFault
 from alula.records.tree import Path
@@ -36,7 +36,7 @@ Asked = frozenset[Path]
 
 
 @dataclass(frozen=True)
-class ProvedAnswer:
+class ProvedResponse:
     """All reactions of the tree to a failure at a moment.
 
     Attributes:
@@ -68,7 +68,7 @@ Key = tuple[Path, str, Path]
 class ProvedMission:
     """The proved reactions of a mission, by leaf, end and moment; ``unproved``: why some, or all, are missing."""
 
-    answers: Mapping[Key, ProvedAnswer] = field(default_factory=dict)
+    responses: Mapping[Key, ProvedResponse] = field(default_factory=dict)
     unproved: str = ""
     seen: Mapping[tuple[Path, End], str] = field(default_factory=dict)
     """As what the tree sees each end of a leaf."""
@@ -97,10 +97,10 @@ def proved(
         return ProvedMission(unproved=f"its runs can't be looked at: {error}")
     except OutOfTimeError:
         return ProvedMission(unproved=_bound(time_s))
-    found: dict[Key, ProvedAnswer] = {}
+    found: dict[Key, ProvedResponse] = {}
     system = regions.system
-    for row in Answers(regions).rows:
-        one = _answer(system, row, effects)
+    for row in FailureResponses(regions).rows:
+        one = _response(system, row, effects)
         known = found.get((one.place, one.end, one.moment))
         found[one.place, one.end, one.moment] = one if known is None else _both(known, one)
     seen = {}
@@ -124,19 +124,19 @@ def _bound(time_s: float) -> str:
     return f"not all runs were looked at in {time_s:g} s"
 
 
-def _both(one: ProvedAnswer, other: ProvedAnswer) -> ProvedAnswer:
-    """Return the union of the answers of two leaves whose names give them one place."""
+def _both(one: ProvedResponse, other: ProvedResponse) -> ProvedResponse:
+    """Return the union of the responses of two leaves whose names give them one place."""
     asked, outcomes = one.asked | other.asked, one.outcomes | other.outcomes
-    return ProvedAnswer(one.place, one.skill, one.end, one.ends, one.moment, one.faults, asked, outcomes)
+    return ProvedResponse(one.place, one.skill, one.end, one.ends, one.moment, one.faults, asked, outcomes)
 
 
-def _answer(system: System, row: Row, effects: EffectsByFault) -> ProvedAnswer:
+def _response(system: System, row: Row, effects: EffectsByFault) -> ProvedResponse:
     places = [path_of(node) for node in system.leaves]
     same = [end for end in _ends(system, row.leaf) if (told := system.told_end(row.leaf, end)) and (told[1] or told[0]) == row.end]
     names = tuple(dict.fromkeys(result or state for state, result in same if state != S.INTERRUPTED.value))
     faults = tuple(name for name in sorted(effects.known) if any(_brings(system, row, effects, name, end) for end in same))
     asked = frozenset(frozenset(places[leaf] for leaf in one) for one in row.asks)
-    return ProvedAnswer(places[row.leaf], row.skill, row.end, names, row.moment, faults, asked, frozenset(row.outcomes))
+    return ProvedResponse(places[row.leaf], row.skill, row.end, names, row.moment, faults, asked, frozenset(row.outcomes))
 
 
 def _ends(system: System, leaf: int) -> Iterator[End]:

@@ -7,7 +7,7 @@ from collections.abc import Mapping, Sequence
 from html import escape
 from itertools import groupby, zip_longest
 
-from alula.campaign.beside import Beside, MissionAnswers
+from alula.campaign.beside import Beside, MissionResponses
 from alula.campaign.coverage import Cover, Coverage
 
 _STYLE = """
@@ -27,7 +27,7 @@ td.n, th.n { text-align: right; font-variant-numeric: tabular-nums } tr.never td
 """
 _HEAD = ("way to fail", "times", "response", "outcomes", "worst recovery", "worst clearance")
 _NOT_PROVED = "not proved"
-_ALL_KNOWN = "Each flown answer is one of the proved ones."
+_ALL_KNOWN = "Each flown response is one of the proved ones."
 
 
 def counted(names: Mapping[str, int]) -> str:
@@ -52,8 +52,8 @@ def as_text(coverage: Coverage) -> str:
     widths = [min(60, max(len(row[column]) for row in tried)) for column in range(len(_HEAD))]
     lines = ["  ".join(cell.ljust(width) for cell, width in zip(row, widths, strict=True)).rstrip() for row in tried]
     lines += ["", f"never tried ({len(coverage.never)}):", *(f"  {way.kind}: {way.name}" for way in coverage.never)]
-    for mission in coverage.answers:
-        lines += ["", *_answers_as_text(mission)]
+    for mission in coverage.responses:
+        lines += ["", *_responses_as_text(mission)]
     troubled = ", ".join(map(str, coverage.troubled[:20])) + (", ..." if len(coverage.troubled) > 20 else "")
     lines += ["", f"{coverage.runs} runs: {counted(dict(coverage.outcomes))}"]
     lines += [f"runs with trouble: {len(coverage.troubled)}{f' ({troubled})' if troubled else ''}"]
@@ -61,7 +61,7 @@ def as_text(coverage: Coverage) -> str:
     return "\n".join(lines) + "\n"
 
 
-def _answers_as_text(mission: MissionAnswers) -> list[str]:
+def _responses_as_text(mission: MissionResponses) -> list[str]:
     lines = [f"{mission.scenario}, flown beside proved: {_summary(mission)}"]
     for row in (one for one in mission.rows if one.times):
         meanwhile = f" while {', '.join(row.moment)} ran" if row.moment else ""
@@ -71,7 +71,7 @@ def _answers_as_text(mission: MissionAnswers) -> list[str]:
     return lines
 
 
-def _summary(mission: MissionAnswers) -> str:
+def _summary(mission: MissionResponses) -> str:
     proved = sum(1 for row in mission.rows if row.proved)
     how = mission.unproved or "all runs were looked at"
     return f"{proved} failures at a moment, {mission.flown} of them flown; {how}"
@@ -92,12 +92,12 @@ def as_page(coverage: Coverage, title: str) -> str:
     never = [f'<tr class="never"><td colspan="6">{escape(way.kind)}: {escape(way.name)}</td></tr>' for way in coverage.never]
     troubled = ", ".join(map(str, coverage.troubled)) or "none"
     again = "".join(f"<li>{run}: <code>alula run {escape(words)}</code></li>" for run, words in coverage.again.items())
-    answers = "\n".join(map(_answers, coverage.answers))
+    responses = "\n".join(map(_responses, coverage.responses))
     return (
         f'<!doctype html>\n<html lang="en"><meta charset="utf-8"><title>{escape(title)}</title><style>{_STYLE}</style>\n'
         f"<h1>{escape(title)}</h1>\n<p>{coverage.runs} runs: {escape(counted(dict(coverage.outcomes)))}. "
         f"Runs with trouble: {escape(troubled)}.</p>\n{f'<ul>{again}</ul>' if again else ''}\n"
-        f"<h2>What failed, and the mission's responses</h2>\n<table><tr>{head}</tr>\n{chr(10).join(rows)}</table>\n{answers}"
+        f"<h2>What failed, and the mission's responses</h2>\n<table><tr>{head}</tr>\n{chr(10).join(rows)}</table>\n{responses}"
         f"<h2>Never tried ({len(never)})</h2>\n<table>{chr(10).join(never)}</table>\n</html>\n"
     )
 
@@ -109,7 +109,7 @@ def _row(cover: Cover, most: int) -> str:
     return f'<tr><td>{escape(name)}</td><td class="n">{bar}{times}</td>{cells}</tr>'
 
 
-def _answers(mission: MissionAnswers) -> str:
+def _responses(mission: MissionResponses) -> str:
     """Return a mission's table: what its tree can do about each failure at a moment, and how often it did."""
     wrong = "".join(f'<p class="wrong">{escape(line)}</p>\n' for line in mission.unknown)
     known = "" if wrong or mission.unproved else f" {_ALL_KNOWN}"
@@ -121,14 +121,14 @@ def _answers(mission: MissionAnswers) -> str:
     unknown = "" if mission.unproved else "wrong"
     bodies = "\n".join(_body(list(rows), unknown) for _, rows in groupby(mission.rows, key=lambda row: row.key[:2]))
     return (
-        f"<h2>{escape(mission.scenario)}: answers to failures, flown beside proved</h2>\n"
+        f"<h2>{escape(mission.scenario)}: responses to failures, flown beside proved</h2>\n"
         f"<p>{escape(_summary(mission))}.{known}</p>\n{wrong}"
         f'<table class="answers">{head}\n{bodies}</table>\n'
     )
 
 
 def _body(rows: Sequence[Beside], unknown: str) -> str:
-    """Return a failure: for each moment a line for each answer, one for each end; ``unknown`` is the look of what is not proved."""
+    """Return a failure: for each moment a line for each response, one for each end; ``unknown`` is the look of what is not proved."""
     lines = [_moment(row, unknown) for row in rows]
     row = rows[0]
     proved = next((one.proved for one in rows if one.proved), None)

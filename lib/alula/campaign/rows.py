@@ -11,7 +11,7 @@ from pathlib import Path
 from typing import Any
 
 from alula.campaign.failures import FAULT, PROCESS, Failure, Way, as_dict, failures_by, failures_in, name_of, ways_to_fail
-from alula.campaign.flown import FlownAnswer
+from alula.campaign.flown import FlownResponse
 from alula.campaign.live import run_live
 from alula.campaign.mocked_scenarios import MockedScenario, load_mocked_scenario
 from alula.campaign.plan import SIMULATOR, PlannedRun
@@ -55,7 +55,7 @@ def _mocked(planned: PlannedRun, behaviour: tuple[str, ...]) -> Row:
     landed = came_back(mocked.events)
     found = {"outcome": mocked.end.outcome.value, "reason": mocked.end.reason, "landed": landed, "open": list(mocked.open)}
     found |= {"problems": list(mocked.notes), "collisions": None, "min_clearance_m": None, "died": [], "exit_code": None}
-    left = _Evidence(mocked.events, mocked.places, first_s=mocked.faults, behaviour=scenario.behaviour, answers=mocked.answers)
+    left = _Evidence(mocked.events, mocked.places, first_s=mocked.faults, behaviour=scenario.behaviour, responses=mocked.responses)
     return _row(planned, found, left, monitor, ways)
 
 
@@ -88,7 +88,7 @@ class _Evidence:
         known: the events, and the ends that only the mission was told of; None: there are none of these.
         first_s: when mocks say that each fault came first.
         behaviour: of the mocks.
-        answers: what the tree did about each failure that it saw; live runs don't tell.
+        responses: what the tree did about each failure that it saw; live runs don't tell.
     """
 
     events: Sequence[EngineEvent]
@@ -96,7 +96,7 @@ class _Evidence:
     known: Sequence[EngineEvent] | None = None
     first_s: Mapping[str, float] | None = None
     behaviour: Behaviour | None = None
-    answers: Sequence[FlownAnswer] = ()
+    responses: Sequence[FlownResponse] = ()
 
 
 def _row(planned: PlannedRun, found: Mapping[str, Any], left: _Evidence, monitor: Monitor, ways: Sequence[Way]) -> Row:
@@ -124,16 +124,16 @@ def _row(planned: PlannedRun, found: Mapping[str, Any], left: _Evidence, monitor
         "events": len(left.events),
         "conforms": monitor.verdict.conforms,
         "failures": [as_dict(failure, origin_s) for failure in every],
-        "answers": _answers(left.answers, events, [fault for _, fault in asked], origin_s),
+        "answers": _responses(left.responses, events, [fault for _, fault in asked], origin_s),
     }
 
 
-def _answers(answers: Sequence[FlownAnswer], events: Sequence[EngineEvent], faults: Sequence[Fault], origin_s: float) -> list[Row]:
-    """Return the answers to failures, each with when it failed, and the fault of the run that it follows from, if any."""
+def _responses(responses: Sequence[FlownResponse], events: Sequence[EngineEvent], faults: Sequence[Fault], origin_s: float) -> list[Row]:
+    """Return the responses to failures, each with when it failed, and the fault of the run that it follows from, if any."""
     causes = {failure.end.id: traced.fault.name for traced in trace(faults, events) for failure in traced.failures}
     ended_s = {event.id: event.stamp_s for event in events if isinstance(event, ExecutionEvent) and event.state.terminal}
     return [
-        {**one.as_dict(), "at_s": round(ended_s.get(one.id, origin_s) - origin_s, 6), "fault": causes.get(one.id, "")} for one in answers
+        {**one.as_dict(), "at_s": round(ended_s.get(one.id, origin_s) - origin_s, 6), "fault": causes.get(one.id, "")} for one in responses
     ]
 
 

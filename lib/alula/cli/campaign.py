@@ -1,6 +1,6 @@
 """``./alula campaign``: does a campaign, goes on where it stopped, and ends with the failure coverage.
 
-Ends with 0: all done, 1: done, and runs had trouble, or answers that the proof does not know, 2: could not start, or could not write
+Ends with 0: all done, 1: done, and runs had trouble, or responses that the proof does not know, 2: could not start, or could not write
 its folder any more.
 """
 
@@ -12,7 +12,7 @@ from collections.abc import Sequence
 from functools import partial
 from pathlib import Path
 
-from alula.campaign.beside import MissionAnswers, beside
+from alula.campaign.beside import MissionResponses, beside
 from alula.campaign.coverage import Coverage, cover, processes
 from alula.campaign.failures import ways_to_fail
 from alula.campaign.mocked_scenarios import load_mocked_scenario
@@ -66,8 +66,8 @@ class Teller:
             sys.stderr.flush()
 
 
-def answers_of(campaign: Campaign, rows: Sequence[Row], time_s: float) -> list[MissionAnswers]:
-    """Return the answers of each mission of a campaign over mocks, flown beside proved; live runs don't tell theirs."""
+def responses_of(campaign: Campaign, rows: Sequence[Row], time_s: float) -> list[MissionResponses]:
+    """Return the responses of each mission of a campaign over mocks, flown beside proved; live runs don't tell theirs."""
     if campaign.over != MOCKS:
         return []
     found, models, effects = [], robot_skillsets(), effects_of_robot()
@@ -87,7 +87,7 @@ def finish(campaign: Campaign, table: Table, out: Path, title: str, time_s: floa
     table.finish()
     rows = [table.rows[number] for number in sorted(table.rows)]
     ways = ways_to_fail(robot_skillsets(), processes(map(load_scenario, scenario_names())))
-    coverage = cover(rows, ways, answers_of(campaign, rows, time_s))
+    coverage = cover(rows, ways, responses_of(campaign, rows, time_s))
     write_json(out / "coverage.json", coverage.as_dict())
     write_text(out / "coverage.txt", as_text(coverage))
     write_text(out / "coverage.html", as_page(coverage, title))

@@ -9,12 +9,12 @@ from alula.language.errors import Diagnostic, Severity
 from alula.model.model import Property
 from alula.model.span import Span
 from alula.prove.limits import Deadline
-from alula.prove.mission.answers import GOOD, Answers, Row
 from alula.prove.mission.deciding import answers_of, never_coming, never_deciding
 from alula.prove.mission.fights import fights
 from alula.prove.mission.left import left_taken
 from alula.prove.mission.refusals import Refusal, failing, refusal_of
 from alula.prove.mission.regions import Regions
+from alula.prove.mission.responses import GOOD, FailureResponses, Row
 from alula.prove.mission.run import MissionFinding, MissionRun, run_of
 from alula.prove.mission.system import FAILED, System
 from alula.prove.mission.waits import Waits
@@ -26,11 +26,11 @@ OWN = "ALU715"
 ANSWER = "put a Fallback around it with what is to be done then, or `<AlwaysFailure/>` where giving up is meant"
 
 
-def findings(regions: Regions, answers: Answers) -> list[Diagnostic]:
+def findings(regions: Regions, responses: FailureResponses) -> list[Diagnostic]:
     """Return what is wrong, or can go wrong, each finding with a run that shows it."""
     found = leaving_and_fighting(regions)
     # What never happens is known only when all runs were looked at.
-    return [*found, *_unanswered(regions, answers), *_never(regions)] if regions.complete else found
+    return [*found, *_unanswered(regions, responses), *_never(regions)] if regions.complete else found
 
 
 def leaving_and_fighting(regions: Regions) -> list[Diagnostic]:
@@ -81,10 +81,10 @@ def _left_taken(regions: Regions) -> Iterator[Diagnostic]:
         yield _finding("ALU701", message, system.nodes[0], cure, told(system, run.events), run)
 
 
-def _unanswered(regions: Regions, answers: Answers) -> Iterator[Diagnostic]:
+def _unanswered(regions: Regions, responses: FailureResponses) -> Iterator[Diagnostic]:
     """Yield ALU702 for failures after which the tree asks for nothing any more, and the mission is not accomplished; ALU705: refusals."""
     seen: set[tuple[int, str]] = set()
-    for row in answers.rows:
+    for row in responses.rows:
         if row.starts or row.outcomes & GOOD or not row.loses or not row.outcomes:
             continue
         refusal = refusal_of(regions, row)

@@ -13,7 +13,6 @@ from alula.missions.plan import InputError
 from alula.model.span import Span
 from alula.prove.limits import Deadline, OutOfTimeError
 from alula.prove.mission.accepted import acceptances, divided
-from alula.prove.mission.answers import Answers, Row
 from alula.prove.mission.asked import with_asked_resources
 from alula.prove.mission.conditions import NO_FAULTS, Faults
 from alula.prove.mission.findings import WAITS, findings, leaving_and_fighting, taken_as, unless_held_up, waits
@@ -21,6 +20,7 @@ from alula.prove.mission.holding import SINGLE, held
 from alula.prove.mission.managers import Failures
 from alula.prove.mission.oracle import UndecidedError
 from alula.prove.mission.regions import Regions
+from alula.prove.mission.responses import FailureResponses, Row
 from alula.prove.mission.system import System, look_at
 from alula.prove.mission.waits import Waits
 from alula.prove.mission.wanted import wanted
@@ -128,9 +128,9 @@ class _Search:
         except OutOfTimeError:
             return _Seen(self._path, None, bounds=(_bound(self._path, 0, given),))
         properties, wrong = wanted(regions.system.nodes, regions.system.skillsets, self._faults)
-        answers = Answers(regions)
+        responses = FailureResponses(regions)
         looked = Waits(regions)
-        found = [*taken_as(regions.system), *findings(regions, answers)]
+        found = [*taken_as(regions.system), *findings(regions, responses)]
         seen_waiting, complete = _waits(looked, regions, deadline.half(deadline.doing) if several else deadline)
         found += [*seen_waiting, *wrong]
         undecided = []
@@ -141,7 +141,7 @@ class _Search:
             helped = one.kind not in SINGLE and not one.within and not seen.finding and seen.complete
             found += list(unless_held_up(regions.system, one)) if helped else []
         bounds = () if complete and not undecided else (_bound(self._path, len(regions.regions), given, undecided),)
-        return _Seen(self._path, regions.system, tuple(found), tuple(answers.rows), bounds)
+        return _Seen(self._path, regions.system, tuple(found), tuple(responses.rows), bounds)
 
     def _regions(self, deadline: Deadline) -> tuple[Regions, bool]:
         """Return what was looked at within a time, and whether a property needs some of that; raises as ``System.of``."""

@@ -5,8 +5,8 @@ from __future__ import annotations
 from collections.abc import Iterator
 from dataclasses import dataclass
 
-from alula.prove.mission.answers import Row, Way
 from alula.prove.mission.regions import Closure, Regions
+from alula.prove.mission.responses import Row, Way
 from alula.prove.mission.state import Event, Kind, State
 
 

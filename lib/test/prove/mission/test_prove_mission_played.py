@@ -14,10 +14,10 @@ from alula.missions.director import Outcome
 from alula.missions.mission_file import MissionFile
 from alula.missions.part import NO_PART
 from alula.prove.limits import Deadline, OutOfTimeError
-from alula.prove.mission.answers import Answers
 from alula.prove.mission.play import play
 from alula.prove.mission.prover import LOOKED_AT, prove_mission, prove_within
 from alula.prove.mission.regions import Regions
+from alula.prove.mission.responses import FailureResponses
 from alula.prove.mission.run import MissionFinding, MissionRun
 from alula.prove.mission.state import Kind
 from alula.prove.mission.system import System
@@ -117,7 +117,7 @@ def test_data_that_break_an_invariant_or_refuse_are_played(tmp_path: Path) -> No
     system = System.of(MissionFile.read(path, robot.skillsets, NO_PART), LOOKED_AT)
     regions = Regions(system, Deadline.after(60.0))
     regions.explore()
-    rows = {(row.skill, row.end): row for row in Answers(regions).rows}
+    rows = {(row.skill, row.end): row for row in FailureResponses(regions).rows}
     kinds = set()
     for row in rows.values():
         events, state = regions.run_on(row.region, *row.way)

@@ -29,12 +29,12 @@ from alula.missions.skillset import MissionClient
 from alula.model.model import Skillset
 from alula.prove.limits import Deadline, OutOfTimeError
 from alula.prove.mission.ahead import Ahead, Looking
-from alula.prove.mission.answers import Answers
 from alula.prove.mission.findings import findings
 from alula.prove.mission.managers import Failures
 from alula.prove.mission.oracle import UndecidedError
 from alula.prove.mission.prover import Proved, prove_mission, prove_within
 from alula.prove.mission.regions import Regions
+from alula.prove.mission.responses import FailureResponses
 from alula.prove.mission.state import State
 from alula.prove.mission.system import System
 from alula.records.causes.fault_file import states_of_faults
@@ -415,7 +415,7 @@ def shown(path: Path, failures: Failures) -> tuple[set[tuple[object, ...]], set[
             for managers in map(system.managers_of, numbers):
                 open_ = tuple(one._replace(left=False) for one in managers.executions if one.phase != "ended")
                 seen.add((active, memory.end, place, managers.states, open_))
-    found = {one.message for one in findings(regions, Answers(regions))}
+    found = {one.message for one in findings(regions, FailureResponses(regions))}
     # But in which states, and what else happened in the run that is told of several.
     return seen, {re.sub(r" \([^()]*==[^()]*\)(?=$|: left by)|, because after the tree has asked [^:]*", "", message) for message in found}
 

@@ -1,4 +1,4 @@
-"""A campaign's answers to failures beside the proved ones: those of real flights are known, those of another tree are errors."""
+"""A campaign's responses to failures beside the proved ones: those of real flights are known, those of another tree are errors."""
 
 from __future__ import annotations
 
@@ -12,9 +12,9 @@ import pytest
 
 pytest.importorskip("z3")
 
-from alula.campaign.beside import NOTHING, MissionAnswers, beside
+from alula.campaign.beside import NOTHING, MissionResponses, beside
 from alula.campaign.coverage import Coverage
-from alula.campaign.flown import FlownAnswer
+from alula.campaign.flown import FlownResponse
 from alula.campaign.mocked_scenarios import load_mocked_scenario
 from alula.campaign.plan import MOCKS, PlannedRun
 from alula.campaign.proved import ProvedMission, proved
@@ -57,7 +57,7 @@ def another_robot(folder: Path) -> Path:
 
 
 @pytest.mark.long
-def test_all_answers_of_flights_are_proved_and_those_of_another_tree_are_errors(
+def test_all_responses_of_flights_are_proved_and_those_of_another_tree_are_errors(
     tmp_path: Path, capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch
 ) -> None:
     assert campaign(tmp_path) == 0, capsys.readouterr().err
@@ -76,7 +76,7 @@ def test_all_answers_of_flights_are_proved_and_those_of_another_tree_are_errors(
     assert set(one["flown"]["faults"]) == {"zed"}
     assert "'watch with the ZED' (perception.zed_depthmap) fails while mapping.lidar_mapping, navigation.goto_straight ran" in said.out
     page = (tmp_path / "out/coverage.html").read_text(encoding="utf-8")
-    assert "Each flown answer is one of the proved ones." in page
+    assert "Each flown response is one of the proved ones." in page
     assert "not proved" not in page
 
     # The same table, and the proof of another tree.
@@ -98,11 +98,11 @@ def test_all_answers_of_flights_are_proved_and_those_of_another_tree_are_errors(
     assert "not proved: degraded" in page
 
 
-def test_an_answer_is_what_the_tree_asked_for_in_the_tick_that_saw_the_failure() -> None:
+def test_a_response_is_what_the_tree_asked_for_in_the_tick_that_saw_the_failure() -> None:
     (row,) = rows_of([PlannedRun(0, "mapping", 0, ("zed@10",))], MOCKS, (), "")
     (told,) = row["answers"]
     assert (told["fault"], 10.3 < told["at_s"] < 10.4) == ("zed", True)
-    one = FlownAnswer.read(json.loads(json.dumps(told)))
+    one = FlownResponse.read(json.loads(json.dumps(told)))
     assert (one.place, one.skill, one.state, one.result) == (
         WATCH,
         "perception.zed_depthmap",
@@ -113,21 +113,21 @@ def test_an_answer_is_what_the_tree_asked_for_in_the_tick_that_saw_the_failure()
     assert [place[-1] for place in one.asked] == ["watch with the LiDAR"]
 
 
-def test_a_mission_that_asks_for_nothing_more_has_an_answer_without_skills() -> None:
+def test_a_mission_that_asks_for_nothing_more_has_a_response_without_skills() -> None:
     row = load_mocked_scenario("mapping").run(PlannedRun(0, "mapping", 0, ("pilot@10",)).requests)
-    assert [(one.result, one.asked) for one in row.answers] == [("keep_sdk_authority", ())]
+    assert [(one.result, one.asked) for one in row.responses] == [("keep_sdk_authority", ())]
 
 
-def answers_of(mission: ProvedMission) -> MissionAnswers:
+def responses_of(mission: ProvedMission) -> MissionResponses:
     return beside("mapping", mission, rows_of([PlannedRun(0, "mapping", 0, ("zed@10",))], MOCKS, (), ""))
 
 
 def test_a_proof_that_is_not_whole_makes_no_error() -> None:
-    assert len(answers_of(ProvedMission()).unknown) == 1
-    answers = answers_of(proved(load_scenario("mapping"), robot_skillsets(), effects_of_robot(), print, 0.0))
-    assert answers.unproved == "not all runs were looked at in 0 s"
-    assert answers.unknown == []
-    coverage = Coverage([], 1, {"degraded": 1}, [], [answers])
+    assert len(responses_of(ProvedMission()).unknown) == 1
+    responses = responses_of(proved(load_scenario("mapping"), robot_skillsets(), effects_of_robot(), print, 0.0))
+    assert responses.unproved == "not all runs were looked at in 0 s"
+    assert responses.unknown == []
+    coverage = Coverage([], 1, {"degraded": 1}, [], [responses])
     assert coverage.unknown == []
     assert "not all runs were looked at" in as_text(coverage)
     assert "<p class=" not in as_page(coverage, "one flight")

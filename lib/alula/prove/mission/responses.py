@@ -1,6 +1,6 @@
 """The response of a mission to each failure: the coverage of its failures, from all its runs.
 
-A row is a skill that fails in some way, at a moment: the other leaves that run then, their skills asked for. Its answer is what the tree
+A row is a skill that fails in some way, at a moment: the other leaves that run then, their skills asked for. Its response is what the tree
 asks for next; its outcomes are all ways in which the mission can end from there, whatever else happens, unless somebody aborts it.
 """
 
@@ -66,7 +66,7 @@ class Row:
         }
 
 
-class Answers:
+class FailureResponses:
     """The rows of all failures that the regions show."""
 
     def __init__(self, regions: Regions) -> None:
