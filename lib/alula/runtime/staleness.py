@@ -38,9 +38,9 @@ def with_silences(skillset: Skillset, given_s: Callable[[str, float], float]) ->
 
 
 class StalenessWatch:
-    """Tells once when a source that was heard of is not heard of any more; it is watched again from when it is.
+    """Reports once when a source that has sent something falls silent; it is watched again from its next message on.
 
-    There is one timer a source at a time, for the moment at which the last that was heard would be stale.
+    There is one timer a source at a time, for the moment at which its last message would be stale.
 
     Args:
         middleware: its clock and timers.
@@ -50,34 +50,34 @@ class StalenessWatch:
     def __init__(self, middleware: Middleware, on_stale: Callable[[str], None]) -> None:
         self._middleware = middleware
         self._on_stale = on_stale
-        self._heard_ns: dict[str, int] = {}
+        self._sampled_ns: dict[str, int] = {}
         self._watched: set[str] = set()
         self._lock = threading.Lock()
 
-    def heard(self, name: str, stamp_ns: int, limit_ns: int) -> None:
-        """Note that a source was heard of at ``stamp_ns``; it is stale when it is not again within ``limit_ns``; from any thread."""
+    def on_sample(self, name: str, stamp_ns: int, limit_ns: int) -> None:
+        """Note that a source has sent something at ``stamp_ns``; without more within ``limit_ns`` it is stale; from any thread."""
         with self._lock:
-            self._heard_ns[name] = stamp_ns
+            self._sampled_ns[name] = stamp_ns
             first = name not in self._watched
             self._watched.add(name)
         if first:
             self._look_at(name, stamp_ns, limit_ns)
 
     def silent_ns(self, name: str) -> int | None:
-        """Return for how long a source was not heard of that is stale; None: it is not."""
+        """Return for how long a stale source has sent nothing; None: it is not stale."""
         with self._lock:
-            return None if name in self._watched or name not in self._heard_ns else self._middleware.now_ns() - self._heard_ns[name]
+            return None if name in self._watched or name not in self._sampled_ns else self._middleware.now_ns() - self._sampled_ns[name]
 
     def forget(self) -> None:
-        """Watch no source until it is heard of again."""
+        """Watch no source until it sends something again."""
         with self._lock:
-            self._heard_ns.clear()
+            self._sampled_ns.clear()
             self._watched.clear()
 
     def _look_at(self, name: str, stamp_ns: int, limit_ns: int) -> None:
         def look() -> None:
             with self._lock:
-                latest_ns = self._heard_ns.get(name)
+                latest_ns = self._sampled_ns.get(name)
                 stale = latest_ns is not None and latest_ns <= stamp_ns
                 if stale:
                     self._watched.discard(name)

@@ -67,7 +67,7 @@ def test_managers_that_can_not_be_called_are_told_of_once_and_their_next_ones_ar
     assert known.missing == "a description that can be used here"
     managers.model, managers.types = MODEL, True
     known.on_heartbeat("new")
-    known.heard_states()
+    known.on_states()
     assert known.ready.is_set()
     assert known.missing == ""
 

@@ -55,7 +55,7 @@ class Graph:
 
     def __init__(self) -> None:
         self.clock = VirtualClock()
-        self.heard: dict[str, object] = {}
+        self.received: dict[str, object] = {}
         self.link = Link()
         self.errors: list[str] = []
         self.silent = False
@@ -70,7 +70,7 @@ class Graph:
     action = lambda self, skill, listener: self.link  # noqa: E731
 
     def subscribe(self, topic, callback):
-        self.heard[topic.name] = callback
+        self.received[topic.name] = callback
         return lambda: True
 
     def watch(self, on_heartbeat, on_doubt):
@@ -89,12 +89,12 @@ class Graph:
 
     def states(self, instance_id: str, after: int = 0, **resources: str) -> None:
         values = {name: ResourceStatus(state, "", 0) for name, state in resources.items()}
-        self.heard[RESOURCE_STATES.name](ResourceStates(instance_id, after, self.clock.now_ns, values))
+        self.received[RESOURCE_STATES.name](ResourceStates(instance_id, after, self.clock.now_ns, values))
 
     def tell(self, instance_id: str, handle, state: ExecutionState, sequence: int = 0) -> None:
         self.sequence = sequence or self.sequence + 1
         event = ExecutionEvent(self.sequence, self.clock.now_ns, "takeoff", handle.id, state, "", "", {}, {}, instance_id=instance_id)
-        self.heard[EVENTS.name](event)
+        self.received[EVENTS.name](event)
 
 
 @pytest.fixture
@@ -152,15 +152,15 @@ def test_a_goal_that_was_taken_and_is_not_told_of_is_asked_for(graph, client):
     graph.link.sent[handle.id](True)
     graph.run_for(SILENCE_S + 0.1)
     assert (handle.done, graph.link.asked) == (False, [handle.id])
-    client._news.on_result(handle.id, None)
+    client._sync.on_result(handle.id, None)
     assert (handle.state, "do not know this execution" in handle.message) == (S.FAILED, True)
 
 
 def test_a_gap_in_the_events_has_the_endings_asked_for(graph, client):
     handle = running(graph, client)
-    graph.heard[EVENTS.name](TransitionEvent(9, 0, "sdk", "A", "B", "extern", instance_id="one"))
+    graph.received[EVENTS.name](TransitionEvent(9, 0, "sdk", "A", "B", "extern", instance_id="one"))
     assert graph.link.asked == [handle.id]
-    client._news.on_result(handle.id, GoalResult(S.TERMINATED, "DONE", "there", {}))
+    client._sync.on_result(handle.id, GoalResult(S.TERMINATED, "DONE", "there", {}))
     assert not handle.done  # its event may still come, and say when it was
     graph.run_for(LOST_S)
     assert (handle.state, handle.result) == (S.TERMINATED, "DONE")
@@ -170,9 +170,9 @@ def test_a_result_that_comes_long_before_its_event_waits_for_what_has_led_to_it(
     handle = running(graph, client)
     seen = []
     handle.add_done_callback(lambda _: seen.append((graph.clock.now_ns, client.resources)))
-    client._news.on_result(handle.id, GoalResult(S.RESOURCE_INVARIANT_VIOLATED, "has_sdk", "", {}))
+    client._sync.on_result(handle.id, GoalResult(S.RESOURCE_INVARIANT_VIOLATED, "has_sdk", "", {}))
     graph.run_for(GRACE_S - 1.0)
-    graph.heard[EVENTS.name](TransitionEvent(3, 0, "sdk", "AVAILABLE", "UNAVAILABLE", "extern", instance_id="one"))
+    graph.received[EVENTS.name](TransitionEvent(3, 0, "sdk", "AVAILABLE", "UNAVAILABLE", "extern", instance_id="one"))
     graph.tell("one", handle, S.RESOURCE_INVARIANT_VIOLATED, sequence=4)
     graph.run_for(GRACE_S - 1.0)
     assert seen == []
@@ -188,7 +188,7 @@ def test_a_state_is_shown_when_the_event_that_has_led_to_it_was_told(graph, clie
     graph.states("one", after=2, sdk="AVAILABLE")
     assert (seen, client.resources) == ([], {"sdk": "AVAILABLE"})
     for sequence, before, after in ((1, "AVAILABLE", "UNAVAILABLE"), (2, "UNAVAILABLE", "AVAILABLE")):
-        graph.heard[EVENTS.name](TransitionEvent(sequence, 0, "sdk", before, after, "extern", instance_id="one"))
+        graph.received[EVENTS.name](TransitionEvent(sequence, 0, "sdk", before, after, "extern", instance_id="one"))
     assert seen == [1, "UNAVAILABLE", 2, "AVAILABLE"]
 
 
@@ -205,14 +205,14 @@ def test_a_state_whose_event_got_lost_is_shown_all_the_same_and_none_of_managers
 
 def test_an_end_whose_event_never_comes_is_told_all_the_same(graph, client):
     handle = running(graph, client)
-    client._news.on_result(handle.id, GoalResult(S.TERMINATED, "DONE", "there", {}))
+    client._sync.on_result(handle.id, GoalResult(S.TERMINATED, "DONE", "there", {}))
     graph.run_for(GRACE_S)
     assert (handle.state, handle.result) == (S.TERMINATED, "DONE")
 
 
 def test_an_end_is_told_when_the_resources_after_it_are_known(graph, client):
     handle = running(graph, client)
-    graph.heard[EVENTS.name](TransitionEvent(3, 0, "axes", "USED", "AVAILABLE", "takeoff", instance_id="one"))
+    graph.received[EVENTS.name](TransitionEvent(3, 0, "axes", "USED", "AVAILABLE", "takeoff", instance_id="one"))
     graph.tell("one", handle, S.TERMINATED, sequence=4)
     assert not handle.done
     seen = []

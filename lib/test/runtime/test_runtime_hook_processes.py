@@ -10,7 +10,7 @@ import pytest
 from alula.model.execution_state import ExecutionState as S
 from alula.runtime.core import SkillsetEngine
 from alula.runtime.hook_processes import HookServer, RemoteHooks, pipe_address
-from alula.runtime.hook_processes.place import pipe_key
+from alula.runtime.hook_processes.pipe import pipe_key
 from alula.runtime.hooks import SkillHooks
 from alula_testing.runtime_models import flying_skill, flying_skillset
 from alula_testing.waits import until

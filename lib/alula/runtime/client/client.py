@@ -12,7 +12,7 @@ from alula.model.model import Data, Skillset
 from alula.runtime.callbacks import Unsubscribe
 from alula.runtime.client.feed import Feed
 from alula.runtime.client.goal import GoalTracker
-from alula.runtime.client.news import ClientNews, OnChange, OnEvent, OnSkills
+from alula.runtime.client.state_sync import OnChange, OnEvent, OnSkills, StateSync
 from alula.runtime.core.records import SkillRecord
 from alula.runtime.core.replies import TransitionReply
 from alula.runtime.core.why import Why
@@ -36,8 +36,8 @@ class Client:
         self._middleware = middleware
         self._feeds: dict[str, Feed] = {}
         self._feeding = threading.Lock()
-        self._news = ClientNews(middleware, skillset)
-        self._connection = self._news.connection
+        self._sync = StateSync(middleware, skillset)
+        self._connection = self._sync.connection
 
     # --- the managers ------------------------------------------------------------------------------------------------
 
@@ -75,8 +75,8 @@ class Client:
 
     def close(self, reason: str = "") -> None:
         """End every wait for this reason, and this client's connections; what runs goes on running."""
-        if not self._news.closed:
-            self._news.close(reason or f"the client of {self.skillset} was closed")
+        if not self._sync.closed:
+            self._sync.close(reason or f"the client of {self.skillset} was closed")
             self._middleware.close()
 
     # --- what is known -----------------------------------------------------------------------------------------------
@@ -84,17 +84,17 @@ class Client:
     @property
     def resources(self) -> dict[str, str]:
         """Return the state of every resource by name; empty before the managers' first message, and once they are gone."""
-        return {} if self._connection.gone else dict(self._news.resources)
+        return {} if self._connection.gone else dict(self._sync.resources)
 
     @property
     def reasons(self) -> dict[str, str]:
         """The reason that the functional layer reported for each resource's state, by name; empty where it reported none."""
-        return {} if self._connection.gone else dict(self._news.reasons)
+        return {} if self._connection.gone else dict(self._sync.reasons)
 
     @property
     def skills(self) -> dict[str, SkillRecord]:
         """Return, by skill, its open executions and its last end; empty before the managers' first message, and once they are gone."""
-        return {} if self._connection.gone else dict(self._news.skills)
+        return {} if self._connection.gone else dict(self._sync.skills)
 
     def last(self, skill: str) -> Ended[dict[str, Any], str] | None:
         """Return how the skill's last execution ended, of any caller and at any time; None when none has.
@@ -103,7 +103,7 @@ class Client:
             ValueError: there is no such skill.
         """
         self._check_skill(skill)
-        known = self._news.last.get(skill)
+        known = self._sync.last.get(skill)
         if known is None:
             return None
         ended = known[1]
@@ -113,15 +113,15 @@ class Client:
 
     def on_change(self, callback: OnChange) -> Unsubscribe:
         """Call ``callback(resources)`` after each step that changed a resource; the return value unsubscribes."""
-        return self._news.on_changes.add(callback)
+        return self._sync.on_changes.add(callback)
 
     def on_event(self, callback: OnEvent) -> Unsubscribe:
         """Call ``callback(event)`` for each event from now on, an ``EngineEvent``; the return value unsubscribes."""
-        return self._news.on_events.add(callback)
+        return self._sync.on_events.add(callback)
 
     def on_skills(self, callback: OnSkills) -> Unsubscribe:
         """Call ``callback(skills)`` after changes, with a ``SkillRecord`` by skill; the return value unsubscribes."""
-        return self._news.on_skills.add(callback)
+        return self._sync.on_skills.add(callback)
 
     def data_feed(self, name: str, every_s: float = 0.0) -> Feed:
         """Return the feed of a data, subscribed to at the first call, from any thread; it has at most one value in ``every_s`` seconds.
@@ -156,8 +156,8 @@ class Client:
         if not self.ready:
             return self._not_started(skill)
         link = self._connection.links[skill]
-        tracker = GoalTracker(self._middleware, self.skillset, skill, link, self._news, pause=self.set_paused, on_over=self._news.over)
-        self._news.follow(tracker, goal)
+        tracker = GoalTracker(self._middleware, self.skillset, skill, link, self._sync, pause=self.set_paused, on_over=self._sync.over)
+        self._sync.follow(tracker, goal)
         return tracker.handle
 
     def interrupt_all(self, skill: str) -> Pending[int]:
@@ -166,7 +166,7 @@ class Client:
         pending = self._open_question()
         if pending.done:
             return pending
-        known = self._news.skills.get(skill, SkillRecord())
+        known = self._sync.skills.get(skill, SkillRecord())
         counted = lambda count: pending.resolve(len(known.open) if count is None else count)  # noqa: E731
         self._connection.links[skill].cancel_all(counted, pending.fail)
         return pending
@@ -214,7 +214,7 @@ class Client:
 
     def moment(self) -> Pending[Any]:
         """Return an answer to be resolved by the caller; it fails when the managers are gone."""
-        return self._news.moment()
+        return self._sync.moment()
 
     # --- inside ------------------------------------------------------------------------------------------------------
 
@@ -238,8 +238,8 @@ class Client:
     def _open_question(self) -> Pending[Any]:
         """Return an answer to wait for; it has failed already where none can be given."""
         pending = self.moment()
-        if self._news.closed or self._connection.gone:
-            pending.fail(self._news.closed or self._not_there())
+        if self._sync.closed or self._connection.gone:
+            pending.fail(self._sync.closed or self._not_there())
         return pending
 
     def _goal(self, skill: str, inputs: Mapping[str, object]) -> Any:

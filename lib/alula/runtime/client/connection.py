@@ -50,12 +50,12 @@ class Connection:
         self._described = ""
         self._unusable = ""
         """The managers whose description can't be used; each is reported once."""
-        self._states_heard = ""
+        self._states_of = ""
         self._asking = False
         self._looking = False
         self._past: dict[str, int] = {}
 
-    def heard(self, instance_id: str, stamp_ns: int = 0) -> bool:
+    def on_message(self, instance_id: str, stamp_ns: int = 0) -> bool:
         """Take a message of managers; False when others have replaced them, and it comes late."""
         if instance_id in self._past:
             if stamp_ns > self._past[instance_id] + RIVALS_NS:
@@ -70,15 +70,15 @@ class Connection:
             self._on_restart()
         return True
 
-    def heard_states(self) -> None:
+    def on_states(self) -> None:
         """Note that the resources of the present managers are known."""
-        if self._states_heard != self.instance_id:
-            self._states_heard = self.instance_id
+        if self._states_of != self.instance_id:
+            self._states_of = self.instance_id
             self._look()
 
     def on_heartbeat(self, instance_id: str, stamp_ns: int = 0) -> None:
         """Take a heartbeat; ``stamp_ns``: when it was sent (mission clock), 0 where that is not known."""
-        if not self.heard(instance_id, stamp_ns):
+        if not self.on_message(instance_id, stamp_ns):
             return
         self._doubted = False
         if not self._alive:
@@ -168,7 +168,7 @@ class Connection:
 
     @property
     def _known(self) -> bool:
-        return self._alive and self.instance_id == self._described == self._states_heard
+        return self._alive and self.instance_id == self._described == self._states_of
 
     @property
     def _connected(self) -> bool:

@@ -26,7 +26,7 @@ LOST_S = 0.5
 """A result waits so long for its event where events got lost, which its own may be one of."""
 
 
-class News(Protocol):
+class KnownStates(Protocol):
     """The part of a client's knowledge that a goal needs."""
 
     @property
@@ -35,7 +35,7 @@ class News(Protocol):
         ...
 
     @property
-    def heard(self) -> int:
+    def received(self) -> int:
         """How many messages of the managers have arrived."""
         ...
 
@@ -52,7 +52,7 @@ class GoalTracker:
         skillset: str,
         skill: str,
         link: ActionLink,
-        news: News,
+        known: KnownStates,
         *,
         pause: Callable[[str, bool], Pending[str]],
         on_over: Callable[[GoalTracker, bool], None],
@@ -66,7 +66,7 @@ class GoalTracker:
         """The managers that have acknowledged it; empty before."""
         self._middleware = middleware
         self._skillset = skillset
-        self._news = news
+        self._known = known
         self._on_over = on_over
         self._lock = threading.Lock()
         self._acknowledged = False
@@ -74,7 +74,7 @@ class GoalTracker:
         self._end: tuple[int, GoalResult] | None = None
         self._grace_s = GRACE_S
         self._looks = 0
-        self._heard = news.heard
+        self._received = known.received
         self._timer: Timer | None = None
         self._feedback: tuple[float, Mapping[str, object]] = (0.0, {})
 
@@ -124,7 +124,7 @@ class GoalTracker:
 
     def settle(self) -> None:
         """End if the end is known, and the resources as they were after it."""
-        if self._end is not None and self._news.states_after >= self._end[0]:
+        if self._end is not None and self._known.states_after >= self._end[0]:
             self._finish()
 
     def abandon(self, reason: str, *, orphan: bool = False) -> None:
@@ -172,8 +172,8 @@ class GoalTracker:
             self._timer = self._middleware.later(SILENCE_S, self._look)
             return
         self._looks += 1
-        heard, self._heard = self._heard, self._news.heard
-        if heard != self._heard and self._looks < ACKNOWLEDGE_LIMIT:
+        received, self._received = self._received, self._known.received
+        if received != self._received and self._looks < ACKNOWLEDGE_LIMIT:
             self._timer = self._middleware.later(ACKNOWLEDGE_S, self._look)
         else:
             self.abandon(f"the managers of {self._skillset} did not answer within {self._looks * ACKNOWLEDGE_S:g} s", orphan=True)

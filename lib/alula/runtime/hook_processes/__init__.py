@@ -13,7 +13,7 @@ each end shows the other that it has the key that lies there.
 """
 
 from alula.runtime.hook_processes.caller import RemoteHooks
-from alula.runtime.hook_processes.place import pipe_address
+from alula.runtime.hook_processes.pipe import pipe_address
 from alula.runtime.hook_processes.server import HookServer
 
 __all__ = ["HookServer", "RemoteHooks", "pipe_address"]

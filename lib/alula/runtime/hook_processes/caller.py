@@ -17,7 +17,7 @@ from alula.runtime.core.events import EngineEvent, ExecutionEvent
 from alula.runtime.core.execution import Execution
 from alula.runtime.core.hook_calls import HookOutcome, Then
 from alula.runtime.core.sanitize import error_line
-from alula.runtime.hook_processes.place import Snapshot, admit, hang_up, opened, pipe_key, sealed, snapshot
+from alula.runtime.hook_processes.pipe import Snapshot, admit, hang_up, opened, pipe_key, sealed, snapshot
 
 ENDED = "its process has ended"
 ASKED = {"terminate", "fail", "interrupted", "set_outputs"}
@@ -85,7 +85,7 @@ class RemoteHooks:
         for event in events:
             process = self._processes.get(event.skill) if isinstance(event, ExecutionEvent) else None
             if process is not None and isinstance(event, ExecutionEvent):
-                process.tell(Snapshot(event.id, None, event.state, event.result, event.message, dict(event.outputs), 0.0))
+                process.report(Snapshot(event.id, None, event.state, event.result, event.message, dict(event.outputs), 0.0))
 
     # --- inside ------------------------------------------------------------------------------------------------------
 
@@ -187,7 +187,7 @@ class _SkillProcess:
         if gone is not None:
             then(gone)
 
-    def tell(self, execution: Snapshot) -> None:
+    def report(self, execution: Snapshot) -> None:
         """Send what has become of an execution."""
         self._send(("event", execution))
 

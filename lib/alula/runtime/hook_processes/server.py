@@ -16,7 +16,7 @@ from alula.model.execution_state import ExecutionState
 from alula.runtime.core.execution import Execution
 from alula.runtime.core.hook_calls import HookOutcome, call_hook
 from alula.runtime.core.sanitize import as_text, error_line
-from alula.runtime.hook_processes.place import Snapshot, hang_up, opened, pipe_key, sealed
+from alula.runtime.hook_processes.pipe import Snapshot, hang_up, opened, pipe_key, sealed
 from alula.runtime.hooks import HOOKS, SkillHooks, is_written
 from alula.runtime.workers import Workers
 
@@ -179,21 +179,21 @@ class HookServer:
             self._stopped.setdefault(execution.id, threading.Event()).set()
         return answer
 
-    def _update(self, told: Snapshot) -> Execution:
-        execution = self._executions.get(told.id)
+    def _update(self, snapshot: Snapshot) -> Execution:
+        execution = self._executions.get(snapshot.id)
         if execution is None:
-            execution = Execution(self, told.id, self._skill, told.inputs)
-            if told.id:
-                self._executions[told.id] = execution
-        self._take(execution, told)
+            execution = Execution(self, snapshot.id, self._skill, snapshot.inputs)
+            if snapshot.id:
+                self._executions[snapshot.id] = execution
+        self._take(execution, snapshot)
         return execution
 
-    def _follow(self, told: Snapshot) -> None:
-        execution = self._executions.get(told.id)
+    def _follow(self, snapshot: Snapshot) -> None:
+        execution = self._executions.get(snapshot.id)
         if execution is not None:
-            self._take(execution, told)
-            if told.state.terminal:
-                self._forget_later(told.id)
+            self._take(execution, snapshot)
+            if snapshot.state.terminal:
+                self._forget_later(snapshot.id)
 
     def _forget_later(self, execution_id: str) -> None:
         """Keep an execution that has ended for the hook that stops its function."""
@@ -203,9 +203,9 @@ class HookServer:
         self._ended.append(execution_id)
 
     @staticmethod
-    def _take(execution: Execution, told: Snapshot) -> None:
-        execution.state, execution.result, execution.message = told.state, told.result, told.message
-        execution.outputs, execution.progress = dict(told.outputs), told.progress or execution.progress
+    def _take(execution: Execution, snapshot: Snapshot) -> None:
+        execution.state, execution.result, execution.message = snapshot.state, snapshot.result, snapshot.message
+        execution.outputs, execution.progress = dict(snapshot.outputs), snapshot.progress or execution.progress
 
     def _engine_gone(self) -> None:
         """End everything: the engine knows nothing of it any more."""

@@ -60,9 +60,9 @@ class LocalManagers:
         """Take an extern transition, or say why not; ``reason``: why the resource is so, in words."""
         return self._managers.resources.transition(resource, to, reason)
 
-    def heard(self, resources: Iterable[str]) -> None:
+    def on_report(self, resources: Iterable[str]) -> None:
         """Take a heartbeat of the reporter of these resources; one with a ``silence`` becomes unknown without another within that time."""
-        self._managers.resources.heard(resources)
+        self._managers.resources.on_report(resources)
 
     def expect_nothing(self) -> None:
         """Expect no more heartbeats of reporters: no resource becomes unknown for want of one."""

@@ -52,7 +52,7 @@ class DataManager:
         data, stamp_ns = self._data[name], self._middleware.now_ns()
         self._received[name] = Sample(value, stamp_ns)
         if (limit := limit_ns(data.period_s)) is not None:
-            self._staleness.heard(name, stamp_ns, limit)
+            self._staleness.on_sample(name, stamp_ns, limit)
         self._publishers[name].publish(Sample(value, stamp_ns))
         self._update(name, value)
 

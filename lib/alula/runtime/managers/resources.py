@@ -37,7 +37,7 @@ class ResourceManager:
         self._lock = threading.Lock()
         self._silences = {one.name: one for one in engine.skillset.resources if one.silence_s is not None}
         self._staleness = StalenessWatch(middleware, self._tell_silence)
-        self._silence_told: dict[str, str] = {}
+        self._silence_reported: dict[str, str] = {}
         """Of each resource that is silent, the reason that was told last."""
         self._publish(middleware.now_ns())
 
@@ -88,15 +88,15 @@ class ResourceManager:
                 self._publish(self._middleware.now_ns())
 
     def _on_reported(self, reported: ResourceStates) -> None:
-        self.heard(reported.resources)
+        self.on_report(reported.resources)
 
-    def heard(self, resources: Iterable[str]) -> None:
+    def on_report(self, resources: Iterable[str]) -> None:
         """Note that the reporter of these resources was heard of."""
         now_ns = self._middleware.now_ns()
         for name in self._silences.keys() & set(resources):
-            self._staleness.heard(name, now_ns, round((self._silences[name].silence_s or 0.0) * 1e9))
-            told = self._silence_told.pop(name, None)
-            if told is not None and self._engine.resources[name].reason == told:
+            self._staleness.on_sample(name, now_ns, round((self._silences[name].silence_s or 0.0) * 1e9))
+            reported_silence = self._silence_reported.pop(name, None)
+            if reported_silence is not None and self._engine.resources[name].reason == reported_silence:
                 self._note(name, self._silences[name].initial, "")
 
     def expect_nothing(self) -> None:
@@ -108,7 +108,7 @@ class ResourceManager:
         silent_ns = self._staleness.silent_ns(name)
         if silent_ns is None:
             return
-        reason = self._silence_told[name] = f"not heard of for {round(silent_ns / 1e9, 1):g} s"
+        reason = self._silence_reported[name] = f"not heard of for {round(silent_ns / 1e9, 1):g} s"
         self.transition(name, self._silences[name].initial, reason)
         self._middleware.at(self._middleware.now_ns() + TELL_SILENCE_NS, lambda: self._tell_silence(name))
 

@@ -20,7 +20,7 @@ from alula.runtime.core.errors import SkillRuntimeError
 from alula.runtime.core.execution import Execution
 from alula.runtime.core.hook_calls import HookOutcome
 from alula.runtime.hook_processes import HookServer, RemoteHooks, pipe_address
-from alula.runtime.hook_processes.place import hang_up, pipe_key
+from alula.runtime.hook_processes.pipe import hang_up, pipe_key
 from alula.runtime.hooks import SkillHooks
 from alula_testing.runtime_models import flying_skill, flying_skillset
 from alula_testing.waits import until

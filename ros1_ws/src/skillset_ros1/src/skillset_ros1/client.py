@@ -19,4 +19,4 @@ class SkillsetClient(Client):
         self.root = place(namespace, name)
         middleware = RospyMiddleware(name, self.root)
         super().__init__(middleware, name)
-        middleware.loop.on_end = lambda: self._news.close("the node was shut down")
+        middleware.loop.on_end = lambda: self._sync.close("the node was shut down")

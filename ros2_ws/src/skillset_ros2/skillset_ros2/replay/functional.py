@@ -253,7 +253,7 @@ class RecordedFunctions(ReplayedRobot):
         if entry.topic == CALLS:
             self._take_transition(json.loads(message.data))
         elif entry.topic in self._reporters:
-            self.world.managers[self._reporters[entry.topic]].heard([one.name for one in message.resources])
+            self.world.managers[self._reporters[entry.topic]].on_report([one.name for one in message.resources])
         for callback in self._subscribers.get(entry.topic, ()) if not self._silent else ():
             callback(message)
 

@@ -1,4 +1,4 @@
-"""The place of a skillset's pipe, the key to it, and what crosses it."""
+"""The address of a skillset's pipe, the key to it, and what crosses it."""
 
 from __future__ import annotations
 

@@ -1,8 +1,8 @@
-"""The messages of one skillset's managers as a client receives them, put into one order on the middleware's loop.
+"""Keep a client's state in step with one skillset's managers: their messages, put into one order on the middleware's loop.
 
 The messages of different topics arrive in any order. Events are numbered, and resource states carry the number of the last event that
 they include. So a caller that learns of an execution's end sees the resources as they are after it, and one that sees a resource's state
-has been told of the event that has led to it: a record of the events has all that a decision was made of.
+has received the event that has led to it: a record of the events has all that a decision was made of.
 """
 
 from __future__ import annotations
@@ -35,7 +35,7 @@ OnEvent = Callable[[EngineEvent], None]
 OnSkills = Callable[[dict[str, SkillRecord]], None]
 
 
-class ClientNews:
+class StateSync:
     """All that a client knows; the goals that it follows, and the orphans: goals that it has given up and that may still run."""
 
     def __init__(self, middleware: Middleware, skillset: str) -> None:
@@ -48,7 +48,7 @@ class ClientNews:
         self.on_events: Callbacks[OnEvent] = Callbacks()
         self.on_skills: Callbacks[OnSkills] = Callbacks()
         self.states_after = -1
-        self.heard = 0
+        self.received = 0
         self.closed = ""
         self.connection = Connection(
             middleware, skillset, self, on_restart=self._on_restart, on_alive=self._cancel_orphans, on_gone=self._on_gone
@@ -62,7 +62,7 @@ class ClientNews:
         self._early: deque[tuple[ResourceStates, Timer]] = deque()
         """Resource states that include events which have not come, each with the timer that ends the waiting."""
         self.connection.subscriptions = [
-            middleware.subscribe(EVENTS, self._on_told),  # first: where both have come, the event is taken first
+            middleware.subscribe(EVENTS, self._on_event),  # first: where both have come, the event is taken first
             middleware.subscribe(RESOURCE_STATES, self._on_states),
             middleware.subscribe(SKILL_STATES, self._on_skills),
         ]
@@ -116,9 +116,9 @@ class ClientNews:
     # --- messages of topics --------------------------------------------------------------------------------------------
 
     def _on_states(self, states: ResourceStates) -> None:
-        if self.closed or not self.connection.heard(states.instance_id, states.stamp_ns):
+        if self.closed or not self.connection.on_message(states.instance_id, states.stamp_ns):
             return
-        self.heard += 1
+        self.received += 1
         if self.states_after >= 0 and (self._early or states.sequence > self._last_event):
             # Its event may have got lost.
             self._early.append((states, self._middleware.later(GRACE_S, lambda: self._show_early(states.sequence))))
@@ -148,18 +148,18 @@ class ClientNews:
         finally:
             for tracker in self._trackers():
                 tracker.settle()
-            self.connection.heard_states()
+            self.connection.on_states()
 
     def _is_old(self, states: ResourceStates) -> bool:
         """Return whether these states were known before; without a transition there may be a new reason."""
         known = states.sequence == self.states_after and all(self.reasons.get(name) == one.reason for name, one in states.resources.items())
         return states.sequence < self.states_after or known
 
-    def _on_told(self, event: EngineEvent) -> None:
+    def _on_event(self, event: EngineEvent) -> None:
         # An event that was published while the history was on its way comes twice.
-        if self.closed or not self.connection.heard(event.instance_id, event.stamp_ns) or event.sequence <= self._last_event:
+        if self.closed or not self.connection.on_message(event.instance_id, event.stamp_ns) or event.sequence <= self._last_event:
             return
-        self.heard += 1
+        self.received += 1
         gap = event.sequence > self._last_event + 1 and self._last_event > 0
         self._last_event = event.sequence
         if isinstance(event, TransitionEvent):
@@ -188,7 +188,7 @@ class ClientNews:
             tracker.on_event(event, self._last_transition)
 
     def _on_skills(self, states: SkillStates) -> None:
-        if self.closed or not self.connection.heard(states.instance_id, states.stamp_ns):
+        if self.closed or not self.connection.on_message(states.instance_id, states.stamp_ns):
             return
         self.skills = dict(states.skills)
         for name, skill in states.skills.items():
