@@ -77,9 +77,15 @@ class AttachedSupervisor:
         self._clock.begin(simulated=False)
         self._began_s = self._clock.now_s or 0.0
         self._serves = not load_scenario(spec.scenario).mission
-        self._held = Held(spec, part, self._clock)
+        self._held = Held(spec, part.held, self._clock)
         self._rest = Rest(
-            part, self._clock, self._held, look=self._look, told_to_end=lambda: self._told_to_end, note_abort=self._note_abort
+            part,
+            self._clock,
+            self._held,
+            Held(spec, part.resting, self._clock),
+            look=self._look,
+            told_to_end=lambda: self._told_to_end,
+            note_abort=self._note_abort,
         )
         self.front_died = False
 

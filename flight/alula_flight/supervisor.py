@@ -120,11 +120,12 @@ class Supervisor:
         self._asked_to_end: signal.Signals | None = None
         self._began_s: float | None = None  # mission clock
         self._beginning = Beginning(spec, part, self._clock)
-        self._held = Held(spec, part, self._clock)
+        self._held = Held(spec, part.held, self._clock)
         self._rest = Rest(
             part,
             self._clock,
             self._held,
+            Held(spec, part.resting, self._clock),
             look=self._look,
             told_to_end=lambda: self._told_to_end,
             note_abort=self._note_abort,

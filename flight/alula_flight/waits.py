@@ -1,8 +1,9 @@
-"""What a run waits for before it can begin, and who else has the robot at its end: found by the supervisor, said by the front."""
+"""What a run waits for before it can begin, and until its robot is at rest: found by the supervisor, said by the front."""
 
 from __future__ import annotations
 
 import time
+from collections.abc import Callable
 from pathlib import Path
 
 from alula.common.run_log import note_held, note_wait
@@ -11,7 +12,7 @@ from alula.runtime.live.spec import RunSpec
 from alula_flight.mission_clock import MissionClock
 
 TELL_CLOCK_S, LOOK_S = 5.0, 1.0  # wall clock until it is told that time has not begun, and how often it is looked
-TELL_HELD_S = 10.0  # mission clock; how often it is told that somebody else has the robot
+TELL_HELD_S = 10.0  # mission clock; how often it is told what keeps the robot from rest
 
 
 class Beginning:
@@ -46,19 +47,26 @@ class Beginning:
 
 
 class Held:
-    """Follows a robot that somebody else has, and writes down how it is: every 10 s, the first time after as many."""
+    """Follows what keeps a robot from rest, and writes down how it is: every 10 s, the first time after as many.
 
-    def __init__(self, spec: RunSpec, part: RunPart, clock: MissionClock) -> None:
+    ``words`` tells it: who else has the robot (`RunPart.held`), or what is still to happen (`RunPart.resting`); empty: nothing.
+    """
+
+    def __init__(self, spec: RunSpec, words: Callable[[MissionClock], str], clock: MissionClock) -> None:
         self._out = Path(spec.out_dir)
-        self._part = part
+        self._words = words
         self._clock = clock
         self._since_s = 0.0
         self._told_s: float | None = None
-        """When it was told last, or when it began; None: nobody else has the robot."""
+        """When it was told last, or when it began; None: nothing keeps it."""
+
+    def restart(self) -> None:
+        """Begin to count anew."""
+        self._told_s = None
 
     def look(self) -> bool:
-        """Write down what is due; return whether somebody else has the robot."""
-        words, now_s = self._part.held(self._clock), self._clock.now_s
+        """Write down what is due; return whether there is anything."""
+        words, now_s = self._words(self._clock), self._clock.now_s
         if not words or now_s is None:
             self._told_s = None
         elif self._told_s is None:

@@ -32,6 +32,7 @@ from alula.report.deaths import read_deaths
 from alula.runtime.live.part import RunPart
 from alula.runtime.live.spec import RequestError, RunSpec
 from alula_flight import attached as attachments
+from alula_flight import rest
 from alula_flight.attached import AttachedSupervisor, PartsWatch
 from alula_flight.command_line import parse
 from alula_flight.outcome import is_recorded
@@ -595,6 +596,7 @@ def attached(robot, part, code, *, limit_s=0.0):
 )
 def test_a_mission_on_what_runs_leaves_a_robot_at_rest(robot, monkeypatch, code, looks, ended, rested):
     monkeypatch.setattr(attachments, "LOOK_S", 0.01)
+    monkeypatch.setattr(rest, "LOOK_S", 60.0)  # it comes to rest at once: no look is due
     part = Watched()
     supervisor = attached(robot, part, code)
     mission_of = supervisor._start

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import json
 import signal
+import threading
 from collections.abc import Callable, Iterator, Mapping
 from dataclasses import dataclass, field
 from pathlib import Path
@@ -18,7 +19,7 @@ from alula.report.deaths import read_deaths
 from alula.report.live import LiveEvents
 from alula.runtime.live.part import DEAD_S, Clock, Consequence, RunPart
 from alula.runtime.live.spec import RunSpec
-from alula_flight import mission_clock, supervisor
+from alula_flight import mission_clock, rest, supervisor
 from alula_flight.mission_clock import MissionClock
 from alula_flight.mission_watch import SILENT_S
 from alula_flight.outcome import GIVEN_UP, finish
@@ -62,8 +63,22 @@ class Part(RunPart):
     def held(self, clock: Clock) -> str:
         return next(self.hold, "")
 
+    landing: Iterator[str] = iter(())
+    """What is said while it is brought to rest, one a look; it is at rest at the end."""
+
     def bring_to_rest(self, clock: Clock) -> None:
         self.rested += 1
+        self.landed.wait()
+
+    def resting(self, clock: Clock) -> str:
+        words = next(self.landing, None)
+        if words is None:
+            self.landed.set()
+        return words or ""
+
+    def __init__(self) -> None:
+        self.landed = threading.Event()
+        self.landed.set()
 
 
 class Flight:
@@ -93,6 +108,7 @@ class Flight:
 @pytest.fixture
 def flight(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Flight:
     monkeypatch.setattr(supervisor, "ABORT_TIMEOUT_S", 0.0)
+    monkeypatch.setattr(rest, "LOOK_S", 60.0)  # it comes to rest at once: no look is due
     return Flight(tmp_path)
 
 
@@ -258,12 +274,47 @@ def test_what_a_run_waits_for_is_said_each_ten_seconds(looks: list[tuple[float |
     part, clock = Part(), MissionClock()
     clock.begin(simulated=True)
     part.hold = iter([words for _, words in looks])
-    held = Held(RunSpec("mapping", str(tmp_path), "id"), part, clock)
+    held = Held(RunSpec("mapping", str(tmp_path), "id"), part.held, clock)
     for now_s, words in looks:
         if now_s is not None:
             clock._tick(SimpleNamespace(clock=SimpleNamespace(to_sec=lambda now_s=now_s: now_s)))
         assert held.look() == bool(words)
     assert read_held(tmp_path) == said
+
+
+def test_a_robot_that_is_brought_to_rest_is_told_of_each_ten_seconds_and_looked_after(
+    flight: Flight, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr(rest, "LOOK_S", 0.0)
+
+    def landing() -> Iterator[str]:
+        for look in range(14):
+            flight.clock(100.0 + 2.0 * look)
+            if look == 3:
+                flight.died("driver")
+            yield f"in LAND, at {14 - look} m"
+
+    flight.part.landed.clear()
+    flight.part.landing = landing()
+    flight.clock(99.0)
+    flight.supervisor._watch.mission_exit = 1
+    assert (flight.ends(), flight.part.rested) == (1, 1)
+    assert read_held(tmp_path) == ["in LAND, at 9 m, for 10 s", "in LAND, at 4 m, for 20 s"]
+    flight.part.landing = iter(["in LAND, at 2 m"])
+    flight.part.landed.clear()
+    flight.clock(200.0)
+    assert flight.ends() == 1
+    assert len(read_held(tmp_path)) == 2, "another landing counts anew"
+
+
+def test_a_part_that_can_not_bring_its_robot_to_rest_is_told_as_before(flight: Flight, monkeypatch: pytest.MonkeyPatch) -> None:
+    def fails(_clock: Clock) -> None:
+        raise RuntimeError("no guidance")
+
+    monkeypatch.setattr(flight.part, "bring_to_rest", fails)
+    flight.supervisor._watch.mission_exit = 1
+    with pytest.raises(RuntimeError, match="no guidance"):
+        flight.ends()
 
 
 def test_who_wants_a_run_to_end_that_watches_ends_it(flight: Flight, tmp_path: Path) -> None:

@@ -115,6 +115,13 @@ class RunPart:
     def bring_to_rest(self, clock: Clock) -> None:
         """Bring the robot to rest when no mission decides any more; return once it is at rest, or after a time limit."""
 
+    def resting(self, clock: Clock) -> str:  # noqa: ARG002
+        """Return what is still to happen until the robot is at rest, in words; empty: nothing that is worth telling.
+
+        It is printed every 10 s while ``bring_to_rest`` runs, which does so in another thread.
+        """
+        return ""
+
 
 def part_of_robot() -> RunPart:
     """Make the robot's part; raises RobotError where what its file names does not exist."""

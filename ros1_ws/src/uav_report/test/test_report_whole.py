@@ -130,8 +130,6 @@ def test_the_flight_in_numbers(whole):
     assert summary["reason"] == "zed_depthmap: zed_works was violated"
     assert summary["duration_s"] == pytest.approx(98.8)
     assert summary["min_clearance_m"] == 1.1, "the simulator's, who sees more than 20 moments a second"
-    assert summary["accounts"]["recomputed"]["min_clearance_m"] == pytest.approx(1.9 - 0.85, abs=1e-3)
-    assert summary["accounts"]["recomputed"]["distance_m"] == pytest.approx(2.7 + 22 + 14 + 22 + 18 + 2.7 * 0.985, abs=0.1)
     assert summary["distance_m"] == 83.0
     assert summary["lift_off"] == {"stamp_s": LIFT_OFF_S, "source": "simulator"}
     assert summary["bridge"] == {"/clock": {"count": 5000, "p50_ms": 0.4, "p95_ms": 1.5, "dropped": 0}}
@@ -139,6 +137,15 @@ def test_the_flight_in_numbers(whole):
         {"name": "zed_depth", "when_s": 12.0, "how": "signal SIGKILL", "again_s": 13.5},
         {"name": "record", "when_s": None, "how": "exit code 1", "again_s": None},
     ]
+
+
+def test_what_no_simulator_has_counted_is_computed_from_the_true_path(folder):
+    t_s, position = poses()
+    write_bag(folder / "functional.bag", poses=(t_s, position), guidance=guidance(t_s))
+    summary = make_report(facts(folder, faults=[]))
+    assert summary["collisions"] == 0
+    assert summary["min_clearance_m"] == pytest.approx(1.9 - 0.85, abs=1e-3)
+    assert summary["distance_m"] == pytest.approx(2.7 + 22 + 14 + 22 + 18 + 2.7 * 0.985, abs=0.1)
 
 
 def test_the_recovery(whole):
@@ -254,7 +261,7 @@ def test_the_report_of_a_run_without_a_supervisor_is_a_command(folder, capsys):
 
 def test_an_empty_folder(tmp_path):
     summary = make_report(facts(tmp_path, faults=[], mission_exit=None))
-    known = {"scenario", "seed", "map", "skills", "resources", "faults", "injected", "died", "lift_off", "accounts", "problems"}
+    known = {"scenario", "seed", "map", "skills", "resources", "faults", "injected", "died", "lift_off", "problems"}
     known |= {"answers", "tasks", "causes"}
     assert {key for key, value in summary.items() if value is not None} == known
     assert summary["skills"] == summary["resources"] == []

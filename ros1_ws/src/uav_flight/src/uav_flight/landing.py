@@ -15,6 +15,7 @@ from alula.runtime.live.part import Clock
 
 LANDING_TIMEOUT_S = 90.0  # mission clock; a landing from 20 m takes about 40 s
 STATE_TIMEOUT_S = 30.0  # wall clock until the guidance, perhaps just started again, says how things are
+AGAIN_S = 1.0  # wall clock, between two requests
 FOR_EVER_S = 2**31
 
 log = logging.getLogger("alula.landing")
@@ -27,6 +28,8 @@ class Landing:
         self._clock = clock
         self._heard, self._down = threading.Event(), threading.Event()
         self._commanded, self._reference = False, ""
+        self.refused = ""
+        """Why the last request to land was refused or not heard, in words; empty: it was accepted."""
         self._heartbeat: Any = None
         if self._clock.simulated:
             self._end_heartbeats()
@@ -41,7 +44,7 @@ class Landing:
         while self._commanded and not self._down.is_set() and (self._clock.now_s or 0.0) < end_s and not self._clock.stands_still:
             if self._reference != "land":
                 self._command()
-            self._down.wait(1.0)
+            self._down.wait(AGAIN_S)
 
     def _look(self, state: Any) -> None:
         self._commanded, self._reference = state.authority, state.reference
@@ -53,9 +56,10 @@ class Landing:
         try:
             rospy.wait_for_service("/uav_guidance/land", timeout=10.0)
             answer = rospy.ServiceProxy("/uav_guidance/land", Command)()
-            log.info("landing: %s %s", answer.accepted, answer.reason)
+            self.refused = "" if answer.accepted else f"the guidance refuses to: {answer.reason}"
         except (rospy.ROSException, rospy.ServiceException) as error:
-            log.error("the guidance could not be told to land: %s", error)
+            self.refused = f"the guidance could not be told to: {error}"
+        log.info("landing: %s", self.refused or "accepted")
 
     def _end_heartbeats(self) -> None:
         """Have simulated time wait no more for a mission that has ended: its heartbeats came over the bridge, which goes on."""

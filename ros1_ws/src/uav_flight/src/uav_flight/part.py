@@ -184,17 +184,10 @@ class DronePart(RunPart):
 
     def held(self, clock: Clock) -> str:
         """Return in words that the pilot or a failsafe has the vehicle in the air, its mode and height; empty where they have not."""
-        state = self._guidance
-        if state is None or clock.now_s is None:
+        state = self._fresh(clock)
+        if state is None or not state.link or state.authority or not state.armed or state.landed_state not in OFF_GROUND:
             return ""
-        if state is not self._seen[0]:
-            self._seen = state, clock.now_s
-        if clock.now_s - self._seen[1] > SILENT_S:
-            return ""
-        if not state.link or state.authority or not state.armed or state.landed_state not in OFF_GROUND:
-            return ""
-        who = f"the pilot or a failsafe has it, in {state.mode}, at {state.position_enu_m.z:.1f} m"
-        return f"the vehicle is to be landed, or given back by GUIDED: {who}"
+        return f"the vehicle is to be landed, or given back by GUIDED: the pilot or a failsafe has it, {where(state)}"
 
     def bring_to_rest(self, clock: Clock) -> None:
         """Make the guidance land the vehicle, and wait until it stands, or somebody else has it."""
@@ -205,6 +198,30 @@ class DronePart(RunPart):
 
             self._landing = Landing(clock)
         self._landing.land()
+
+    def resting(self, clock: Clock) -> str:
+        """Return in words how the vehicle is that is being landed, and why the guidance does not land it, if it said so."""
+        state = self._fresh(clock)
+        if state is None:
+            return "the vehicle is to be landed: nothing is heard of the guidance"
+        if not state.armed:
+            return ""
+        how = where(state) if state.landed_state in OFF_GROUND else f"on the ground with its motors on, in {state.mode}"
+        refused = "" if self._landing is None else self._landing.refused
+        return f"the vehicle is being landed: {how}" + (f"; {refused}" if refused else "")
+
+    def _fresh(self, clock: Clock) -> Any:
+        """Return the guidance's last state; None where there is none, or the guidance has died or hangs."""
+        if self._guidance is None or clock.now_s is None:
+            return None
+        if self._guidance is not self._seen[0]:
+            self._seen = self._guidance, clock.now_s
+        return None if clock.now_s - self._seen[1] > SILENT_S else self._guidance
+
+
+def where(state: Any) -> str:
+    """Return mode and height of a vehicle in the air, in words."""
+    return f"in {state.mode}, at {state.position_enu_m.z:.1f} m"
 
 
 def sensors_words(out: Path) -> str:

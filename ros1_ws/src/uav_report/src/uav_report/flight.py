@@ -95,7 +95,6 @@ class FlightReport:
         self._draw(recovery, timeline)
         said, truth = self._recording.simulator, self._truth
         found = told_or_computed(said, truth.recomputed)
-        simulated = None if said is None else Encounter(said.collisions, said.min_clearance_m, said.distance_m, said.crash)
         down = self._came_down()
         values: dict[str, Any] = {
             "crash": found.crash or None,
@@ -105,7 +104,6 @@ class FlightReport:
             "distance_m": _rounded(found.distance_m),
             "map": _map(truth.quality, self._recording),
             "video": self._video.summary,
-            "accounts": {"simulator": _encounter(simulated), "recomputed": _encounter(truth.recomputed)},
         }
         return Findings(values, False if found.crash else down)
 
@@ -201,17 +199,6 @@ def _map(quality: MapQuality, recording: Recording) -> dict[str, Any]:
         "coverage": None if quality.coverage is None else round(quality.coverage, 4),
         "rmse_m": None if quality.rmse_m is None else round(quality.rmse_m, 4),
         "patches_in_reach": quality.in_reach,
-    }
-
-
-def _encounter(encounter: Encounter | None) -> dict[str, Any] | None:
-    if encounter is None:
-        return None
-    return {
-        "collisions": encounter.collisions,
-        "crash": encounter.crash or None,
-        "min_clearance_m": _rounded(encounter.min_clearance_m),
-        "distance_m": _rounded(encounter.distance_m),
     }
 
 

@@ -20,7 +20,6 @@ NOTHING_MEASURED = {
     "distance_m": None,
     "map": {"points": None, "coverage": None, "rmse_m": None, "patches_in_reach": None},
     "video": None,
-    "accounts": {"simulator": None, "recomputed": None},
 }
 
 
