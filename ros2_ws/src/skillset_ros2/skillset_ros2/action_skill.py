@@ -143,8 +143,7 @@ class ActionSkill(FunctionSkill[Goal]):
         server, request = self.server_for(execution.inputs), self.goal(execution.inputs)
         with self._lock:
             goal = Goal(execution, server, self.watch.now_s, client=self._client(server), request=request)
-            self._calls[execution.id] = goal
-            self.look(goal)
+            self.begin(goal)
 
     def _send(self, goal: Goal) -> None:
         goal.sent, goal.since_s = True, self.watch.now_s

@@ -78,7 +78,7 @@ class FunctionSkill(SkillHooks, Generic[CallT]):
         self._calls: dict[str, CallT] = {}
         self._late: LateStop | None = None
         _check_results(type(self))
-        watch.every(self._look)
+        watch.every(self._look, lambda: bool(self._calls) or self._late is not None)
 
     def call_at_start(self, kind: Any, server: str, request: Any) -> None:
         """Call a service that stops what runs until it answers, wall clock; one that is not there is called when it comes.
@@ -89,6 +89,7 @@ class FunctionSkill(SkillHooks, Generic[CallT]):
         client = self.watch.node.create_client(kind, server)
         if not client.wait_for_service(timeout_sec=FOUND_S):
             self._late = LateStop(client, request)
+            self.watch.wake()
             return
         try:
             answered, end_s = threading.Event(), time.monotonic() + self.answer_s
@@ -117,6 +118,12 @@ class FunctionSkill(SkillHooks, Generic[CallT]):
     def server_for(self, inputs: Any) -> str:  # noqa: ARG002
         """Return the server for these inputs."""
         return self.server
+
+    def begin(self, call: CallT) -> None:
+        """Wait for a server's answer from now on; called with the lock held."""
+        self._calls[call.execution.id] = call
+        self.watch.wake()
+        self.look(call)
 
     def look(self, call: CallT) -> str:
         """Ask the server once it is there; return why it is lost, or "". Called several times a second with the lock held."""

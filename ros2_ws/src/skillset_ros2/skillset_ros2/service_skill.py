@@ -64,9 +64,7 @@ class ServiceSkill(FunctionSkill[ServiceCall]):
         server, request = self.server_for(execution.inputs), self.request(execution.inputs)
         with self._lock:
             client = self._clients.get(server) or self._clients.setdefault(server, self.watch.node.create_client(self.service, server))
-            call = ServiceCall(execution, server, self.watch.now_s, client=client, request=request)
-            self._calls[execution.id] = call
-            self.look(call)
+            self.begin(ServiceCall(execution, server, self.watch.now_s, client=client, request=request))
 
     def on_interrupt(self, execution: Execution) -> bool | None:
         """Call the service that stops it; wait no more for the answer."""
@@ -76,9 +74,7 @@ class ServiceSkill(FunctionSkill[ServiceCall]):
         if call is None or not self.stop_server:
             return None
         with self._lock:
-            stop = ServiceCall(execution, self.stop_server, self.watch.now_s, True, self._stops, self.stop_request())
-            self._calls[execution.id] = stop
-            self.look(stop)
+            self.begin(ServiceCall(execution, self.stop_server, self.watch.now_s, True, self._stops, self.stop_request()))
         return False
 
     def on_emergency(self, execution: Execution) -> None:

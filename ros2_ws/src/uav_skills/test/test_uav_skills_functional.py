@@ -15,10 +15,15 @@ class Node:
 
     def __init__(self, steady_per_mission_s):
         self.now_s, self.steady_s, self._each_s, self._looks = 50.0, 1000.0, WATCH_PERIOD_S * steady_per_mission_s, []
+        self.awake_since_s, self.woken, self.needed = 0.0, 0, lambda: True
         self.part = FunctionalPart(self, self, lambda: self.steady_s)
 
-    def every(self, look):
+    def every(self, look, needed):
         self._looks.append(look)
+        self.needed = needed
+
+    def wake(self):
+        self.woken += 1
 
     def passes(self, mission_s):
         for _ in range(round(mission_s / WATCH_PERIOD_S)):
@@ -74,7 +79,7 @@ def test_all_limits_of_a_call_last_as_long_by_both_clocks(steady_per_mission_s, 
 def test_watchers_count_mission_clock():
     node = Node(steady_per_mission_s=0.1)
     told_s = []
-    node.part.watch(lambda: told_s.append(node.part.now_s))
+    node.part.watch(lambda: told_s.append(node.part.now_s), lambda: True)
     node.passes(2.0)
     assert told_s[-1] == pytest.approx(2.0)
 
@@ -86,3 +91,29 @@ def test_a_clock_that_did_not_come_through_is_neither_silence_nor_patience():
     node.passes(2.0)
     assert responses == []
     assert node.part.now_s < 2.5
+
+
+def test_what_passes_while_nothing_is_needed_is_neither_silence_nor_patience():
+    node, responses = Node(steady_per_mission_s=1.0), []
+    node.passes(1.0)
+    before_s = node.part.now_s
+    node.now_s, node.steady_s = node.now_s + 60.0, node.steady_s + 60.0
+    node.awake_since_s = node.now_s
+    node.part._submit(Service(ready=False), "a", responses.append)
+    node.passes(WATCH_PERIOD_S)
+    assert node.part.now_s == pytest.approx(before_s + WATCH_PERIOD_S)
+
+
+def test_a_part_is_watched_while_a_watcher_needs_it_or_a_call_is_without_a_response():
+    node, responses, watched = Node(steady_per_mission_s=1.0), [], []
+    node.part.watch(lambda: None, lambda: bool(watched))
+    assert not node.needed()
+    watched.append("an execution")
+    assert node.needed()
+    watched.clear()
+    node.part._submit(Service(ready=False), "a", responses.append)
+    assert node.woken == 1
+    assert node.needed()
+    node.passes(4.0)
+    assert len(responses) == 1
+    assert not node.needed()

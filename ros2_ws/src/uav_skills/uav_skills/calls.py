@@ -91,12 +91,17 @@ def read_response(response: Any) -> Response:
 
 
 class CallQueue:
-    """Sends calls in order; thread-safe. ``now_s``: the slower clock. ``tick`` is to be called several times a second of it."""
+    """Sends calls in order; thread-safe. ``now_s``: the slower clock. ``tick`` it several times a second while any call is ``pending``."""
 
     def __init__(self, now_s: Callable[[], float]) -> None:
         self._now_s = now_s
         self._calls: list[_Call] = []
         self._lock = threading.Lock()
+
+    @property
+    def pending(self) -> bool:
+        """Whether any call is without a response."""
+        return bool(self._calls)
 
     def submit(self, service: Service, request: object, reply: Reply = ignore_response) -> None:
         """Send the request when its turn comes; ``reply`` gets exactly one response, from another thread or this one."""

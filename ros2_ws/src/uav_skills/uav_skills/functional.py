@@ -39,8 +39,9 @@ class FunctionalPart:
 
     ``clock`` is what ``watch_of`` has made, where several parts of a node share it. ``now_s`` is mission clock without its jumps: when
     the clock itself did not come through for a while (the bridge was started again), nothing else came either, and what was not heard
-    meanwhile must not count as silent. Watchers count it: the vehicle moves by it, so two seconds without a depth map are two seconds of
-    flight that nobody looks ahead, however slow the machine. Calls count the slower one of it and the monotonic clock ``steady_s``.
+    meanwhile must not count as silent. It may stand while no watcher is needed and no call is without a response. Watchers count it: the
+    vehicle moves by it, so two seconds without a depth map are two seconds of flight that nobody looks ahead, however slow the machine.
+    Calls count the slower one of it and the monotonic clock ``steady_s``.
     """
 
     def __init__(self, node: Node, clock: Watch | None = None, steady_s: Callable[[], float] = time.monotonic) -> None:
@@ -51,21 +52,30 @@ class FunctionalPart:
         self._clock_s = self._clock.now_s
         self._slower = SlowerClock(lambda: self.now_s, steady_s)
         self._calls = CallQueue(lambda: self._slower.now_s)
-        self._watchers: list[Callable[[], None]] = []
-        self._clock.every(self._watch)
+        self._watchers: list[tuple[Callable[[], None], Callable[[], bool]]] = []
+        self._clock.every(self._watch, lambda: self._calls.pending or any(needed() for _, needed in self._watchers))
 
-    def watch(self, watcher: Callable[[], None]) -> None:
-        """Call ``watcher`` ten times a second of mission clock."""
-        self._watchers.append(watcher)
+    def watch(self, watcher: Callable[[], None], needed: Callable[[], bool]) -> None:
+        """Call ``watcher`` ten times a second of mission clock, while ``needed()``; it takes no lock. Then call ``wake``."""
+        self._watchers.append((watcher, needed))
+
+    def wake(self) -> None:
+        """Watch: something is needed now."""
+        self._clock.wake()
 
     def _watch(self) -> None:
         clock_s = self._clock.now_s
-        self.now_s += min(max(clock_s - self._clock_s, 0.0), LONGEST_STEP_S)
+        self.now_s += min(max(clock_s - max(self._clock_s, self._clock.awake_since_s), 0.0), LONGEST_STEP_S)
         self._clock_s = clock_s
         self._slower.look()
         self._calls.tick()
-        for watcher in self._watchers:
+        for watcher, _ in self._watchers:
             watcher()
+
+    def _submit(self, service: Any, request: object, reply: Reply = ignore_response) -> None:
+        """Call a service in its turn, and watch until it has answered."""
+        self._calls.submit(service, request, reply)
+        self.wake()
 
     def _client(self, service_type: Any, name: str) -> Any:
         return self._node.create_client(service_type, name, callback_group=self._group)
@@ -101,30 +111,30 @@ class GuidanceApi(FunctionalPart):
 
     def takeoff(self, *, height_m: float, speed_m_s: float, reply: Reply) -> None:
         """Climb to a height above home."""
-        self._calls.submit(self._takeoff, Takeoff.Request(height_m=height_m, speed_m_s=speed_m_s), reply)
+        self._submit(self._takeoff, Takeoff.Request(height_m=height_m, speed_m_s=speed_m_s), reply)
 
     def set_position(self, *, target_enu_m: Point, speed_m_s: float, along_travel: bool, reply: Reply) -> None:
         """Fly to a point, the nose along the travel or kept where the heading reference wants it."""
         kinds = SetPositionReference.Request
         heading = kinds.ALONG_TRAVEL if along_travel else kinds.KEEP
-        self._calls.submit(self._position, kinds(target_enu_m=target_enu_m, speed_m_s=speed_m_s, heading=heading), reply)
+        self._submit(self._position, kinds(target_enu_m=target_enu_m, speed_m_s=speed_m_s, heading=heading), reply)
 
     def set_heading(self, *, heading_rad: float, rate_rad_s: float, lock: bool, reply: Reply) -> None:
         """Turn on the spot, or hold a heading while position references move the vehicle."""
         request = SetHeadingReference.Request(yaw_rad=heading_rad, rate_rad_s=rate_rad_s, lock=lock)
-        self._calls.submit(self._heading, request, reply)
+        self._submit(self._heading, request, reply)
 
     def release_heading(self, reply: Reply = ignore_response) -> None:
         """End the holding of a heading."""
-        self._calls.submit(self._heading, SetHeadingReference.Request(release=True), reply)
+        self._submit(self._heading, SetHeadingReference.Request(release=True), reply)
 
     def hover(self, reply: Reply = ignore_response) -> None:
         """Stop the motion and hold the position."""
-        self._calls.submit(self._hover, Command.Request(), reply)
+        self._submit(self._hover, Command.Request(), reply)
 
     def land(self, reply: Reply) -> None:
         """Land where the vehicle is."""
-        self._calls.submit(self._land, Command.Request(), reply)
+        self._submit(self._land, Command.Request(), reply)
 
     def _on_state(self, state: GuidanceState) -> None:
         if self.state is None and state.reference in MOTIONS and state.reference in self._orphans:
@@ -145,7 +155,7 @@ class DepthApi(FunctionalPart):
 
     def enable(self, *, on: bool, reply: Reply = ignore_response) -> None:
         """Start or stop the obstacle detection."""
-        self._calls.submit(self._enable, SetBool.Request(data=on), reply)
+        self._submit(self._enable, SetBool.Request(data=on), reply)
 
     def _on_obstacle(self, _obstacle: Obstacle) -> None:
         """Hear of the sensor, also where it can't judge the way: the guidance does not move on then."""
@@ -168,11 +178,11 @@ class MappingApi(FunctionalPart):
 
     def enable(self, *, on: bool, reply: Reply = ignore_response) -> None:
         """Start or stop the registration of scans."""
-        self._calls.submit(self._enable, SetBool.Request(data=on), reply)
+        self._submit(self._enable, SetBool.Request(data=on), reply)
 
     def save(self, reply: Reply = ignore_response) -> None:
         """Have the node write the map to its file."""
-        self._calls.submit(self._save, Trigger.Request(), reply)
+        self._submit(self._save, Trigger.Request(), reply)
 
     def _on_state(self, state: MappingState) -> None:
         if self.state is None or state.scans != self.state.scans:
@@ -200,11 +210,11 @@ class VideoApi(FunctionalPart):
     def begin(self, *, min_fps: float, min_quality: float, patience_s: float, reply: Reply) -> None:
         """Send, with what the telepilot needs at least."""
         request = Stream.Request(on=True, min_fps=min_fps, min_quality=min_quality, patience_s=patience_s)
-        self._calls.submit(self._stream, request, reply)
+        self._submit(self._stream, request, reply)
 
     def stop(self, reply: Reply = ignore_response) -> None:
         """Have the node end the stream."""
-        self._calls.submit(self._stream, Stream.Request(), reply)
+        self._submit(self._stream, Stream.Request(), reply)
 
     def _on_state(self, state: VideoState) -> None:
         self.told_idle = not state.streaming

@@ -64,7 +64,7 @@ class GuidedSkill(SkillHooks):
         self._motion: GuidedMotion | None = None
         self._lock = threading.Lock()
         guidance.listen(self._on_state)
-        guidance.watch(self._on_watch)
+        guidance.watch(self._on_watch, lambda: self._motion is not None)
 
     # --- what a skill adds -------------------------------------------------------------------------------------------
 
@@ -97,6 +97,7 @@ class GuidedSkill(SkillHooks):
         motion = GuidedMotion(execution)
         with self._lock:
             self._motion = motion
+        self.guidance.wake()
         self._ask(motion)
 
     def progress(self, execution: Execution) -> float:

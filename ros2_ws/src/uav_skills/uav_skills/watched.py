@@ -26,7 +26,7 @@ class WatchedSkill(SkillHooks):
         self._execution: Execution | None = None
         self._since_s = 0.0
         self._lock = threading.Lock()
-        part.watch(self._on_watch)
+        part.watch(self._on_watch, lambda: self._execution is not None)
 
     # --- what a skill adds -------------------------------------------------------------------------------------------
 
@@ -56,6 +56,7 @@ class WatchedSkill(SkillHooks):
         """Switch the function on and begin to listen."""
         with self._lock:
             self._execution, self._since_s = execution, self._part.now_s
+        self._part.wake()
         self.switch_on(execution)
 
     def progress(self, execution: Execution) -> float:
