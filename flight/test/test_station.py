@@ -656,6 +656,7 @@ def test_the_unit_keeps_the_deployment_up(robot, user):
     service = dict(read["Service"])
     assert service["ExecStart"] == f"{ROOT}/setup/in_ros1 python3 -m alula_flight.station.keeper robot"
     assert (service["Type"], service["WatchdogSec"], service["Restart"], service.get("User", "")) == ("notify", "60", "on-failure", user)
+    assert service["KillMode"] == "process", "the parts outlive their keeper, and the next one takes them over"
     assert service["WorkingDirectory"] == str(robot)
     assert read["Unit"]["StartLimitBurst"] == "5"
     assert read["Install"]["WantedBy"] == ("multi-user.target" if user else "default.target")
@@ -701,7 +702,13 @@ def test_a_service_is_installed_enabled_and_removed(robot, capsys, monkeypatch, 
     name = services.unit_name(Station("robot"))
     assert commands(["service", "install", "robot"]) == 0
     assert (tmp_path / "config/systemd/user" / name).read_text().startswith("[Unit]\n")
+    left = subprocess.Popen([sys.executable, "-c", "import time; time.sleep(1000)"])
+    folder = Station("robot").folder
+    folder.mkdir(parents=True, exist_ok=True)
+    start = states.start_of(left.pid)
+    StationState(parts={"bridge": PartState(pid=left.pid, start=start, state=states.RUNNING)}).save(folder)
     assert commands(["service", "remove", "robot"]) == 0
+    assert living(left.pid, start) is None, "what a keeper has left is ended"
     assert not (tmp_path / "config/systemd/user" / name).exists()
     user = ["daemon-reload", f"enable --now {name}", f"disable --now {name}", "daemon-reload"]
     assert asked.read_text().splitlines() == [f"--user {one}" for one in user]

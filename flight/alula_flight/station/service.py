@@ -52,7 +52,8 @@ def unit(station: Station, user: str, environment: Mapping[str, str]) -> str:
         f"RestartSec={AGAIN_S}",
         "RestartPreventExitStatus=2",
         f"WatchdogSec={WATCHDOG_S}",
-        "KillMode=mixed",
+        # What a keeper that died or hung kept goes on, and the next one takes it over; one that is told to end ends it itself.
+        "KillMode=process",
         f"TimeoutStopSec={STOP_S}",
         "",
         "[Install]",
@@ -106,6 +107,7 @@ def service(given: Any) -> int:
         if not path.exists():
             raise StationError(f"there is no {path}; nothing was installed{'' if system else ', or for the system: --system'}")
         _run([*control, "disable", "--now", path.name])
+        station.end()  # what a keeper that hung has left
         path.unlink()
         _run([*control, "daemon-reload"])
         sys.stderr.write(f"{path} is removed\n")
