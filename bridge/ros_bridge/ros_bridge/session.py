@@ -12,6 +12,7 @@ from typing import TYPE_CHECKING
 import rclpy
 from rclpy.signals import SignalHandlerOptions
 
+from alula.common.shared_memory import sweep_shared_memory
 from ros_bridge.conversion import Types
 from ros_bridge.definitions import DefinitionFiles, ament_prefixes, ros1_modules, ros1_shares
 from ros_bridge.errors import NoMasterError
@@ -53,6 +54,7 @@ def run_session(
         require_master(master, name)
     if not wait_for_master(master, name, stop):
         return
+    sweep_shared_memory()
     rclpy.init(args=ros2_arguments, signal_handler_options=SignalHandlerOptions.NO)
     try:
         bridge = Bridge(config, types, master, name)

@@ -31,7 +31,6 @@ from alula.common.files import write_json, write_text
 from alula.common.network import DOMAINS, NoFreeDomainError, claim_domain
 from alula.common.processes import end_run
 from alula.common.robots import RobotFolder, find_robot
-from alula.common.shared_memory import sweep_shared_memory
 from alula.common.signals import StopEvent
 from alula.report.deaths import describe_exit
 from alula_flight.station import state as states
@@ -138,9 +137,6 @@ class Kept:
                 os.truncate(self.log, 0)
 
     def _start(self) -> None:
-        if self.state.deaths:
-            # What goes on to write to the shared memory of the one that was killed would not reach this one.
-            sweep_shared_memory()
         with self.log.open("ab") as said:
             self._child = subprocess.Popen(
                 self.part.words,

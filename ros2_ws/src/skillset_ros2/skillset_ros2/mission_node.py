@@ -26,6 +26,7 @@ from std_msgs.msg import Header, String
 from std_srvs.srv import SetBool, Trigger
 
 from alula.common.fast_dds import leave, small_segment
+from alula.common.shared_memory import sweep_shared_memory
 from alula.common.signals import on_end_signal
 from alula.missions.director import EXIT_CODES, START_TIMEOUT_S, MissionResult, Outcome
 from alula.missions.driver import TICK_PERIOD_S, MissionDriver
@@ -212,6 +213,7 @@ def run_mission(plan: MissionPlan, out: Path, arguments: Sequence[str] | None = 
     words = list(sys.argv if arguments is None else arguments)
     signals: list[signal.Signals] = []
     on_end_signal(signals.append)
+    sweep_shared_memory()
     # rclpy's own handlers would end the communication that is needed to stop the robot.
     rclpy.init(args=words, signal_handler_options=SignalHandlerOptions.NO)
     try:
