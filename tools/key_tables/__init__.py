@@ -8,9 +8,11 @@ from __future__ import annotations
 from collections.abc import Callable, Iterable, Iterator, Mapping
 from pathlib import Path
 
-from alula.common import deployments, robot_page, robots
+from alula.campaign import plan
+from alula.common import deployments, robot_page, robots, scenarios
 from alula.common.generated import key_table, replaced, table
 from alula.common.keys import Key
+from alula.mock import reading as mocks
 from ros_bridge import config_file, discovery_options
 
 ALULA_ROOT = Path(__file__).resolve().parents[2]
@@ -51,8 +53,23 @@ def _bridge() -> Iterator[str]:
     yield from ("## Keys of `discover`", "", *table(("key", "what it does"), *options))
 
 
+def _scenario() -> Iterator[str]:
+    yield from ("## Keys of a scenario", "", *key_table(scenarios.KEYS))
+
+
+def _campaign() -> Iterator[str]:
+    yield from ("## Keys of a campaign", "", *key_table(plan.KEYS), "", "Of `draw`:", "", *key_table(plan.DRAW))
+
+
+def _mock() -> Iterator[str]:
+    yield from ("## Keys of a rule", "", *key_table(mocks.RULE))
+
+
 PAGES: Mapping[str, Callable[[], Iterable[str]]] = {
     "docs/reference/robots.md": _robot,
     "docs/how-to/on-the-robot.md": _deployment,
     "docs/reference/bridge.md": _bridge,
+    "docs/how-to/scenarios.md": _scenario,
+    "docs/how-to/campaigns.md": _campaign,
+    "docs/reference/mocks.md": _mock,
 }

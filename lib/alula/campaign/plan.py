@@ -9,12 +9,38 @@ from pathlib import Path
 
 from alula.campaign.drawing import MAX_SEED, Draw, Kind, Kinds
 from alula.common.faults import FaultError, FaultRequest, parse_fault
+from alula.common.keys import Key
 from alula.common.located_yaml import Located, choices, read_yaml
 from alula.common.scenarios import mission_names
 from alula.records.errors import AnalysisError
 
-KEYS = ("about", "over", "scenarios", "seeds", "faults", "runs", "seed", "draw", "worlds", "options", "limit_s", "behaviour", "at_once")
-DRAW = ("faults", "least", "most", "in_turn", "at_s", "lasts_s")
+KEYS: Mapping[str, Key] = {
+    "about": Key("a sentence"),
+    "over": Key("`mocks`, or `simulator`: live runs, whose folders stay", "`mocks`"),
+    "scenarios": Key("one that is named twice is run twice as often", "all that have a mission"),
+    "seeds": Key("with `faults`: every scenario with every seed and every list", "`[0]`"),
+    "faults": Key("lists of faults as of `--fail`: `[[], [zed@30], [zed@30, lidar@50]]`", "`[[]]`"),
+    "runs": Key("how many are drawn, instead of `seeds` and `faults`"),
+    "seed": Key("of the drawing", "0"),
+    "draw": Key("what is drawn for each run: below"),
+    "worlds": Key("live: a world file by scenario, `{mapping: FILE}`", "the scenario's"),
+    "options": Key("live: the robot's own options, as `{rate: 0}` (`alula run --options`)"),
+    "limit_s": Key("live: ends a run that hangs, seconds of mission clock", "no limit"),
+    "behaviour": Key("behaviour files on top of the robot's own mocks"),
+    "at_once": Key("how many runs at a time", "one a core; live: 1"),
+}
+DRAW: Mapping[str, Key] = {
+    "faults": Key(
+        "entries to draw from, for all scenarios or by scenario. An entry is a fault, or a list of kinds of which one is drawn: "
+        '`[zed:dead, zed:late, {"zed:dark": 5}]` (dark for 5 s); a thing is in one entry only',
+        "`in_turn`",
+    ),
+    "least": Key("number of faults a run, at least", "0"),
+    "most": Key("and at most, each of another entry", "1"),
+    "in_turn": Key("instead: the runs of a scenario take its lists one after another, as `{mapping: [[], [zed], [zed, lidar]]}`"),
+    "at_s": Key("when, in seconds after the departure", "`[0, 90]`"),
+    "lasts_s": Key("half of them end again after so long", "none ends"),
+}
 MOCKS, SIMULATOR = "mocks", "simulator"
 MOST_RUNS = 1_000_000
 

@@ -2,17 +2,33 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from dataclasses import dataclass
 from pathlib import Path
 
 from alula.common.errors import AlulaError
+from alula.common.keys import Key
 from alula.common.located_yaml import Located, read_yaml
 from alula.common.public import public
 from alula.common.robots import RobotError, find_robot
 from alula.common.suggestions import with_nearest
 
 NEEDED = ("about", "skillsets")
-KEYS = ("about", "world", "mission", "skillsets", "launch", "report", "faults", "processes", "fallback", "motion", "robots", "library")
+KEYS: Mapping[str, Key] = {
+    "about": Key("a sentence", "needed"),
+    "world": Key("name or file of what stands there, route, radio zones; `--world` names another one"),
+    "mission": Key("the file of its tree, as `missions/inspection.xml`", "[none](#without-a-mission)"),
+    "skillsets": Key("whose managers are started", "needed"),
+    "launch": Key("launch file, `package/file`; with plain roslaunch it runs the scenario, too", "over mocks only"),
+    "report": Key("parts of the report that the robot adds, of the drone `map` and `video`"),
+    "faults": Key("what can fail besides what the robot's own options say, and how: `radio: [critical, out]`, `encoder: [killed, hung]`"),
+    "processes": Key("which of them are processes, which can be `killed` or `hung`, and their nodes: `encoder: video_stream`"),
+    "fallback": Key("the skill whose running makes the robot safe after a failure"),
+    "motion": Key("the skills that take it on then"),
+    "robots": Key("of a fleet: how each robot serves its skills ([fleets](fleets.md))"),
+    "library": Key("folders and files, from this file on, whose trees the mission may use without including them: `[../trees]`"),
+}
+"""What a scenario may say."""
 
 
 class ScenarioError(AlulaError):

@@ -8,17 +8,51 @@ from collections.abc import Collection, Mapping, Sequence
 from pathlib import Path
 from typing import TypeVar
 
+from alula.common.keys import Key
 from alula.common.located_yaml import Located, choices, read_yaml
 from alula.common.public import public
-from alula.mock.behaviour import NEVER, Behaviour, DataScript, Ending, MockChange, MockFault, Place, Rule, TimelineEvent, Value
+from alula.mock.behaviour import (
+    DEFAULT_DELAY_S,
+    NEVER,
+    Behaviour,
+    DataScript,
+    Ending,
+    MockChange,
+    MockFault,
+    Place,
+    Rule,
+    TimelineEvent,
+    Value,
+)
 from alula.mock.errors import BehaviourError
 from alula.mock.formula import NO_RESOURCES, Formula, FormulaError
 from alula.model.model import Skill, Skillset
 
 SECTIONS = ("memory", "skills", "timeline", "faults", "data")
-CONDITIONS = ("call", "when", "chance")
 ENDINGS = ("result", "refuse", "crash", "never")
-RULE = (*CONDITIONS, "delay", *ENDINGS, "message", "progress", "outputs", "then", "moves")
+RULE: Mapping[str, Key] = {
+    "call": Key("condition: the third request of this skill (`3`), refused ones counted", "each"),
+    "when": Key("condition: a formula over inputs and memory, `target.x > 40`", "always"),
+    "chance": Key("condition: in so many of the calls, `0.1`", "all"),
+    "delay": Key("seconds from the start to the end: `2 + height / speed`", f"{DEFAULT_DELAY_S:g}"),
+    "result": Key("how it ends, `ARRIVED`, or with weights, `{ARRIVED: 9, BLOCKED: 1}`", "its first success"),
+    "message": Key("the text that goes with `result`"),
+    "refuse": Key("a text: `validate` refuses, NOT_VALIDATED"),
+    "crash": Key("a text: the function raises (after the delay, if one is given): FAILED"),
+    "never": Key("`true`: runs until it is interrupted or violated", "if it has no success"),
+    "progress": Key(
+        "formula of `t` (seconds), `f` (part of the delay), `delay`, as `f * f`; or points (part, progress), `[[0, 0], [0.5, 0.2], [1, 1]]`"
+    ),
+    "outputs": Key("outputs of the model, `{reached: height}`; text for a `string`, formulas for the rest"),
+    "then": Key(
+        "extern transitions while it runs, `[{after: 2.5, set: {navigation.flight_status: IN_AIR}}]`; none once it was stopped",
+        "none",
+    ),
+    "moves": Key(
+        'brings a part of the memory there, evenly over the delay; stopped half-way, it is half-way: `{position: "[target.x, target.y]"}`'
+    ),
+}
+"""What a rule may say: conditions of the call, and what it does."""
 DEFAULT_PERIOD_S = 0.5
 States = Mapping[str, Sequence[str]]
 """Resources that a formula may ask for, with their states."""
