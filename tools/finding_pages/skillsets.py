@@ -9,15 +9,20 @@ the rules, and what `check` prints of an example is what it prints.
 from __future__ import annotations
 
 import difflib
+import re
 import sys
 from collections.abc import Callable, Iterator, Mapping
 from pathlib import Path
+from textwrap import dedent
 
 from alula.common.files import write_text
 from alula.common.generated import replaced
+from alula.language import paper
 from alula.language.codes import CODES, PROOF_CODES
 from alula.language.errors import Diagnostic
 from alula.language.models import ModelFile, check_texts
+from alula.language.notation import Notation
+from alula.language.printer import print_skillset
 from alula.prove.skillset.prover import prove
 from finding_pages.examples import LANGUAGE, PROOFS, Example, examples
 
@@ -26,26 +31,41 @@ def main() -> int:
     """Rewrite the pages in the folder that the command line names; return the exit code."""
     for name, findings in PAGES.items():
         path = Path(sys.argv[1]) / name
-        write_text(path, page(path.read_text(encoding="utf-8"), findings()))
+        write_text(path, page(path.read_text(encoding="utf-8"), findings))
     return 0
 
 
-def page(text: str, findings: str) -> str:
+def page(text: str, findings: Callable[[str], str]) -> str:
     """Return a page with its findings replaced."""
-    return replaced(text, "python -m finding_pages.skillsets skillsets", "the rules and their examples", findings.splitlines())
+    return replaced(text, "python -m finding_pages.skillsets skillsets", "the rules and their examples", findings(text).splitlines())
 
 
-def language_findings() -> str:
-    """Return the table of the findings of reading, checking and generating."""
+def language_findings(text: str) -> str:
+    """Return the table of the findings of reading, checking and generating, and the page's skill in the other notation."""
     rows = (f"| {code} | {CODES[code]} | {_shown(example)} | {example.cure} |" for code, example in examples(LANGUAGE).items())
-    return "\n".join(["| code | meaning | example | cure |", "|---|---|---|---|", *rows, ""])
+    return "\n".join(["| code | meaning | example | cure |", "|---|---|---|---|", *rows, "", *_translated(text)])
+
+
+def _translated(text: str) -> Iterator[str]:
+    """Yield the page's example of a skill as `check --to rl` prints it, without the skillset around it."""
+    shown = next(model for model in re.findall(r"^```skill\n(.*?)^```", text, re.MULTILINE | re.DOTALL) if "\nskill " in model)
+    printed = print_skillset(paper.parse(f"skillset page {{ {shown} }}"), Notation.ROBOT_LANGUAGE)
+    types, _, inside = printed.partition("skillset page {\n")
+    yield from (
+        "## The skill in the Robot Language",
+        "",
+        "```rl",
+        types.rstrip(),
+        dedent(inside.rstrip().removesuffix("}")).rstrip(),
+        "```",
+    )
 
 
 def _shown(example: Example) -> str:
     return f"`{example.broken}`" if example.broken else f"*{example.files}*"
 
 
-def proof_findings() -> str:
+def proof_findings(_text: str) -> str:
     """Return a section for each finding of the proofs: a model, what `check` says of it, and the lines that mend it."""
     known = examples(PROOFS)
     return "\n".join(line for code, meaning in PROOF_CODES.items() for line in _section(code, meaning, known[code]))
@@ -80,7 +100,7 @@ def _difference(example: Example) -> str:
     return "\n".join(line for line in lines if line[0] in "+-")
 
 
-PAGES: Mapping[str, Callable[[], str]] = {"LANGUAGE.md": language_findings, "PROOFS.md": proof_findings}
+PAGES: Mapping[str, Callable[[str], str]] = {"LANGUAGE.md": language_findings, "PROOFS.md": proof_findings}
 
 
 if __name__ == "__main__":

@@ -34,7 +34,7 @@ def proved(tmp_path, text, **options):
 def test_the_pages_are_written_of_rules_and_examples(name):
     """Mend with `python -m finding_pages.skillsets skillsets`."""
     text = (FOLDER / name).read_text()
-    assert text == page(text, PAGES[name]())
+    assert text == page(text, PAGES[name])
 
 
 def test_each_code_has_an_example():
