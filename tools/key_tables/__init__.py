@@ -1,4 +1,4 @@
-"""Writes the tables of keys of files on the manual's pages, from the code that refuses the others.
+"""Writes the tables of keys of files, messages and topics on the manual's pages, from the code that has them.
 
 PYTHONPATH=tools setup/in_ros2 python -m key_tables
 """
@@ -9,10 +9,11 @@ from collections.abc import Callable, Iterable, Iterator, Mapping
 from pathlib import Path
 
 from alula.campaign import plan
-from alula.common import deployments, robot_page, robots, scenarios
+from alula.common import deployments, record, robot_page, robots, scenarios
 from alula.common.generated import key_table, replaced, table
 from alula.common.keys import Key
 from alula.mock import reading as mocks
+from key_tables.interfaces import definitions, nodes, rooms, topics
 from ros_bridge import config_file, discovery_options
 
 ALULA_ROOT = Path(__file__).resolve().parents[2]
@@ -65,6 +66,27 @@ def _mock() -> Iterator[str]:
     yield from ("## Keys of a rule", "", *key_table(mocks.RULE))
 
 
+def _record() -> Iterator[str]:
+    yield from ("## Topics of `skills.mcap`", "", *topics(record))
+
+
+def _skillset_interfaces() -> Iterator[str]:
+    yield from ("## Messages of a skillset", "", "Of `skillset_interfaces`.", "")
+    yield from definitions(ALULA_ROOT / "bridge/interfaces/skillset_interfaces")
+
+
+def _drone() -> Iterator[str]:
+    yield from ("## Messages of the drone", "", "Of `uav_msgs`.", "", *definitions(ALULA_ROOT / "bridge/interfaces/uav_msgs"))
+
+
+def _nodes() -> Iterator[str]:
+    yield from ("## Alula's nodes", "", *nodes())
+
+
+def _rooms() -> Iterator[str]:
+    yield from ("## Rooms of the library", "", *rooms(ALULA_ROOT / "tests/test_rooms.py", ALULA_ROOT / "lib/alula"))
+
+
 PAGES: Mapping[str, Callable[[], Iterable[str]]] = {
     "docs/reference/robots.md": _robot,
     "docs/how-to/on-the-robot.md": _deployment,
@@ -72,4 +94,9 @@ PAGES: Mapping[str, Callable[[], Iterable[str]]] = {
     "docs/how-to/scenarios.md": _scenario,
     "docs/how-to/campaigns.md": _campaign,
     "docs/reference/mocks.md": _mock,
+    "docs/reference/records.md": _record,
+    "docs/reference/names.md": _skillset_interfaces,
+    "docs/reference/drone.md": _drone,
+    "docs/reference/mission-files.md": _nodes,
+    "docs/concepts/architecture.md": _rooms,
 }

@@ -36,7 +36,7 @@ FILE = "skills.mcap"
 
 MISSION = "/mission"
 """What was asked for and how it ended: ``{scenario, outcome, reason, start_s, lift_off_s, end_s, parameters, inputs, problems}`` and what
-the plan tells; once at the start, once at the end."""
+the mission adds; once at the start, once at the end."""
 EVENTS = "/events"
 """Each event of each skillset, as ``alula.runtime.core.events`` writes it down."""
 DECISIONS = "/decisions"
@@ -51,11 +51,11 @@ TICKS = "/ticks"
 Before that also ``conditions``, all that it needs: ``[[needed, what is so instead or ""], ...]``.
 """
 REPORTS = "/reports"
-"""What the tree was told of its executions: ``{skillset, skill, id, state, progress, result, message, outputs}``, at each change."""
+"""What was reported to the tree of its executions: ``{skillset, skill, id, state, progress, result, message, outputs}``, at each change."""
 OPERATOR = "/operator"
 """What the operator did: ``{command, by}`` and what belongs to it.
 
-By "mission": what it was told (abort, pause, resume), and what holds since (paused).
+By "mission": what it received (abort, pause, resume), and what holds since (paused).
 """
 DATA = "/data"
 """Samples of data that a skillset got: ``{skillset, data, value, stamp_s}``; each where the model's conditions ask for the data, else

@@ -213,7 +213,7 @@ class Needs(Condition):
 
 
 class NoteReason(SyncAction):
-    """Keeps what went wrong up to here as the mission's reason; or, with a text, adds that to what went wrong: no skill tells it."""
+    """Keeps what went wrong up to here as the mission's reason; or, with a text, adds that to what went wrong: no skill reports it."""
 
     ports = (input_port("text", STRING, "", "what went wrong; empty: what the skills reported"),)
     ends = SUCCEEDS

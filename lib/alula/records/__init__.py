@@ -1,1 +1,1 @@
-"""What recorded runs tell: conformance to the model, expectations, comparison, campaigns. No ROS; on top of records and missions."""
+"""What is asked of recorded runs: causes, conformance to the model, expectations, comparison, replay."""

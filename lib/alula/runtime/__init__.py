@@ -1,1 +1,1 @@
-"""Executes skillsets: ``core`` without ROS, ``ros2`` managers and client over rclpy, ``hooks`` what a developer of skills writes."""
+"""Executes skillsets: managers and clients over the port to the middleware; ``live`` is what a live run is asked to be."""
