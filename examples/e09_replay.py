@@ -1,4 +1,4 @@
-"""A replay with one thing changed: the tree decides again over what was recorded, and the first difference is told.
+"""A replay with one thing changed: the tree decides again over what was recorded, and the first difference is reported.
 
 It prints:
 

@@ -13,7 +13,7 @@ from alula.common import deployments, record, robot_page, robots, scenarios
 from alula.common.generated import key_table, replaced, table
 from alula.common.keys import Key
 from alula.mock import reading as mocks
-from key_tables.interfaces import definitions, nodes, rooms, topics
+from key_tables.interfaces import definitions, examples, nodes, rooms, topics
 from ros_bridge import config_file, discovery_options
 
 ALULA_ROOT = Path(__file__).resolve().parents[2]
@@ -87,6 +87,10 @@ def _rooms() -> Iterator[str]:
     yield from ("## Rooms of the library", "", *rooms(ALULA_ROOT / "tests/test_rooms.py", ALULA_ROOT / "lib/alula"))
 
 
+def _examples() -> Iterator[str]:
+    yield from ("## Files that show one thing", "", *examples(ALULA_ROOT / "examples"))
+
+
 PAGES: Mapping[str, Callable[[], Iterable[str]]] = {
     "docs/reference/robots.md": _robot,
     "docs/how-to/on-the-robot.md": _deployment,
@@ -99,4 +103,5 @@ PAGES: Mapping[str, Callable[[], Iterable[str]]] = {
     "docs/reference/drone.md": _drone,
     "docs/reference/mission-files.md": _nodes,
     "docs/concepts/architecture.md": _rooms,
+    "examples/README.md": _examples,
 }

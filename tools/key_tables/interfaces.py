@@ -1,4 +1,4 @@
-"""What the manual lists of interfaces: fields of messages and services, topics of a record, types of nodes, the library's rooms."""
+"""What the manual lists of code: fields of messages and services, topics of a record, types of nodes, rooms of the library, examples."""
 
 from __future__ import annotations
 
@@ -66,3 +66,13 @@ def _sentence(module: Path) -> str:
     """Return the first sentence of a module's docstring."""
     text = " ".join((ast.get_docstring(ast.parse(module.read_text(encoding="utf-8"))) or "").split())
     return re.split(r"(?<=\.) ", text)[0].replace("``", "`")
+
+
+def examples(folder: Path) -> Iterator[str]:
+    """Yield the lines of a table of the examples that show one thing: what the first line of each says, without how it is run."""
+    rows = (
+        (path.name, ast.get_docstring(ast.parse(path.read_text(encoding="utf-8"))) or "") for path in sorted(folder.glob("[er]??_*.py"))
+    )
+    yield from table(
+        ("file", "what it shows"), *((f"[{name}]({name})", text.partition("\n")[0].partition(" Run:")[0]) for name, text in rows)
+    )
