@@ -59,14 +59,16 @@ class StopHere(AbstractStopHereSkill):
     """Commands no speed until the wheels stand."""
 
     def __init__(self, node: Node, watch: Watch) -> None:
+        self._watch = watch
         self._execution: Execution | None = None
         self._commands = node.create_publisher(Twist, "cmd_vel", 5)
         node.create_subscription(Odometry, "odom", self._on_odometry, 5)
-        watch.every(self._command)
+        watch.every(self._command, lambda: self._execution is not None)
 
     def on_dispatch(self, execution: Execution) -> None:
         """Begin."""
         self._execution = execution
+        self._watch.wake()
         self._command()
 
     def on_interrupt(self, execution: Execution) -> None:

@@ -34,7 +34,7 @@ class Question(SkillHooks):
         self._asked_s = 0.0
         self._voice = node.create_publisher(String, "person/ask", 5)
         node.create_subscription(String, "person/answer", self._on_answer, 5)
-        watch.every(self._look)
+        watch.every(self._look, lambda: self._execution is not None)
 
     def text(self, inputs: object) -> str:
         """Return what is said."""
@@ -43,6 +43,7 @@ class Question(SkillHooks):
     def on_dispatch(self, execution: Execution) -> None:
         """Say it."""
         self._asked_s, self._execution = self._watch.now_s, execution
+        self._watch.wake()
         self._voice.publish(String(data=self.text(execution.inputs)))
 
     def on_interrupt(self, execution: Execution) -> None:

@@ -27,11 +27,12 @@ class Eye(SkillHooks):
         self._execution: Execution | None = None
         self._since_s = self._heard_s = 0.0
         node.create_subscription(kind, topic, self._hear, 5)
-        watch.every(self._look)
+        watch.every(self._look, lambda: self._execution is not None)
 
     def on_dispatch(self, execution: Execution) -> None:
         """Begin to listen."""
         self._since_s, self._execution = self._watch.now_s, execution
+        self._watch.wake()
 
     def progress(self, execution: Execution) -> float:
         """Return 1 once something has come."""

@@ -55,11 +55,12 @@ class Supply(AbstractSupplySkill):
         self._battery = battery
         self._execution: Execution | None = None
         self._since_s = 0.0
-        battery.watch.every(self._look)
+        battery.watch.every(self._look, lambda: self._execution is not None)
 
     def on_dispatch(self, execution: Execution) -> None:
         """Begin."""
         self._since_s, self._execution = self._battery.watch.now_s, execution
+        self._battery.watch.wake()
 
     def on_interrupt(self, execution: Execution) -> None:
         """End."""
@@ -85,7 +86,7 @@ class Charge(AbstractChargeSkill):
         self._battery = battery
         self._execution: Execution | None = None
         self._best, self._best_s = 0.0, 0.0
-        battery.watch.every(self._look)
+        battery.watch.every(self._look, lambda: self._execution is not None)
 
     def validate(self, inputs: ChargeInputs) -> str:
         """Refuse what can't be reached."""
@@ -95,6 +96,7 @@ class Charge(AbstractChargeSkill):
         """Begin."""
         self._best, self._best_s = self._battery.level or 0.0, self._battery.watch.now_s
         self._execution = execution
+        self._battery.watch.wake()
 
     def on_interrupt(self, execution: Execution) -> None:
         """End."""
