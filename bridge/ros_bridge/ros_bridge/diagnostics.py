@@ -44,7 +44,10 @@ class Diagnostics:
     def publish(
         self, figures: Mapping[Spec, Figures], rates: Mapping[Spec, float], failed: Mapping[Spec, str], decisions: Iterable[Decision]
     ) -> None:
-        """Publish a status for each route: a warning while it loses messages, an error for one that can't be made."""
+        """Publish a status for each route, if it is heard: a warning while it loses messages, an error for one that can't be made."""
+        if not self._ros2.get_subscription_count() and not self._ros1.peers():
+            self._before.clear()
+            return
         statuses = [self._of_route(spec, one, rates.get(spec, 0.0)) for spec, one in figures.items()]
         statuses += [self._status(level=ERROR, name=f"ros_bridge: {spec.label}", message=reason) for spec, reason in failed.items()]
         statuses += [

@@ -8,6 +8,8 @@ import shutil
 import sys
 import threading
 import time
+from collections import Counter
+from collections.abc import Mapping
 from contextlib import nullcontext, suppress
 from pathlib import Path
 from typing import TYPE_CHECKING
@@ -64,6 +66,10 @@ class Bridge:
         """Start both nodes and their ends of the heartbeat; no route yet. ``name`` is that of the ROS 1 node. Raises BridgeError."""
         self._rates = Rates()
         self._rates_hz: dict[Spec, float] = {}
+        self._errors = 0
+        """Of all routes, at the last look."""
+        self._written: Mapping[str, object] | None = None
+        """What is in the file of figures."""
         self._config = config
         with nullcontext() if may_send_bulk(config, types) else small_segment():
             self._node = rclpy.create_node("ros_bridge")
@@ -128,6 +134,7 @@ class Bridge:
         """Publish the diagnostics, and draw the live view on a terminal."""
         figures = self.table.figures()
         self._rates_hz = self._rates.update(figures, time.monotonic())
+        self._errors = sum(one.errors for one in figures.values())
         if self._diagnostics is not None:
             decisions = self._discovery.decisions if self._discovery is not None else []
             self._diagnostics.publish(figures, self._rates_hz, self.table.failed, decisions)
@@ -137,19 +144,23 @@ class Bridge:
             sys.stdout.flush()
 
     def _write(self, stats_file: Path) -> None:
+        figures = summary(self.table.figures(), self._rates_hz)
+        if figures == self._written and stats_file.is_file():
+            return
         try:
-            write_json(stats_file, summary(self.table.figures(), self._rates_hz))
+            write_json(stats_file, figures)
+            self._written = figures
         except OSError as error:
             logger.warning("the figures can't be written to %s: %s", stats_file, error)
 
     def _state(self) -> dict[str, object]:
         """Return the content of a heartbeat besides its number."""
-        routes = self.table.running()
+        routes = Counter(SECTION_OF[type(spec)] for spec in self.table.running())
         return {
             "pid": os.getpid(),
             "ros1_master": self._monitor.state.reachable,
-            **{section: sum(SECTION_OF[type(spec)] == section for spec in routes) for section in SECTION_OF.values()},
-            "errors": sum(route.figures().errors for route in routes.values()),
+            **{section: routes[section] for section in SECTION_OF.values()},
+            "errors": self._errors,
         }
 
     def close(self) -> None:

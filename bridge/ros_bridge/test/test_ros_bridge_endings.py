@@ -4,12 +4,14 @@ import json
 import signal
 from xmlrpc.client import ServerProxy
 
+from diagnostic_msgs.msg import DiagnosticArray
 from ros_bridge_harness import BridgeProcess, Master, Ros1Peer
 from ros_bridge_nodes import Ros2Peer, open_up
 from std_msgs.msg import String
 
 from alula.common.network import free_port
 from alula_testing.waits import HANGS_S, until
+from ros_bridge.node import LOOKS_A_STATS_FILE
 
 
 def test_interrupt_ends_the_bridge_with_its_figures(master, ros2_domain, tmp_path):
@@ -22,6 +24,22 @@ def test_interrupt_ends_the_bridge_with_its_figures(master, ros2_domain, tmp_pat
         about = {"ros2_name": "/bt_end", "direction": "ros1_to_ros2", "type": "std_msgs/String", "rate_hz": 0.0}
         figures = {"count": 0, "bytes": 0, "p50_ms": None, "p95_ms": None, "dropped": 0, "errors": 0, "dropped_why": {}}
         assert json.loads(process.stats_file.read_text()) == {"topics": {"/bt_end": about | figures}, "services": {}, "actions": {}}
+
+
+def test_figures_are_written_where_they_have_changed_or_are_gone(master, ros2_domain, tmp_path):
+    process = BridgeProcess(master, tmp_path, "topics:\n  - {name: /bt_kept, direction: ros1_to_ros2, type: std_msgs/String}\n")
+    process.wait_running()
+    ros2 = Ros2Peer()
+    looks = ros2.subscribe("/diagnostics", DiagnosticArray)
+    until(process.stats_file.is_file, "they are written")
+    written_ns, before = process.stats_file.stat().st_mtime_ns, len(looks)
+    until(lambda: len(looks) > before + 2 * LOOKS_A_STATS_FILE, "they are looked at again")
+    assert process.stats_file.stat().st_mtime_ns == written_ns
+    process.stats_file.unlink()
+    until(process.stats_file.is_file, "they are written again")
+    ros2.tidy()
+    ros2.close()
+    assert process.close() < 5.0
 
 
 WITHOUT_ROS1 = """

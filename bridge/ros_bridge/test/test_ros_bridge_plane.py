@@ -178,6 +178,8 @@ def test_publisher_that_breaks_off_or_talks_nonsense_is_tried_again_and_harms_no
         return figures.get("/bp/fake", {}).get("errors", 0) >= 1
 
     until(counted, "the message that is none is counted")
+    beats = ros2.subscribe("/ros_bridge/state", String, LATCHED)
+    until(lambda: beats and json.loads(beats[-1].data)["errors"] >= 1, "the heartbeat tells of it")
 
 
 def test_lost_publisher_is_found_again(ros2, master, bridge):
