@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import functools
 import importlib
+import time
 from collections.abc import Callable, Mapping
 from typing import Any
 
@@ -23,6 +24,9 @@ from skillset_ros2.base import QUIET_PUBLISHER, RclpyBase
 from skillset_ros2.calls import Calls, Discovery
 from skillset_ros2.convert import message_class
 from skillset_ros2.names import ALIVE, SERVICE, SOURCE, action_type, in_namespace, latched
+
+EARLY_S = 0.02
+"""A heartbeat that is at most so early is sent for the moment that is to come."""
 
 
 class RclpyMiddleware(RclpyBase):
@@ -166,7 +170,7 @@ class RclpyMiddleware(RclpyBase):
         def beat() -> None:
             if not self._closed:
                 self._send_heartbeat()
-                self.later(ALIVE_PERIOD_S, beat)
+                self.later(until_beat_s(time.monotonic()), beat)
 
         def send() -> None:
             # Both in wall time as that is set now: whoever began first still did when the clock was set meanwhile.
@@ -204,6 +208,15 @@ class RclpyMiddleware(RclpyBase):
             callback_group=self._group,
             event_callbacks=SubscriptionEventCallbacks(liveliness=self.on_loop(changed), use_default_callbacks=False),
         )
+
+
+def until_beat_s(now_s: float) -> float:
+    """Return how long it is from a moment of the machine's monotonic clock to the next heartbeat.
+
+    All skillsets send theirs at the same moments: whoever hears several wakes once for them.
+    """
+    left_s = ALIVE_PERIOD_S - now_s % ALIVE_PERIOD_S
+    return left_s if left_s > EARLY_S else left_s + ALIVE_PERIOD_S
 
 
 class RclpyPublisher:

@@ -25,6 +25,7 @@ from alula.runtime.middleware import ALIVE_PERIOD_S  # noqa: E402
 from alula.runtime.workers import Workers  # noqa: E402
 from alula_testing.navigation import FLYING  # noqa: E402
 from skillset_ros2 import ActionClient, SkillsetNode  # noqa: E402
+from skillset_ros2.middleware import EARLY_S, until_beat_s  # noqa: E402
 from skillset_ros2.names import LATCHED  # noqa: E402
 
 S = ExecutionState
@@ -89,6 +90,16 @@ def test_heartbeats_are_messages_too_and_end_where_the_executor_hangs(anyhow):
     finally:
         go_on.set()
     until(lambda: len(heard) >= count + 3, "and go on")
+
+
+@pytest.mark.parametrize("late_s", [0.0, 0.001, 0.2, ALIVE_PERIOD_S - 2 * EARLY_S])
+def test_heartbeats_of_all_skillsets_are_due_at_the_same_moments(late_s):
+    """Whenever managers begin, and however late they send one."""
+    assert until_beat_s(1000 * ALIVE_PERIOD_S + late_s) == pytest.approx(ALIVE_PERIOD_S - late_s)
+
+
+def test_a_heartbeat_that_is_early_by_a_moment_is_not_sent_twice():
+    assert until_beat_s(1000 * ALIVE_PERIOD_S - EARLY_S / 2) == pytest.approx(ALIVE_PERIOD_S + EARLY_S / 2)
 
 
 def test_why_answers_over_the_graph(anyhow):
