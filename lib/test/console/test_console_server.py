@@ -32,7 +32,7 @@ from alula.console import acts, commands, server
 from alula.console.acts import ActError, WantedRun, read_wanted
 from alula.console.admission import is_loopback
 from alula.console.server import FEED, MAX_COMMANDS_PER_S, MAX_MESSAGE_BYTES
-from alula.report import ends
+from alula.report import aborts
 
 
 def events_in(message: dict[str, Any]) -> int:
@@ -297,8 +297,8 @@ def test_everything_off_ends_the_processes_of_the_run(make_run: Callable[..., Pa
     folder = make_run()
     assert acts.everything_off(folder) == "3 processes were ended at once"
     assert ended == [("id-run", 0.0)]
-    ends.note_abort(folder, ends.ReportedAbort(ends.FRONT, "the supervisor died"))  # which is what the front sees of it
-    assert ends.read_abort(folder) == ends.ReportedAbort(ends.OPERATOR, "everything off")
+    aborts.note_abort(folder, aborts.ReportedAbort(aborts.FRONT, "the supervisor died"))  # which is what the front sees of it
+    assert aborts.read_abort(folder) == aborts.ReportedAbort(aborts.OPERATOR, "everything off")
 
 
 @pytest.mark.parametrize(
