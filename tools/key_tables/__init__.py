@@ -13,7 +13,7 @@ from alula.common import deployments, record, robot_page, robots, scenarios
 from alula.common.generated import key_table, replaced, table
 from alula.common.keys import Key
 from alula.mock import reading as mocks
-from key_tables.interfaces import definitions, examples, nodes, rooms, topics
+from key_tables.interfaces import definitions, examples, nodes, rooms, settings, topics
 from ros_bridge import config_file, discovery_options
 
 ALULA_ROOT = Path(__file__).resolve().parents[2]
@@ -91,6 +91,11 @@ def _examples() -> Iterator[str]:
     yield from ("## Files that show one thing", "", *examples(ALULA_ROOT / "examples"))
 
 
+def _dead_man() -> Iterator[str]:
+    kinds = ("ZeroSettings", "CancelSettings", "ServiceSettings", "ScriptSettings", "ReportSettings")
+    yield from ("## Calls and report", "", *settings(ALULA_ROOT / "ros1_ws/src/alula_base/src/alula_base/settings.py", kinds))
+
+
 PAGES: Mapping[str, Callable[[], Iterable[str]]] = {
     "docs/reference/robots.md": _robot,
     "docs/how-to/on-the-robot.md": _deployment,
@@ -104,4 +109,5 @@ PAGES: Mapping[str, Callable[[], Iterable[str]]] = {
     "docs/reference/mission-files.md": _nodes,
     "docs/concepts/architecture.md": _rooms,
     "examples/README.md": _examples,
+    "ros1_ws/src/alula_base/README.md": _dead_man,
 }

@@ -6,7 +6,7 @@ import ast
 import inspect
 import itertools
 import re
-from collections.abc import Iterator
+from collections.abc import Iterable, Iterator, Mapping
 from pathlib import Path
 from types import ModuleType
 
@@ -30,7 +30,8 @@ def topics(module: ModuleType) -> Iterator[str]:
     rows = (
         (f"`{here.value.value}`", " ".join(str(below.value.value).split()).replace("``", "`"))
         for here, below in itertools.pairwise(body)
-        if isinstance(here, ast.Assign) and isinstance(here.value, ast.Constant) and str(here.value.value).startswith("/")
+        if isinstance(here, ast.Assign) and isinstance(here.value, ast.Constant)
+        if isinstance(here.value.value, str) and here.value.value.startswith("/")
         if isinstance(below, ast.Expr) and isinstance(below.value, ast.Constant)
     )
     yield from table(("topic", "what"), *rows)
@@ -76,3 +77,27 @@ def examples(folder: Path) -> Iterator[str]:
     yield from table(
         ("file", "what it shows"), *((f"[{name}]({name})", text.partition("\n")[0].partition(" Run:")[0]) for name, text in rows)
     )
+
+
+def settings(module: Path, kinds: Iterable[str]) -> Iterator[str]:
+    """Yield the lines of a table of a module's dataclasses of settings: what each does, and its keys with their defaults."""
+    tree = ast.parse(module.read_text(encoding="utf-8"))
+    constants = {ast.unparse(one.targets[0]): one.value for one in tree.body if isinstance(one, ast.Assign)}
+    classes = {one.name: one for one in tree.body if isinstance(one, ast.ClassDef)}
+    rows = ((ast.get_docstring(classes[kind]) or "", "; ".join(_keys(classes[kind], constants))) for kind in kinds)
+    yield from table(("what it does", "keys, with their defaults"), *((what.replace("``", "`"), keys) for what, keys in rows))
+
+
+def _keys(definition: ast.ClassDef, constants: Mapping[str, ast.expr]) -> Iterator[str]:
+    """Yield the fields of a class of settings; one without a default is needed, one that may be left out is in brackets."""
+    for one in definition.body:
+        if not isinstance(one, ast.AnnAssign) or not isinstance(one.value, ast.Call):
+            continue
+        name = ast.unparse(one.target)
+        if any(word.arg == "default_factory" for word in one.value.keywords):
+            yield f"`{name}` (empty)"
+        elif len(one.value.args) > 1:
+            default = one.value.args[1]
+            yield f"`{name}` ({ast.unparse(constants.get(ast.unparse(default), default))})"
+        else:
+            yield f"`{name}`"
