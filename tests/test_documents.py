@@ -113,6 +113,22 @@ def test_a_line_that_is_not_folded_is_found() -> None:
     assert too_long(f"a\n{long}\n| {long}\n```\n{long}\n```\n- {long}\n{MARK} x -->\n{long}") == [2, 7]
 
 
+def torn(text: str) -> list[int]:
+    """Return the numbers of the lines at which a table begins without its head: rows that a forge shows as text."""
+    lines = re.sub(r"^```.*?^```", lambda code: "\n" * code[0].count("\n"), text, flags=re.MULTILINE | re.DOTALL).splitlines()
+    begins = (number for number, line in enumerate(lines, start=1) if line.startswith("|") and not lines[number - 2].startswith("|"))
+    return [number for number in begins if number == len(lines) or not re.fullmatch(r"[|:\- ]+", lines[number])]
+
+
+@pytest.mark.parametrize("name", NAMES)
+def test_no_table_of_a_page_is_torn(name: str) -> None:
+    assert torn((ALULA_ROOT / name).read_text(encoding="utf-8")) == []
+
+
+def test_a_torn_table_is_found() -> None:
+    assert torn("a\n\n| a |\n|---|\n| 1 |\n\n| 2 |\n\n```\n| b |\n```\n") == [7]
+
+
 def test_the_pages_are_counted_apart_from_what_programs_write() -> None:
     page = size_of("a.md", "# A\n\nFor ü.\n\n<!-- Below this line: written by `x`. -->\n\nmore\n")
     assert (page.by_hand, page.generated) == (14, 48)
