@@ -19,11 +19,11 @@ KEYS: Mapping[str, Key] = {
     "over": Key("`mocks`, or `simulator`: live runs, whose folders stay", "`mocks`"),
     "scenarios": Key("one that is named twice is run twice as often", "all that have a mission"),
     "seeds": Key("with `faults`: every scenario with every seed and every list", "`[0]`"),
-    "faults": Key("lists of faults as of `--fail`: `[[], [zed@30], [zed@30, lidar@50]]`", "`[[]]`"),
+    "faults": Key("lists of faults as of `--fail`: `[[], [battery@30], [battery@30, door@50]]`", "`[[]]`"),
     "runs": Key("how many are drawn, instead of `seeds` and `faults`"),
     "seed": Key("of the drawing", "0"),
     "draw": Key("what is drawn for each run: below"),
-    "worlds": Key("live: a world file by scenario, `{mapping: FILE}`", "the scenario's"),
+    "worlds": Key("live: a world file by scenario, `{patrol: FILE}`", "the scenario's"),
     "options": Key("live: the robot's own options, as `{rate: 0}` (`alula run --options`)"),
     "limit_s": Key("live: ends a run that hangs, seconds of mission clock", "no limit"),
     "behaviour": Key("behaviour files on top of the robot's own mocks"),
@@ -32,12 +32,12 @@ KEYS: Mapping[str, Key] = {
 DRAW: Mapping[str, Key] = {
     "faults": Key(
         "entries to draw from, for all scenarios or by scenario. An entry is a fault, or a list of kinds of which one is drawn: "
-        '`[zed:dead, zed:late, {"zed:dark": 5}]` (dark for 5 s); a thing is in one entry only',
+        '`[door:stuck, door:slow, {"door:shut": 5}]` (shut for 5 s); a thing is in one entry only',
         "`in_turn`",
     ),
     "least": Key("number of faults a run, at least", "0"),
     "most": Key("and at most, each of another entry", "1"),
-    "in_turn": Key("instead: the runs of a scenario take its lists one after another, as `{mapping: [[], [zed], [zed, lidar]]}`"),
+    "in_turn": Key("instead: the runs of a scenario take its lists one after another, as `{patrol: [[], [battery], [battery, door]]}`"),
     "at_s": Key("when, in seconds after the departure", "`[0, 90]`"),
     "lasts_s": Key("half of them end again after so long", "none ends"),
 }
