@@ -30,7 +30,6 @@ from alula_flight.station import state as states
 from alula_flight.station.parts import recording
 from alula_flight.station.state import StationState
 from alula_flight.station.station import Station
-from alula_flight.waits import Held
 
 LOOK_S = 0.2
 ABORT_TIMEOUT_S = 150.0  # wall clock, for the mission to bring the robot to rest
@@ -77,12 +76,10 @@ class AttachedSupervisor:
         self._clock.begin(simulated=False)
         self._began_s = self._clock.now_s or 0.0
         self._serves = not load_scenario(spec.scenario).mission
-        self._held = Held(spec, part.held, self._clock)
         self._rest = Rest(
+            spec,
             part,
             self._clock,
-            self._held,
-            Held(spec, part.resting, self._clock),
             look=self._look,
             told_to_end=lambda: self._told_to_end,
             note_abort=self._note_abort,
@@ -145,7 +142,7 @@ class AttachedSupervisor:
             death = Death("mission", describe_exit(mission.returncode), self._clock.now_s)
             note_death(self._out, death)
             note_abort(self._out, ReportedAbort(SUPERVISOR, f"{death.name} died ({death.how})", death.when_s))
-        if mission.returncode != 0 or self._serves or self._held.look():
+        if mission.returncode != 0 or self._serves or self._rest.held.look():
             self._rest.bring()  # what the mission could not, or there was none
         return mission.returncode if mission.returncode >= 0 else GIVEN_UP
 
@@ -155,7 +152,7 @@ class AttachedSupervisor:
         self._changed.clear()
         self._parts.look(self._clock.now_s or 0.0)
         self._look_for_the_front()
-        self._held.look()
+        self._rest.held.look()
 
     @property
     def _told_to_end(self) -> bool:

@@ -32,7 +32,7 @@ from alula_flight.mission_watch import SILENT_S, MissionWatch
 from alula_flight.outcome import GIVEN_UP, finish
 from alula_flight.process_faults import ProcessFaults, Started, process_faults_of
 from alula_flight.rest import Rest
-from alula_flight.waits import Beginning, Held
+from alula_flight.waits import Beginning
 
 OF_EVERY_ROBOT = {"mission": Consequence.REST, "master": Consequence.ABORT}
 """What the death of a process means whose name is the same in every run; the robot's part knows of the others."""
@@ -120,12 +120,10 @@ class Supervisor:
         self._asked_to_end: signal.Signals | None = None
         self._began_s: float | None = None  # mission clock
         self._beginning = Beginning(spec, part, self._clock)
-        self._held = Held(spec, part.held, self._clock)
         self._rest = Rest(
+            spec,
             part,
             self._clock,
-            self._held,
-            Held(spec, part.resting, self._clock),
             look=self._look,
             told_to_end=lambda: self._told_to_end,
             note_abort=self._note_abort,
@@ -216,7 +214,7 @@ class Supervisor:
         while True:
             self._look()
             self._beginning.look()
-            held = self._held.look()
+            held = self._rest.held.look()
             if self._watch.mission_exit is not None:
                 if self._watch.mission_exit != 0 or self._serves or held:
                     self._rest.bring()  # what the mission could not, or there was none

@@ -27,7 +27,7 @@ SWEPT_AFTER_S = 5.0
 _LAYOUT = b"port_node_abi5\0"
 """In each port that is laid out as is known here."""
 _NODE = struct.Struct("<6IB")
-"""Number, readers that wait, limits of a check and of a wait (ms), capacity, readers; bits, the lowest of which says that it is well."""
+"""Number, readers, limits of a check and of a wait (ms), capacity, readers that wait; bits, the lowest of which says that it is well."""
 _WELL = 1
 
 
@@ -117,5 +117,5 @@ def _is_node(data: bytes, place: int, number: int) -> bool:
     """Return whether what the port's number stands in front of is what Fast DDS keeps of it."""
     if data[place : place + 4] != number.to_bytes(4, "little"):
         return False
-    _, _, check_ms, wait_ms, capacity, readers, bits = _NODE.unpack_from(data, place)
-    return bool(readers <= capacity and 0 < wait_ms == check_ms // 3 and bits < 1 << 3)
+    _, _, check_ms, wait_ms, capacity, waiting, bits = _NODE.unpack_from(data, place)
+    return bool(waiting <= capacity and 0 < wait_ms == check_ms // 3 and bits < 1 << 3)

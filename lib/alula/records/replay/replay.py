@@ -137,7 +137,7 @@ class Replay:
             wall_s=time.monotonic() - begun,
             lift_off_s=None if self._record is None else self._record.departure_s,
             faults=self.robot.faults,
-            first_s=dict(self.robot.robot.faults),
+            first_s=dict(self.robot.mocks.faults),
         )
 
     # --- what the record says ----------------------------------------------------------------------------------------

@@ -98,7 +98,7 @@ class ReplayedRobot:
     def __init__(self, behaviour: Behaviour, *, start_s: float) -> None:
         self.world = LocalWorld(start_s=start_s)
         self.host = ReplayHost(self.world)
-        self.robot = MockRobot(behaviour, self.host)
+        self.mocks = MockRobot(behaviour, self.host)
         self.handles: dict[str, SkillHandle] = {}
         self.faults: list[FaultRequest] = []
         self.differs: Callable[[str], None] = lambda _: None
@@ -111,7 +111,7 @@ class ReplayedRobot:
 
     def fail(self, request: FaultRequest) -> None:
         """Have a fault happen that was not recorded; raises SkillRuntimeError where there is none."""
-        self.robot.fail(request)
+        self.mocks.fail(request)
         self.faults.append(request)
 
     def requested(self, skillset: str, skill: str, execution_id: str, then: RecordedDecision | None) -> None:
@@ -153,7 +153,7 @@ class RecordedSkills(ReplayedRobot):
         self._running: dict[str, tuple[Execution, MockSkill]] = {}
         self._progress: dict[str, float] = {}
         self._passed: set[str] = set()
-        serve_robot(self.world, self.robot, skillsets, self._make_skill)
+        serve_robot(self.world, self.mocks, skillsets, self._make_skill)
 
     def _make_skill(self, state: MockState, skillset: str, skill: Skill, rules: Sequence[Rule], chance: random.Random) -> MockSkill:
         return ReplayedSkill(self, state, skillset, skill, rules, chance)
@@ -234,11 +234,11 @@ class RecordedSkills(ReplayedRobot):
         place = (event.skillset, event.resource)
         if diverged and place in self.caused and not self._explained(event.skillset):
             return
-        self.robot.take({place: event.to_state}, event.reason)
+        self.mocks.take({place: event.to_state}, event.reason)
 
     def sample(self, skillset: str, data: str, value: object) -> None:
         """Have a data arrive, unless a fault that was not recorded makes it untrue."""
-        if self.robot.holds(skillset):
+        if self.mocks.holds(skillset):
             self.host.mocked.add(skillset)
         self.host.publish_recorded(skillset, data, value)
 

@@ -59,7 +59,10 @@ class Landing:
             self.refused = "" if answer.accepted else f"the guidance refuses to: {answer.reason}"
         except (rospy.ROSException, rospy.ServiceException) as error:
             self.refused = f"the guidance could not be told to: {error}"
-        log.info("landing: %s", self.refused or "accepted")
+        if self.refused:
+            log.warning("landing: %s", self.refused)
+        else:
+            log.info("landing: accepted")
 
     def _end_heartbeats(self) -> None:
         """Have simulated time wait no more for a mission that has ended: its heartbeats came over the bridge, which goes on."""

@@ -174,9 +174,9 @@ class RecordedFunctions(ReplayedRobot):
         """The skillset that each topic of reporters' heartbeats is about."""
         for skillset in skillsets:
             for resource in skillset.resources:
-                self.robot.on_state(skillset.name, resource.name, resource.initial)
+                self.mocks.on_state(skillset.name, resource.name, resource.initial)
             self._serve(skillset)
-        self.world.clock.soon(self.robot.begin)
+        self.world.clock.soon(self.mocks.begin)
 
     @property
     def topics(self) -> set[str]:
@@ -188,7 +188,7 @@ class RecordedFunctions(ReplayedRobot):
         node = BagNode(self.world.clock, self._called, self._subscribers, lambda: self._silent, self._action)
         real = self._robot.load(f"{self._hooks}.{name}").make_hooks(node)
         actions = importlib.import_module(f"{name}_interfaces.action")
-        mocks = self.robot.hooks_of(skillset, ShadowSkill)
+        mocks = self.mocks.hooks_of(skillset, ShadowSkill)
         hooks = {
             skill: SwitchedSkill(self, f"{name}.{skill}", real[skill], mock, getattr(actions, _camel(skill)).Goal)
             for skill, mock in mocks.items()
@@ -197,7 +197,7 @@ class RecordedFunctions(ReplayedRobot):
         self._skills += hooks.values()
         managers = self.world.serve(skillset, hooks)
         managers.on_step(functools.partial(_tell_ends, hooks))
-        managers.on_step(functools.partial(follow, self.robot, name))
+        managers.on_step(functools.partial(follow, self.mocks, name))
         for data, (topic, _) in importlib.import_module(f"{name}_managers.model").DATA_TOPICS.items():
             self._subscribers.setdefault(topic, []).append(functools.partial(self._on_data, managers, data))
 
@@ -263,10 +263,10 @@ class RecordedFunctions(ReplayedRobot):
         if service == ["transition"] and skillset in self.world.managers and (call["response"] or {}).get("accepted"):
             place = (skillset, str(call["request"]["resource"]))
             if not self._diverged or place not in self.caused:
-                self.robot.take({place: str(call["request"]["to"])}, str(call["request"].get("reason", "")))
+                self.mocks.take({place: str(call["request"]["to"])}, str(call["request"].get("reason", "")))
 
     def _on_data(self, managers: LocalManagers, data: str, message: object) -> None:
-        if self.robot.holds(managers.skillset.name):
+        if self.mocks.holds(managers.skillset.name):
             self.host.mocked.add(managers.skillset.name)
         if managers.alive and managers.skillset.name not in self.host.mocked:
             managers.publish(data, message)
